@@ -1,0 +1,1 @@
+"""flexcal: makes industrial robots accurate."""
