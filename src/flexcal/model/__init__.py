@@ -1,1 +1,23 @@
-"""TODO"""
+"""URDF and robot.yaml to RobotModel, and its forward maps, each with exact derivatives."""
+
+from flexcal.model.elastic_joint import ElasticJoint
+from flexcal.model.equilibrium import Equilibrium, gravity_torque, static_equilibrium
+from flexcal.model.inertia import Inertia
+from flexcal.model.joint import Joint
+from flexcal.model.kinematics import PointKinematics, point_kinematics
+from flexcal.model.point import Payload, Point
+from flexcal.model.robot_model import RobotModel
+
+__all__ = [
+    "ElasticJoint",
+    "Equilibrium",
+    "Inertia",
+    "Joint",
+    "Payload",
+    "Point",
+    "PointKinematics",
+    "RobotModel",
+    "gravity_torque",
+    "point_kinematics",
+    "static_equilibrium",
+]

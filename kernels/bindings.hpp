@@ -1,0 +1,6 @@
+// Each kernel adds itself to the module.
+#pragma once
+#include <nanobind/nanobind.h>
+
+void bind_closed_loop(nanobind::module_& m);
+void bind_tree(nanobind::module_& m);

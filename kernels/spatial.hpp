@@ -1,0 +1,66 @@
+// Three-vectors and rotation matrices, small enough to live in registers.
+#pragma once
+#include <array>
+#include <cmath>
+
+namespace flexcal {
+
+struct Vector3 {
+    double x, y, z;
+};
+
+inline Vector3 operator+(Vector3 a, Vector3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+inline Vector3 operator-(Vector3 a, Vector3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+inline Vector3 operator*(double s, Vector3 a) { return {s * a.x, s * a.y, s * a.z}; }
+inline double dot(Vector3 a, Vector3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+inline Vector3 cross(Vector3 a, Vector3 b) {
+    return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
+}
+inline Vector3 vector3(const double* p) { return {p[0], p[1], p[2]}; }
+
+// A rotation as its three columns: the images of x, y and z.
+struct Rotation {
+    Vector3 x, y, z;
+};
+
+inline Vector3 operator*(const Rotation& r, Vector3 v) { return v.x * r.x + v.y * r.y + v.z * r.z; }
+inline Rotation operator*(const Rotation& a, const Rotation& b) { return {a * b.x, a * b.y, a * b.z}; }
+inline Rotation identity() { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; }
+inline Rotation transpose(const Rotation& r) {
+    return {{r.x.x, r.y.x, r.z.x}, {r.x.y, r.y.y, r.z.y}, {r.x.z, r.y.z, r.z.z}};
+}
+
+// Row-major 3x3 array to columns.
+inline Rotation rotation(const double* m) {
+    return {{m[0], m[3], m[6]}, {m[1], m[4], m[7]}, {m[2], m[5], m[8]}};
+}
+
+// r · R_z(angle), r · R_y(angle), r · R_x(angle): turns about an axis of the rotated frame itself.
+inline void turn_z(Rotation& r, double angle) {
+    const double c = std::cos(angle), s = std::sin(angle);
+    const Vector3 x = c * r.x + s * r.y;
+    r.y = c * r.y - s * r.x;
+    r.x = x;
+}
+inline void turn_y(Rotation& r, double angle) {
+    const double c = std::cos(angle), s = std::sin(angle);
+    const Vector3 z = c * r.z + s * r.x;
+    r.x = c * r.x - s * r.z;
+    r.z = z;
+}
+inline void turn_x(Rotation& r, double angle) {
+    const double c = std::cos(angle), s = std::sin(angle);
+    const Vector3 y = c * r.y + s * r.z;
+    r.z = c * r.z - s * r.y;
+    r.y = y;
+}
+
+// Rotation by an angle about a unit axis (Rodrigues).
+inline Rotation about(Vector3 a, double angle) {
+    const double c = std::cos(angle), s = std::sin(angle), d = 1 - c;
+    return {{c + d * a.x * a.x, d * a.x * a.y + s * a.z, d * a.x * a.z - s * a.y},
+            {d * a.x * a.y - s * a.z, c + d * a.y * a.y, d * a.y * a.z + s * a.x},
+            {d * a.x * a.z + s * a.y, d * a.y * a.z - s * a.x, c + d * a.z * a.z}};
+}
+
+}  // namespace flexcal

@@ -1,0 +1,38 @@
+import numpy as np
+
+class Tree:
+    @staticmethod
+    def build(
+        parents: list[int],
+        prismatic: list[bool],
+        placements: np.ndarray,
+        translations: np.ndarray,
+        normals: np.ndarray,
+        bearings: np.ndarray,
+    ) -> Tree: ...
+    def point(
+        self,
+        joint: int,
+        placement: np.ndarray,
+        translation: np.ndarray,
+        target: np.ndarray,
+        geometry: np.ndarray,
+        tool: np.ndarray,
+        q: np.ndarray,
+        deflection: np.ndarray,
+        jacobians: bool,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]: ...
+    def equilibrium(
+        self,
+        axes: list[tuple[int, int]],
+        stiffness: np.ndarray,
+        geometry: np.ndarray,
+        mass: np.ndarray,
+        first_moment: np.ndarray,
+        payload: np.ndarray,
+        payload_joint: int,
+        payload_point: np.ndarray,
+        gravity: np.ndarray,
+        q: np.ndarray,
+        sensitivities: bool,
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]: ...

@@ -1,0 +1,127 @@
+"""A calibrated URDF: joint origins and the tool moved to where they were found to be."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.atomic import write_text
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel, point_kinematics, static_equilibrium
+from flexcal.model.rotations import axis_rotation, rotation_rpy, rpy_rotation
+from flexcal.units import MILLIMETRE
+
+_SAMPLES = 2000
+
+
+@dataclass(frozen=True)
+class UrdfExport:
+    """What was written, and what a URDF cannot say: `lost` terms and the tool error that leaving them out makes (m)."""
+
+    path: Path
+    lost: tuple[str, ...]
+    mean_loss: float
+    max_loss: float
+
+    def __str__(self) -> str:
+        if not self.lost:
+            return f"{self.path}: nothing is lost; forward kinematics agree to rounding."
+        return (
+            f"{self.path}: a URDF cannot carry {', '.join(self.lost)}; without them the tool is off by "
+            f"{self.mean_loss / MILLIMETRE:.3f} mm on average and {self.max_loss / MILLIMETRE:.3f} mm at most over the joint range."
+        )
+
+
+def write_urdf(model: RobotModel, path: str | Path, *, rng: np.random.Generator | None = None) -> UrdfExport:
+    """Write the URDF of `model` with its geometric errors in the joint origins, and a link a point of `points:` there.
+
+    The point links are named after the points. Offsets, misalignments and lengths (Eqs. 15-17) fit a URDF exactly; deflection, backlash
+    and transmission errors do not, and what leaving them out costs is measured on random poses and returned. Raises `FlexcalError` where
+    a point's name is already a link's, or the file cannot be written.
+    """
+    path = Path(path)
+    tree = ET.parse(model.urdf, ET.XMLParser(target=ET.TreeBuilder(insert_comments=True)))
+    root = tree.getroot()
+    joints = {joint.get("name"): joint for joint in root.findall("joint")}
+    for i, joint in enumerate(model.joints):
+        errors = model.geometry[i]
+        length = model.geometry[joint.parent, 3:] if joint.parent >= 0 else np.zeros(3)
+        turn = (
+            axis_rotation(joint.normals[1], errors[2]) @ axis_rotation(joint.normals[0], errors[1])
+            if joint.kind == "prismatic"
+            else axis_rotation(joint.normals[1], errors[2])
+            @ axis_rotation(joint.normals[0], errors[1])
+            @ axis_rotation(joint.axis, errors[0])
+        )
+        shift = joint.rotation.T @ length
+        if joint.kind == "prismatic":
+            shift = shift + turn @ joint.axis * errors[0]
+        _move(joints[joint.name], shift, turn)
+    _add_points(model, root)
+    ET.indent(tree)
+    text = ET.tostring(root, encoding="unicode", xml_declaration=False)
+    write_text(path, '<?xml version="1.0"?>\n' + text + "\n")
+    return _measure_loss(model, path, np.random.default_rng(0) if rng is None else rng)
+
+
+def _move(joint: ET.Element, shift: np.ndarray, turn: np.ndarray) -> None:
+    """Append Trans(shift) · turn to a joint's origin; leaves the origin as it was written where both are nothing."""
+    if not shift.any() and (turn == np.eye(3)).all():
+        return
+    origin = joint.find("origin")
+    if origin is None:
+        origin = ET.SubElement(joint, "origin")
+    xyz = np.array([float(v) for v in origin.get("xyz", "0 0 0").split()])
+    rotation = rpy_rotation(np.array([float(v) for v in origin.get("rpy", "0 0 0").split()]))
+    _place(origin, xyz + rotation @ shift, rotation @ turn)
+
+
+def _place(origin: ET.Element, xyz: np.ndarray, rotation: np.ndarray) -> None:
+    origin.set("xyz", " ".join(repr(float(v)) for v in xyz))
+    origin.set("rpy", " ".join(repr(float(v)) for v in rotation_rpy(rotation)))
+
+
+def _add_points(model: RobotModel, root: ET.Element) -> None:
+    links = {link.get("name") for link in root.findall("link")}
+    z, x, y = np.eye(3)[[2, 0, 1]]
+    tool_turn = (
+        axis_rotation(y, model.tool[2]) @ axis_rotation(x, model.tool[1]) @ axis_rotation(z, model.tool[0])
+    )
+    for k, (name, point) in enumerate(model.points.items()):
+        if name in links:
+            raise FlexcalError(
+                f"the point '{name}' has the name of a link of {model.urdf.name}; rename it under `points:`."
+            )
+        offset = point.xyz + model.point_error[k] + (model.tool[3:] if k == 0 else 0.0)
+        rotation = point.rotation @ tool_turn
+        ET.SubElement(root, "link", name=name)
+        joint = ET.SubElement(root, "joint", name=f"{name}_point", type="fixed")
+        arm = point.translation + model.geometry[point.joint, 3:]
+        _place(ET.SubElement(joint, "origin"), arm + rotation @ offset, rotation)
+        ET.SubElement(joint, "parent", link=model.joints[point.joint].link)
+        ET.SubElement(joint, "child", link=name)
+
+
+def _measure_loss(model: RobotModel, path: Path, rng: np.random.Generator) -> UrdfExport:
+    lost = [
+        name
+        for name, present in (
+            ("elastic deflection", bool(model.elastic)),
+            ("backlash", model.backlash.any()),
+            ("gravity compliance", model.gravity_compliance.any()),
+            ("transmission error", model.transmission.any()),
+        )
+        if present
+    ]
+    if not lost or not model.points:
+        return UrdfExport(path, tuple(lost), 0.0, 0.0)
+    lower = [max(joint.lower, -np.pi) for joint in model.joints]
+    upper = [min(joint.upper, np.pi) for joint in model.joints]
+    q = rng.uniform(lower, upper, (_SAMPLES, model.n))
+    bent = point_kinematics(model, q, static_equilibrium(model, q).deflection, jacobians=False).position
+    straight = point_kinematics(model, q, jacobians=False).position
+    distance = np.linalg.norm(bent - straight, axis=1)
+    return UrdfExport(path, tuple(lost), float(distance.mean()), float(distance.max()))

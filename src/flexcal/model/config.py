@@ -1,0 +1,172 @@
+"""What a user writes in robot.yaml, one frozen dataclass a block (FORMATS: robot.yaml)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from flexcal.errors import FlexcalError
+
+Triple = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PointConfig:
+    """A reflector: nominal position `xyz` (m) in the URDF frame `frame`."""
+
+    frame: str
+    xyz: Triple
+
+
+@dataclass(frozen=True)
+class PayloadConfig:
+    """A body held by the robot: kg, m, kg m² about its centre of mass, in the axes of `frame`."""
+
+    frame: str
+    mass: float
+    com: Triple
+    mass_std: float = 0.0
+    inertia: tuple[Triple, Triple, Triple] | None = None
+
+    def __post_init__(self) -> None:
+        if self.mass < 0 or self.mass_std < 0:
+            raise FlexcalError("the payload's mass and mass_std must not be negative.")
+
+
+@dataclass(frozen=True)
+class PriorConfig:
+    """How far the URDF's inertials may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative)."""
+
+    mass: float = 0.07
+    com: float = 0.010
+    rotor_inertia: float = 0.05
+
+
+@dataclass(frozen=True)
+class CouplingConfig:
+    """A transmission in which `motor` also turns `joint`, by `ratio`."""
+
+    motor: str
+    joint: str
+    ratio: float
+
+
+@dataclass(frozen=True)
+class DrivesConfig:
+    """Drive values referred to the joint, one entry per joint: kg m², N m s/rad, N m, turns per turn."""
+
+    rotor_inertia: tuple[float, ...] | None = None
+    viscous: tuple[float, ...] | None = None
+    coulomb: tuple[float, ...] | None = None
+    ratio: tuple[float, ...] | None = None
+    coupling: tuple[CouplingConfig, ...] = ()
+
+
+@dataclass(frozen=True)
+class SpringConfig:
+    """Stiffness (N m/rad) and damping (N m s/rad) of one spring."""
+
+    stiffness: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.stiffness > 0:
+            raise FlexcalError(f"a stiffness must be positive, not {self.stiffness:g} N m/rad.")
+        if self.damping < 0:
+            raise FlexcalError(f"a damping must not be negative, not {self.damping:g} N m s/rad.")
+
+
+@dataclass(frozen=True)
+class ElasticConfig:
+    """An elastic joint: its drive spring and, optionally, the two bearing springs.
+
+    `frame_rpy` turns the parent link's axes into the bearing's: z is the joint axis, x and y the tilt axes at q = 0. The default takes
+    the joint's own axis as z and the first axis normal to it, in cyclic order, as x.
+    """
+
+    joint: str
+    drive: SpringConfig
+    bearing_x: SpringConfig | None = None
+    bearing_y: SpringConfig | None = None
+    frame_rpy: Triple | None = None
+
+    def __post_init__(self) -> None:
+        if (self.bearing_x is None) != (self.bearing_y is None):
+            raise FlexcalError(
+                f"the elastic joint '{self.joint}' has one bearing spring; give bearing_x and bearing_y or neither."
+            )
+
+
+@dataclass(frozen=True)
+class GeometryConfig:
+    """Which terms the geometric calibration may use, and the joints with backlash."""
+
+    terms: str | tuple[str, ...] = "auto"
+    backlash: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        known = ("kinematic", "backlash", "gravity_compliance", "transmission")
+        if isinstance(self.terms, str) and self.terms != "auto":
+            raise FlexcalError(
+                f"geometry terms must be 'auto' or a list out of {', '.join(known)}, not '{self.terms}'."
+            )
+        for term in () if isinstance(self.terms, str) else self.terms:
+            if term not in known:
+                raise FlexcalError(f"unknown geometry term '{term}'; known are {', '.join(known)}.")
+
+
+@dataclass(frozen=True)
+class DynamicsConfig:
+    """Signal treatment of the dynamic identification; absent values are proposed from the data."""
+
+    friction: str | tuple[str, ...] = "auto"
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+    mask_standstill: bool = True
+
+
+@dataclass(frozen=True)
+class StationConfig:
+    """Where the instrument stands, in the robot's base frame (m)."""
+
+    xyz: Triple
+    line_of_sight: bool = False
+
+
+@dataclass(frozen=True)
+class ControllerConfig:
+    """Joint-side PD gains (N m/rad, N m s/rad) and the rate (Hz) of the position controller."""
+
+    kp: tuple[float, ...]
+    kd: tuple[float, ...]
+    rate_hz: float
+
+
+@dataclass(frozen=True)
+class SignalConfig:
+    """How columns of a log become SI values at the joint: matrix · (gain ⊙ column · unit) + offset · unit."""
+
+    columns: tuple[str, ...]
+    unit: str | None = None
+    gain: tuple[float, ...] | None = None
+    matrix: str | None = None
+    offset: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class RobotConfig:
+    """The whole of robot.yaml."""
+
+    robot: str
+    points: dict[str, PointConfig] = field(default_factory=dict)
+    payload: PayloadConfig | None = None
+    gravity: Triple = (0.0, 0.0, -9.81)
+    prior: PriorConfig = PriorConfig()
+    drives: DrivesConfig = DrivesConfig()
+    elastic: tuple[ElasticConfig, ...] = ()
+    geometry: GeometryConfig = GeometryConfig()
+    dynamics: DynamicsConfig = DynamicsConfig()
+    stations: dict[str, StationConfig] = field(default_factory=dict)
+    obstacles: tuple[str, ...] = ()
+    controller: ControllerConfig | None = None
+    signals: dict[str, SignalConfig] = field(default_factory=dict)
+    estimates: str = "estimates.yaml"

@@ -1,0 +1,161 @@
+"""The arm with its springs as a Pinocchio model: every elastic joint is three revolutes, twist, tilt about y, tilt about x (Eq. 1)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexcal.model.equilibrium import elastic_axes
+from flexcal.model.inertia import Inertia, parallel_axis
+from flexcal.model.loading import bearing_frame
+from flexcal.model.robot_model import RobotModel
+from flexcal.model.rotations import axis_rotation
+
+
+class ElasticArm:
+    """A robot and a payload mass (kg) in Pinocchio, with the arm's own coordinates after the drives.
+
+    `elastic` (d,) are the velocity indices of the elastic coordinates in the order of `elastic_axes`; `model` and `data` are
+    Pinocchio's. Inertias can be exchanged (`set_inertia`), which is what derivatives with respect to them need.
+    """
+
+    def __init__(self, robot: RobotModel, payload: float | None = None) -> None:
+        import pinocchio as pin
+
+        self.robot = robot
+        self.payload = float(robot.payload_mass[0] if payload is None else payload)
+        self.model: Any = pin.Model()
+        self.model.gravity = pin.Motion(robot.gravity, np.zeros(3))
+        self.bodies: list[int] = []
+        self.turns: list[np.ndarray] = []
+        first: list[int] = []
+        for i, joint in enumerate(robot.joints):
+            frame = robot.bearing_frames.get(i)
+            frame = bearing_frame(joint) if frame is None else frame
+            errors = robot.geometry[i]
+            length = robot.geometry[joint.parent, 3:] if joint.parent >= 0 else np.zeros(3)
+            aligned = (
+                joint.rotation
+                @ axis_rotation(joint.normals[1], errors[2])
+                @ axis_rotation(joint.normals[0], errors[1])
+            )
+            placement = pin.SE3(aligned @ frame, joint.translation + length)
+            if joint.parent >= 0:
+                placement = pin.SE3(self.turns[joint.parent].T, np.zeros(3)) * placement
+            parent = self.bodies[joint.parent] if joint.parent >= 0 else 0
+            kind = pin.JointModelPZ() if joint.kind == "prismatic" else pin.JointModelRZ()
+            body = self.model.addJoint(parent, kind, placement, joint.name)
+            first.append(self.model.joints[body].idx_v)
+            if i in robot.bearing_frames and np.isfinite(robot.stiffness[i, 0]):
+                body = self.model.addJoint(
+                    body, pin.JointModelRY(), pin.SE3.Identity(), f"{joint.name}.bearing_y"
+                )
+                body = self.model.addJoint(
+                    body, pin.JointModelRX(), pin.SE3.Identity(), f"{joint.name}.bearing_x"
+                )
+            self.bodies.append(body)
+            self.turns.append(frame)
+            self.set_inertia(i, robot.inertias[i])
+        self.data: Any = self.model.createData()
+        self.joint_velocity = np.array(first)
+        self.elastic = np.array([first[i] + (2 - c) for i, c in elastic_axes(robot)], dtype=int)
+
+    def set_inertia(self, joint: int, link: Inertia) -> None:
+        """Give the link of a joint another inertia; the payload is added where it hangs on that link."""
+        import pinocchio as pin
+
+        turn = self.turns[joint]
+        total = pin.Inertia(link.mass, link.com, link.inertia)
+        held = self.robot.payload
+        if held is not None and held.joint == joint and self.payload > 0:
+            total = total + self._payload_inertia(held.com)
+        self.model.inertias[self.bodies[joint]] = pin.SE3(turn.T, np.zeros(3)).act(total)
+
+    def _payload_inertia(self, com: np.ndarray) -> Any:
+        import pinocchio as pin
+
+        held = self.robot.payload
+        assert held is not None
+        scale = self.payload / held.mass if held.mass > 0 else 0.0
+        about = held.rotation @ held.inertia @ held.rotation.T * scale
+        return pin.Inertia(self.payload, held.translation + held.rotation @ com, about)
+
+    def configuration(self, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
+        """Pinocchio's configuration (nq,) of motors at `q` (n,) and the arm deflected by `deflection` (n, 3)."""
+        result = np.zeros(self.model.nq)
+        result[self.joint_velocity] = q + self.robot.geometry[:, 0] + deflection[:, 2]
+        for at, (joint, component) in zip(self.elastic, elastic_axes(self.robot), strict=True):
+            if component != 2:
+                result[at] = deflection[joint, component]
+        return result
+
+    def mass_matrix(self, configuration: np.ndarray) -> np.ndarray:
+        """Mass matrix (d, d) of the elastic coordinates, kg m²."""
+        import pinocchio as pin
+
+        full = pin.crba(self.model, self.data, configuration)
+        full = np.triu(full) + np.triu(full, 1).T
+        return full[np.ix_(self.elastic, self.elastic)]
+
+    def gravity_stiffness(self, configuration: np.ndarray) -> np.ndarray:
+        """Gravity stiffness ∂g/∂q (d, d) of the elastic coordinates, N m/rad."""
+        import pinocchio as pin
+
+        full = pin.computeGeneralizedGravityDerivatives(self.model, self.data, configuration)
+        return np.array(full)[np.ix_(self.elastic, self.elastic)]
+
+    def mass_matrix_derivatives(self, configuration: np.ndarray) -> np.ndarray:
+        """∂M/∂q (d, d, d): the last index is the elastic coordinate that moves."""
+        import pinocchio as pin
+
+        rest = np.zeros(self.model.nv)
+        weight = np.array(pin.computeGeneralizedGravityDerivatives(self.model, self.data, configuration))
+        columns = []
+        for at in self.elastic:
+            push = rest.copy()
+            push[at] = 1.0
+            by_q = pin.computeRNEADerivatives(self.model, self.data, configuration, rest, push)[0]
+            columns.append((np.array(by_q) - weight)[np.ix_(self.elastic, self.elastic)])
+        return np.stack(columns, axis=1)
+
+    def gravity_stiffness_derivatives(self, configuration: np.ndarray) -> np.ndarray:
+        """∂²g/∂q² (d, d, d): for k before j before l it is -gᵀ(a_k × (a_j × (a_l × S_l))), S_l the first moment beyond l."""
+        import pinocchio as pin
+
+        pin.centerOfMass(self.model, self.data, configuration, True)
+        d = len(self.elastic)
+        axes, moments = np.empty((d, 3)), np.empty((d, 3))
+        ids = [self._joint_of(at) for at in self.elastic]
+        for k, joint in enumerate(ids):
+            placement = self.data.oMi[joint]
+            unit = {"Z": 2, "Y": 1, "X": 0}[self.model.joints[joint].shortname()[-1]]
+            axes[k] = placement.rotation[:, unit]
+            moments[k] = self.data.mass[joint] * (placement.rotation @ self.data.com[joint])
+        result = np.zeros((d, d, d))
+        supports = [set(self.model.supports[joint]) for joint in ids]
+        for last in range(d):
+            turned = np.cross(axes[last], moments[last])
+            for middle in range(last + 1):
+                twice = np.cross(axes[middle], turned)
+                for before in range(middle + 1):
+                    if ids[before] in supports[middle] and ids[middle] in supports[last]:
+                        value = -self.robot.gravity @ np.cross(axes[before], twice)
+                        for at in {
+                            (before, middle, last), (before, last, middle), (middle, before, last),
+                            (middle, last, before), (last, before, middle), (last, middle, before),
+                        }:  # fmt: skip
+                            result[at] = value
+        return result
+
+    def _joint_of(self, velocity: int) -> int:
+        return next(i for i in range(1, self.model.njoints) if self.model.joints[i].idx_v == velocity)
+
+
+def moved_inertia(link: Inertia, mass: float, com: np.ndarray) -> Inertia:
+    """A link with another mass and centre of mass: the inertia about the centre of mass scales with the mass and moves along."""
+    scale = mass / link.mass if link.mass > 0 else 1.0
+    return Inertia(mass, com, link.inertia * scale)
+
+
+__all__ = ["ElasticArm", "moved_inertia", "parallel_axis"]

@@ -1,0 +1,21 @@
+"""The inertia of a link."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Inertia:
+    """Mass (kg), centre of mass (3,) in the link frame (m), inertia (3, 3) about the centre of mass in link axes (kg m²)."""
+
+    mass: float
+    com: np.ndarray
+    inertia: np.ndarray
+
+
+def parallel_axis(mass: float, com: np.ndarray) -> np.ndarray:
+    """What moving the reference from the centre of mass to the frame's origin adds to the inertia, (3, 3) kg m²."""
+    return mass * ((com @ com) * np.eye(3) - np.outer(com, com))

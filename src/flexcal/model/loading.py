@@ -1,0 +1,192 @@
+"""robot.yaml and URDF to RobotModel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flexcal._kernels import Tree
+from flexcal.model.config import ElasticConfig, RobotConfig
+from flexcal.model.joint import Joint
+from flexcal.model.point import Payload, Point
+from flexcal.model.robot_model import RobotModel
+from flexcal.model.rotations import rpy_rotation
+from flexcal.model.urdf import Description, Frame, read_urdf
+from flexcal.yaml_reader import YamlFile, read_yaml_file
+
+HARMONICS = (1, 2, 3)
+
+
+def load_robot(path: Path, *, estimates: bool) -> RobotModel:
+    """Read a robot; raises `InputError` with file and line for everything that does not fit together."""
+    file = read_yaml_file(path)
+    config = file.structure(RobotConfig)
+    urdf = path.parent / config.robot
+    description = read_urdf(urdf)
+    model = _assemble(file, config, urdf, description)
+    stored = path.parent / config.estimates
+    if estimates and stored.exists():
+        from flexcal.model.stored import apply_estimates
+
+        model = apply_estimates(model, stored)
+    return model
+
+
+def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Description) -> RobotModel:
+    joints = description.joints
+    n = len(joints)
+    names = [joint.name for joint in joints]
+    for k, name in enumerate(config.geometry.backlash):
+        _joint(file, ("geometry", "backlash", k), names, name)
+    points = {name: _point(file, description, name, config) for name in config.points}
+    payload = _payload(file, description, config)
+    stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    bearing_frames: dict[int, np.ndarray] = {}
+    carrying = {i for p in points.values() for i in _path(joints, p.joint)}
+    for k, entry in enumerate(config.elastic):
+        i = _joint(file, ("elastic", k, "joint"), names, entry.joint)
+        if i in bearing_frames:
+            raise file.error(
+                ("elastic", k), f"the joint '{entry.joint}' stands twice under `elastic:`; keep one."
+            )
+        if points and i not in carrying:
+            seen = ", ".join(points)
+            raise file.error(
+                ("elastic", k),
+                f"no declared point ({seen}) is downstream of the elastic joint '{entry.joint}'; "
+                "declare a point that it moves, or remove the joint from `elastic:`.",
+            )
+        bearing_frames[i] = _bearing_frame(file, k, entry, joints[i])
+        stiffness[i, 2], damping[i, 2] = entry.drive.stiffness, entry.drive.damping
+        for c, spring in enumerate((entry.bearing_x, entry.bearing_y)):
+            if spring is not None:
+                stiffness[i, c], damping[i, c] = spring.stiffness, spring.damping
+    stations = tuple(config.stations) or ("tracker",)
+    return RobotModel(
+        config=config,
+        path=file.path,
+        urdf=urdf,
+        name=description.name,
+        joints=joints,
+        points=points,
+        nominal_payload=payload,
+        bearing_frames=bearing_frames,
+        tree=_tree(joints, bearing_frames),
+        stations=stations,
+        harmonics=HARMONICS,
+        geometry=np.zeros((n, 6)),
+        tool=np.zeros(6),
+        point_error=np.zeros((len(points), 3)),
+        station=np.zeros((len(stations), 6)),
+        backlash=np.zeros(n),
+        gravity_compliance=np.zeros(n),
+        transmission=np.zeros((n, len(HARMONICS), 2)),
+        stiffness=stiffness,
+        damping=damping,
+        rotor_inertia=_per_joint(file, config, "rotor_inertia", n),
+        viscous=_per_joint(file, config, "viscous", n),
+        coulomb=_per_joint(file, config, "coulomb", n),
+        torque_offset=np.zeros(n),
+        delay=np.zeros(n),
+        ratio=_per_joint(file, config, "ratio", n),
+        mass=np.array([y.mass for y in description.inertias]),
+        com=np.array([y.com for y in description.inertias]),
+        inertia=np.array([y.inertia for y in description.inertias]),
+        payload_mass=np.array([payload.mass if payload else 0.0]),
+        payload_com=np.array(payload.com if payload else np.zeros(3)),
+    )
+
+
+def _joint(file: YamlFile, keys: tuple[str | int, ...], names: list[str], name: str) -> int:
+    if name not in names:
+        raise file.error(keys, f"the URDF has no movable joint '{name}'; it has {', '.join(names)}.")
+    return names.index(name)
+
+
+def _frame(file: YamlFile, keys: tuple[str | int, ...], description: Description, name: str) -> Frame:
+    frame = description.frames.get(name)
+    if frame is None:
+        known = ", ".join(f for f in description.frames if f != "universe")
+        raise file.error(keys, f"the URDF lacks the frame '{name}'; it has {known}.")
+    if frame.joint < 0:
+        raise file.error(
+            keys, f"the frame '{name}' does not move with any joint; name one beyond the first joint."
+        )
+    return frame
+
+
+def _point(file: YamlFile, description: Description, name: str, config: RobotConfig) -> Point:
+    entry = config.points[name]
+    frame = _frame(file, ("points", name, "frame"), description, entry.frame)
+    return Point(name, entry.frame, frame.joint, frame.rotation, frame.translation, np.array(entry.xyz))
+
+
+def _payload(file: YamlFile, description: Description, config: RobotConfig) -> Payload | None:
+    entry = config.payload
+    if entry is None:
+        return None
+    frame = _frame(file, ("payload", "frame"), description, entry.frame)
+    com = np.array(entry.com)
+    inertia = np.zeros((3, 3)) if entry.inertia is None else np.array(entry.inertia)
+    if np.linalg.eigvalsh(inertia)[0] < 0 or np.abs(inertia - inertia.T).max() > 0:
+        raise file.error(("payload", "inertia"), "the payload's inertia must be symmetric and positive.")
+    return Payload(
+        entry.frame, frame.joint, frame.rotation, frame.translation, entry.mass, entry.mass_std, com, inertia
+    )
+
+
+def _bearing_frame(file: YamlFile, k: int, entry: ElasticConfig, joint: Joint) -> np.ndarray:
+    if joint.kind != "revolute":
+        raise file.error(
+            ("elastic", k, "joint"),
+            f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic.",
+        )
+    if entry.frame_rpy is None:
+        return bearing_frame(joint)
+    frame = joint.rotation.T @ rpy_rotation(np.array(entry.frame_rpy))
+    if frame[:, 2] @ joint.axis < 1 - 1e-6:
+        raise file.error(
+            ("elastic", k, "frame_rpy"),
+            f"the z axis of frame_rpy is not the axis of '{joint.name}'; turn it so that it is, or leave frame_rpy out.",
+        )
+    return frame
+
+
+def bearing_frame(joint: Joint) -> np.ndarray:
+    """The default bearing frame (3, 3) of a joint: z its axis, x the first axis normal to it."""
+    x = joint.normals[0]
+    return np.column_stack([x, np.cross(joint.axis, x), joint.axis])
+
+
+def _tree(joints: tuple[Joint, ...], bearing_frames: dict[int, np.ndarray]) -> Tree:
+    return Tree.build(
+        [j.parent for j in joints],
+        [j.kind == "prismatic" for j in joints],
+        np.array([j.rotation for j in joints]),
+        np.array([j.translation for j in joints]),
+        np.array([j.normals for j in joints]),
+        np.array([bearing_frames.get(i, bearing_frame(j)) for i, j in enumerate(joints)]),
+    )
+
+
+def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndarray:
+    values = getattr(config.drives, key)
+    if values is None:
+        return np.full(n, np.nan)
+    if len(values) != n:
+        raise file.error(
+            ("drives", key),
+            f"{key} has {len(values)} entries but the robot has {n} joints; give one per joint.",
+        )
+    if key != "ratio" and min(values) < 0:
+        raise file.error(("drives", key), f"{key} must not be negative.")
+    return np.array(values)
+
+
+def _path(joints: tuple[Joint, ...], joint: int) -> list[int]:
+    result = []
+    while joint >= 0:
+        result.append(joint)
+        joint = joints[joint].parent
+    return result

@@ -1,0 +1,69 @@
+"""The one table of parameter names (FORMATS): where in a `RobotModel` each named value lives, and its unit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flexcal.model.robot_model import RobotModel
+
+GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
+SPRINGS = ("bearing_x", "bearing_y", "drive")
+STATION = ("x", "y", "z", "rx", "ry", "rz")
+
+_UNITS = {
+    "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
+    "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
+    "stiffness": "N m/rad", "damping": "N m s/rad", "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
+    "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m", "stiffness_scale": "1",
+}  # fmt: skip
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a parameter name."""
+    last = name.rpartition(".")[2]
+    if last.startswith("transmission_"):
+        return "rad"
+    if last.startswith("I") and len(last) == 3:
+        return "kg m²"
+    return _UNITS.get(last, "1")
+
+
+def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
+
+    Inertia entries (`<link>.Ixx`…, at the joint frame) are not here: they depend on mass and centre of mass too.
+    """
+    table: dict[str, tuple[str, tuple[int, ...]]] = {}
+    for s, name in enumerate(model.stations):
+        for k, key in enumerate(STATION):
+            table[f"station.{name}.{key}"] = ("station", (s, k))
+    elastic = {e.index: e for e in model.elastic}
+    for i, joint in enumerate(model.joints):
+        for k, key in enumerate(GEOMETRY):
+            table[f"{joint.name}.{key}"] = ("geometry", (i, k))
+        table[f"{joint.name}.backlash"] = ("backlash", (i,))
+        table[f"{joint.name}.gravity_compliance"] = ("gravity_compliance", (i,))
+        for h, order in enumerate(model.harmonics):
+            for k, key in enumerate(("sin", "cos")):
+                table[f"{joint.name}.transmission_{order}_{key}"] = ("transmission", (i, h, k))
+        for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
+            table[f"{joint.name}.{key}"] = (key, (i,))
+        if i in elastic:
+            for k, key in enumerate(SPRINGS):
+                if key == "drive" or elastic[i].bearings:
+                    table[f"{joint.name}.{key}.stiffness"] = ("stiffness", (i, k))
+                    table[f"{joint.name}.{key}.damping"] = ("damping", (i, k))
+        table[f"{joint.link}.mass"] = ("mass", (i,))
+        for k, key in enumerate("xyz"):
+            table[f"{joint.link}.com_{key}"] = ("com", (i, k))
+    for k, key in enumerate(GEOMETRY):
+        table[f"tool.{key}"] = ("tool", (k,))
+    for p, name in enumerate(model.points):
+        for k, key in enumerate("xyz"):
+            table[f"point.{name}.{key}"] = ("point_error", (p, k))
+    if model.payload is not None:
+        table["payload.mass"] = ("payload_mass", (0,))
+        for k, key in enumerate("xyz"):
+            table[f"payload.com_{key}"] = ("payload_com", (k,))
+    return table

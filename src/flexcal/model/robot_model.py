@@ -1,0 +1,224 @@
+"""The robot as it is known: nominal from robot.yaml and URDF, then changed by estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal._kernels import Tree
+from flexcal.errors import FlexcalError
+from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
+from flexcal.model.elastic_joint import ElasticJoint
+from flexcal.model.inertia import Inertia, parallel_axis
+from flexcal.model.joint import Joint
+from flexcal.model.names import locations
+from flexcal.model.point import Payload, Point
+
+if TYPE_CHECKING:
+    from flexcal.estimation import Estimate
+
+_MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
+
+
+@dataclass(frozen=True, eq=False)
+class RobotModel:
+    """An immutable robot: structure from the URDF, and one array a kind of parameter (n joints, SI units).
+
+    Every number that can be identified has a name (FORMATS): `values` reads them all, `with_values` makes a changed robot. Setting a
+    link's mass scales its inertia about the centre of mass with it; setting `com_x`… moves that inertia rigidly.
+    """
+
+    config: RobotConfig
+    path: Path
+    urdf: Path
+    name: str
+    joints: tuple[Joint, ...]
+    points: Mapping[str, Point]
+    nominal_payload: Payload | None
+    bearing_frames: Mapping[int, np.ndarray]
+    tree: Tree
+    stations: tuple[str, ...]
+    harmonics: tuple[int, ...]
+    geometry: np.ndarray
+    tool: np.ndarray
+    point_error: np.ndarray
+    station: np.ndarray
+    backlash: np.ndarray
+    gravity_compliance: np.ndarray
+    transmission: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    rotor_inertia: np.ndarray
+    viscous: np.ndarray
+    coulomb: np.ndarray
+    torque_offset: np.ndarray
+    delay: np.ndarray
+    ratio: np.ndarray
+    mass: np.ndarray
+    com: np.ndarray
+    inertia: np.ndarray
+    payload_mass: np.ndarray
+    payload_com: np.ndarray
+    posterior_names: tuple[str, ...] = ()
+    posterior_covariance: np.ndarray | None = None
+
+    @classmethod
+    def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
+        """Read robot.yaml, its URDF and, where present, the estimates beside it; raises `InputError` with file and line."""
+        from flexcal.model.loading import load_robot
+
+        return load_robot(Path(path), estimates=estimates)
+
+    @property
+    def n(self) -> int:
+        """Number of movable joints."""
+        return len(self.joints)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        """URDF names of the movable joints."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """Gravity (3,) in the base frame, m/s²."""
+        return np.array(self.config.gravity)
+
+    @property
+    def prior(self) -> PriorConfig:
+        """How far the nominal inertials may be off."""
+        return self.config.prior
+
+    @property
+    def controller(self) -> ControllerConfig | None:
+        """The position controller, where declared."""
+        return self.config.controller
+
+    @property
+    def backlash_joints(self) -> tuple[int, ...]:
+        """Indices of the joints declared to have backlash."""
+        return tuple(self.joint_index(name) for name in self.config.geometry.backlash)
+
+    @cached_property
+    def elastic(self) -> tuple[ElasticJoint, ...]:
+        """The joints with springs, in chain order."""
+        return tuple(
+            ElasticJoint(
+                i,
+                self.joints[i].name,
+                frame,
+                self.stiffness[i],
+                self.damping[i],
+                bool(np.isfinite(self.stiffness[i, 0])),
+            )
+            for i, frame in sorted(self.bearing_frames.items())
+        )
+
+    @cached_property
+    def inertias(self) -> tuple[Inertia, ...]:
+        """Inertia of the link of every joint."""
+        return tuple(
+            Inertia(float(m), c, y) for m, c, y in zip(self.mass, self.com, self.inertia, strict=True)
+        )
+
+    @property
+    def payload(self) -> Payload | None:
+        """The declared payload with its current mass and centre of mass."""
+        if self.nominal_payload is None:
+            return None
+        return replace(self.nominal_payload, mass=float(self.payload_mass[0]), com=self.payload_com)
+
+    @cached_property
+    def reach(self) -> float:
+        """Sum of the link lengths from the base to the farthest point, m."""
+        lengths = [float(np.linalg.norm(joint.translation)) for joint in self.joints]
+        far = [float(np.linalg.norm(p.translation) + np.linalg.norm(p.xyz)) for p in self.points.values()]
+        return sum(lengths) + max(far, default=0.0)
+
+    def joint_index(self, name: str) -> int:
+        """Index of a joint by its URDF name; raises `FlexcalError` that lists the names."""
+        if name not in self.joint_names:
+            raise FlexcalError(
+                f"there is no movable joint '{name}' in {self.urdf.name}; there are {', '.join(self.joint_names)}."
+            )
+        return self.joint_names.index(name)
+
+    def point(self, name: str | None = None) -> Point:
+        """A target by name, the first declared one without; raises `FlexcalError` that lists the names."""
+        if not self.points:
+            raise FlexcalError(
+                f"{self.path} declares no point; add one under `points:` so that there is something to measure."
+            )
+        key = next(iter(self.points)) if name is None else name
+        if key not in self.points:
+            raise FlexcalError(
+                f"there is no point '{key}' under `points:` in {self.path}; there are {', '.join(self.points)}."
+            )
+        return self.points[key]
+
+    @cached_property
+    def _locations(self) -> dict[str, tuple[str, tuple[int, ...]]]:
+        return locations(self)
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Every named value, SI."""
+        table = {name: float(getattr(self, field)[index]) for name, (field, index) in self._locations.items()}
+        for i, joint in enumerate(self.joints):
+            at_joint = self.inertia[i] + parallel_axis(self.mass[i], self.com[i])
+            table.update({f"{joint.link}.{key}": float(at_joint[index]) for key, index in _MOMENTS.items()})
+        return MappingProxyType(table)
+
+    def value(self, name: str) -> float:
+        """One named value, SI; raises `FlexcalError` that suggests close names."""
+        if name not in self.values:
+            close = get_close_matches(name, self.values, 3)
+            raise FlexcalError(
+                f"unknown parameter '{name}'{'; did you mean ' + ', '.join(close) if close else ''}."
+            )
+        return self.values[name]
+
+    def with_values(self, values: Mapping[str, float]) -> RobotModel:
+        """A robot with some named values changed; raises `FlexcalError` for an unknown name."""
+        arrays: dict[str, np.ndarray] = {}
+
+        def own(field: str) -> np.ndarray:
+            return arrays.setdefault(field, getattr(self, field).copy())
+
+        moments: dict[int, dict[str, float]] = {}
+        for name, value in values.items():
+            if name in self._locations:
+                field, index = self._locations[name]
+                own(field)[index] = value
+                if field == "mass" and self.mass[index] > 0:
+                    own("inertia")[index] = self.inertia[index] * (value / self.mass[index])
+            else:
+                self.value(name)
+                link, _, key = name.rpartition(".")
+                moments.setdefault([j.link for j in self.joints].index(link), {})[key] = value
+        for i, entries in moments.items():
+            moved = parallel_axis(own("mass")[i], own("com")[i])
+            at_joint = own("inertia")[i] + moved
+            for key, value in entries.items():
+                row, column = _MOMENTS[key]
+                at_joint[row, column] = at_joint[column, row] = value
+            own("inertia")[i] = at_joint - moved
+        return replace(self, **arrays)
+
+    def with_estimate(self, estimate: Estimate) -> RobotModel:
+        """A robot with the values of an estimate that are the robot's own, and their covariance where it is determined."""
+        own = [name for name in estimate.parameters.names if name in self.values]
+        names, covariance = estimate.marginal(own)[0], estimate.marginal(own)[1]
+        changed = self.with_values({name: estimate.values[name] for name in own})
+        return changed.with_posterior(tuple(names), covariance)
+
+    def with_posterior(self, names: tuple[str, ...], covariance: np.ndarray | None) -> RobotModel:
+        """A robot that carries the joint covariance of some of its values (natural units), in place of what it carried for these."""
+        return replace(self, posterior_names=names, posterior_covariance=covariance)

@@ -1,0 +1,46 @@
+"""The calibrated URDF against the model it came from, read back by Pinocchio and by ourselves."""
+
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from flexcal.errors import FlexcalError
+from flexcal.export.urdf import write_urdf
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.names import GEOMETRY
+
+
+@pytest.mark.parametrize("robot", ["tx90l", "ur5"])
+def test_forward_kinematics_survive(robot: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    model: RobotModel = request.getfixturevalue(robot)
+    rng = np.random.default_rng(1)
+    owners = [*model.joint_names, "tool"]
+    wrong = model.with_values({f"{o}.{key}": 1e-2 * rng.normal() for o in owners for key in GEOMETRY})
+    export = write_urdf(wrong, tmp_path / "calibrated.urdf")
+    other = pin.buildModelFromUrdf(str(export.path))
+    data, frame = other.createData(), other.getFrameId(model.point().name)
+    q = rng.uniform(-2, 2, (50, model.n))
+    ours = point_kinematics(wrong, q)
+    for k in range(len(q)):
+        pin.framesForwardKinematics(other, data, q[k])
+        np.testing.assert_allclose(data.oMf[frame].translation, ours.position[k], atol=1e-12)
+        np.testing.assert_allclose(data.oMf[frame].rotation, ours.orientation[k], atol=1e-12)
+
+
+def test_the_loss_is_said_in_millimetres(tx90l: RobotModel, tmp_path: Path) -> None:
+    loose = tx90l.with_values({"joint_2.backlash": 1e-4})
+    export = write_urdf(loose, tmp_path / "calibrated.urdf")
+    assert export.lost == ("elastic deflection", "backlash")
+    assert 0.5e-3 < export.mean_loss < export.max_loss < 10e-3
+    assert "cannot carry elastic deflection, backlash" in str(export)
+
+
+def test_a_point_named_like_a_link_is_refused(tx90l: RobotModel, tmp_path: Path) -> None:
+    from dataclasses import replace
+
+    point = tx90l.point()
+    with pytest.raises(FlexcalError, match="rename it"):
+        write_urdf(replace(tx90l, points={"tool0": replace(point, name="tool0")}), tmp_path / "x.urdf")
+    assert not (tmp_path / "x.urdf").exists()

@@ -1,0 +1,60 @@
+"""M, D, K and G: published modes of the bare TX90L, and every derivative against central differences."""
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel
+from flexcal.model.linearisation import linearise
+from flexcal.model.transfer import transfer_matrix
+from flexcal.units import DEGREE
+
+LINES = np.arange(3.25, 80, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("pose", "modes_hz"),
+    [
+        ((0, 90, 0, 0, 0, 0), (11.1, 13.3, 39.7, 63.7)),
+        ((0, 45, 60, 0, 45, 0), (12.9, 14.7, 32.6, 44.0)),
+        ((0, 0, 90, 0, 0, 0), (16.3, 17.9, 28.0, 34.4)),
+    ],
+)
+def test_locked_motor_modes_of_the_bare_arm(tx90l: RobotModel, pose: tuple, modes_hz: tuple) -> None:
+    system = linearise(tx90l, np.array(pose) * DEGREE, 0.0)
+    squares = eigh(system.stiffness[3:, 3:], system.mass[3:, 3:], eigvals_only=True)
+    np.testing.assert_allclose(np.sqrt(squares[:4]) / (2 * np.pi), modes_hz, atol=0.06)
+
+
+def test_every_derivative_of_the_transfer_matrix(tx90l: RobotModel) -> None:
+    q = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2])
+    endings = ("stiffness", "damping", "rotor_inertia", "viscous", "mass", "com_x", "com_y", "com_z")
+    names = [
+        n for n in tx90l.values if n.endswith(endings) and not (n.startswith("joint_") and n[6] in "456")
+    ]
+    exact = transfer_matrix(linearise(tx90l, q, derivatives=names), LINES).derivatives
+
+    def response(name: str, value: float) -> np.ndarray:
+        return transfer_matrix(linearise(tx90l.with_values({name: value}), q), LINES).response
+
+    def slope(name: str, step: float) -> np.ndarray:
+        value = tx90l.value(name)
+        return (response(name, value + step) - response(name, value - step)) / (2 * step)
+
+    for name in names:
+        step = 1e-4 if ".com" in name else 1e-4 * tx90l.value(name)
+        richardson = (4 * slope(name, step / 2) - slope(name, step)) / 3
+        assert np.abs(richardson - exact[name]).max() < 1e-6 * np.abs(exact[name]).max(), name
+
+
+def test_free_rotors_show_poles_and_zeros(tx90l: RobotModel) -> None:
+    """The literal Eq. (9) has no antiresonance; what is implemented has one at the locked-motor mode of 11.1 Hz on axis 1."""
+    lines = np.arange(8.0, 15.0, 0.05)
+    response = transfer_matrix(linearise(tx90l, np.array([0, 90, 0, 0, 0, 0]) * DEGREE, 0.0), lines).response
+    assert abs(lines[np.abs(response[:, 0, 0]).argmin()] - 11.1) < 0.2
+
+
+def test_a_robot_without_springs_is_refused(ur5: RobotModel) -> None:
+    with pytest.raises(FlexcalError, match="declares no elastic joint"):
+        linearise(ur5, np.zeros(6))
