@@ -1,1 +1,26 @@
-"""TODO"""
+"""Stage 2: geometry from measured points, with the elastic deflection taken into account, and its verification."""
+
+from flexcal.calibration.calibrate import Calibration, calibrate
+from flexcal.calibration.elastic_prior import ElasticPrior
+from flexcal.calibration.error_statistics import ErrorStatistics
+from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.registration import register, rigid_motion
+from flexcal.calibration.term_selection import TermSelection, select_terms
+from flexcal.calibration.terms import geometric_parameters
+from flexcal.calibration.verification import Verification, verify
+
+__all__ = [
+    "Calibration",
+    "ElasticPrior",
+    "ErrorStatistics",
+    "Prediction",
+    "TermSelection",
+    "Verification",
+    "calibrate",
+    "geometric_parameters",
+    "predict",
+    "register",
+    "rigid_motion",
+    "select_terms",
+    "verify",
+]

@@ -8,21 +8,19 @@ from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal._kernels import Tree
 from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
 from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
 from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis
 from flexcal.model.joint import Joint
 from flexcal.model.names import locations
 from flexcal.model.point import Payload, Point
-
-if TYPE_CHECKING:
-    from flexcal.estimation import Estimate
+from flexcal.model.posterior import NOTHING_ESTIMATED, Posterior
 
 _MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
 
@@ -66,8 +64,7 @@ class RobotModel:
     inertia: np.ndarray
     payload_mass: np.ndarray
     payload_com: np.ndarray
-    posterior_names: tuple[str, ...] = ()
-    posterior_covariance: np.ndarray | None = None
+    posterior: Posterior = NOTHING_ESTIMATED
 
     @classmethod
     def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
@@ -213,12 +210,7 @@ class RobotModel:
         return replace(self, **arrays)
 
     def with_estimate(self, estimate: Estimate) -> RobotModel:
-        """A robot with the values of an estimate that are the robot's own, and their covariance where it is determined."""
-        own = [name for name in estimate.parameters.names if name in self.values]
-        names, covariance = estimate.marginal(own)[0], estimate.marginal(own)[1]
+        """A robot with the values of an estimate that are the robot's own, carrying their joint covariance."""
+        own = tuple(name for name in estimate.parameters.names if name in self.values)
         changed = self.with_values({name: estimate.values[name] for name in own})
-        return changed.with_posterior(tuple(names), covariance)
-
-    def with_posterior(self, names: tuple[str, ...], covariance: np.ndarray | None) -> RobotModel:
-        """A robot that carries the joint covariance of some of its values (natural units), in place of what it carried for these."""
-        return replace(self, posterior_names=names, posterior_covariance=covariance)
+        return replace(changed, posterior=self.posterior.updated(estimate, own))

@@ -1,0 +1,39 @@
+"""How far the tool is from where it was said to be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True)
+class ErrorStatistics:
+    """Mean, 90th percentile and maximum of the distances (m) over a number of poses; nan without poses."""
+
+    poses: int
+    mean: float
+    p90: float
+    max: float
+
+    @classmethod
+    def of(cls, errors: np.ndarray) -> ErrorStatistics:
+        """From error vectors (N, 3), m."""
+        distance = np.linalg.norm(errors, axis=1)
+        if not len(distance):
+            return cls(0, np.nan, np.nan, np.nan)
+        return cls(
+            len(distance), float(distance.mean()), float(np.quantile(distance, 0.9)), float(distance.max())
+        )
+
+    def in_millimetres(self) -> dict[str, float | int | None]:
+        """The block of results.json: poses, mean_mm, p90_mm, max_mm; null without poses."""
+        values = {"mean_mm": self.mean, "p90_mm": self.p90, "max_mm": self.max}
+        return {"poses": self.poses} | {
+            key: v / MILLIMETRE if self.poses else None for key, v in values.items()
+        }
+
+    def __str__(self) -> str:
+        return f"mean {self.mean / MILLIMETRE:.3f}, p90 {self.p90 / MILLIMETRE:.3f}, max {self.max / MILLIMETRE:.3f} mm over {self.poses} poses"

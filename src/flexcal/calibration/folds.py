@@ -1,0 +1,26 @@
+"""Folds for cross-validation that do not leak: contiguous in measuring order, or in the workspace."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def order_folds(samples: int, folds: int) -> np.ndarray:
+    """Fold number (samples,) of consecutive blocks of nearly equal size."""
+    return (np.arange(samples) * folds) // samples
+
+
+def workspace_folds(points: np.ndarray, folds: int) -> np.ndarray:
+    """Fold number (N,) of cells of nearly equal count: `points` (N, 3) are halved across their longest direction, again and again."""
+    result = np.zeros(len(points), dtype=int)
+    cells = [np.arange(len(points))]
+    while len(cells) < folds:
+        largest = max(range(len(cells)), key=lambda k: len(cells[k]))
+        cell = cells.pop(largest)
+        centred = points[cell] - points[cell].mean(axis=0)
+        direction = np.linalg.svd(centred, full_matrices=False)[2][0]
+        order = cell[np.argsort(centred @ direction, kind="stable")]
+        cells += [order[: len(order) // 2], order[len(order) // 2 :]]
+    for k, cell in enumerate(cells):
+        result[cell] = k
+    return result

@@ -1,0 +1,176 @@
+"""What the instrument should read at each pose, and how that depends on every parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model import Equilibrium, PointKinematics, RobotModel, point_kinematics, static_equilibrium
+from flexcal.model.names import GEOMETRY, STATION
+from flexcal.model.rotations import vector_rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Points (N, 3) in the instrument's frame at the poses, with what their derivatives need."""
+
+    model: RobotModel
+    poses: PoseSet
+    position: np.ndarray
+    base: np.ndarray
+    rest: Equilibrium
+    kinematics: PointKinematics
+
+    def jacobian(self, names: Sequence[str]) -> np.ndarray:
+        """∂position/∂parameter (N, 3, len(names)) in natural units; raises `FlexcalError` for a name without effect on points.
+
+        How the deflection itself moves with a geometric error, some 3e-3 of the column, is left out.
+        """
+        result = np.zeros((len(self.position), 3, len(names)))
+        by_geometry = self._turned(self.kinematics.geometry_jacobian[:, :3])
+        by_motion = self._turned(self.kinematics.motion_jacobian[:, :3].reshape(len(self.position), 3, -1))
+        by_motion = by_motion.reshape(len(self.position), 3, self.model.n, 3)
+        elastic = None
+        for k, name in enumerate(names):
+            owner, _, key = name.rpartition(".")
+            if owner.startswith("station.") and key in STATION:
+                result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
+            elif owner.startswith("point."):
+                at = [*self.model.joint_names, "tool"].index("tool") * 6 + 3 + "xyz".index(key)
+                own = self.poses.target == owner.removeprefix("point.")
+                result[own, :, k] = by_geometry[own, :, at]
+            elif key in GEOMETRY:
+                at = [*self.model.joint_names, "tool"].index(owner) * 6 + GEOMETRY.index(key)
+                result[:, :, k] = by_geometry[:, :, at]
+                if owner == "tool" and key.startswith("length"):
+                    result[self.poses.target != next(iter(self.model.points)), :, k] = 0.0
+            elif key == "backlash":
+                i = self.model.joint_index(owner)
+                result[:, :, k] = -self.rest.flank[:, i, None] * by_motion[:, :, i, 2]
+            elif key == "gravity_compliance":
+                i = self.model.joint_index(owner)
+                result[:, :, k] = -self.rest.torque[:, i, None] * by_motion[:, :, i, 2]
+            elif key.startswith("transmission_"):
+                i = self.model.joint_index(owner)
+                order, wave = key.split("_")[1:]
+                phase = int(order) * self.poses.q[:, i]
+                result[:, :, k] = (np.sin(phase) if wave == "sin" else np.cos(phase))[:, None] * by_motion[
+                    :, :, i, 2
+                ]
+            else:
+                if elastic is None:
+                    moved = [by_motion[:, :, i, c] for i, c in self.rest.axes]
+                    elastic = -np.matmul(np.stack(moved, axis=2), self.rest.compliance)
+                result[:, :, k] = np.matmul(elastic, self.load(name)[:, :, None])[:, :, 0]
+        return result
+
+    def _turned(self, columns: np.ndarray) -> np.ndarray:
+        return np.matmul(self.base, columns) if (self.base != np.eye(3)).any() else columns
+
+    def _by_station(self, station: str, key: str) -> np.ndarray:
+        own = (self.poses.station == station)[:, None]
+        if key in ("x", "y", "z"):
+            return own * np.eye(3)["xyz".index(key)]
+        values = [self.model.value(f"station.{station}.{k}") for k in STATION]
+        arm = self.position - np.array(values[:3])
+        return own * np.cross(_left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])], arm)
+
+    def load(self, name: str) -> np.ndarray:
+        """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""
+        owner, _, key = name.rpartition(".")
+        if key == "stiffness":
+            joint_name, _, spring = owner.rpartition(".")
+            axis = (self.model.joint_index(joint_name), ("bearing_x", "bearing_y", "drive").index(spring))
+            load = np.zeros(self.rest.compliance.shape[:2])
+            stretch = self.rest.deflection[:, axis[0], axis[1]]
+            if axis[1] == 2:
+                stretch = -self.rest.torque[:, axis[0]] / self.model.stiffness[axis]
+            load[:, [tuple(a) for a in self.rest.axes].index(axis)] = stretch
+            return load
+        if key == "mass" or key.startswith("com_"):
+            if owner == "payload":
+                held = self.model.payload
+                assert held is not None
+                block = self.rest.regressor[:, :, 4 * held.joint : 4 * held.joint + 4]
+                share = payload_share(self.model, self.poses)[:, None]
+                if key == "mass":
+                    return share * (block[:, :, 0] + block[:, :, 1:] @ held.com_in_link)
+                return share * held.mass * (block[:, :, 1:] @ held.rotation[:, "xyz".index(key[-1])])
+            i = [joint.link for joint in self.model.joints].index(owner)
+            block = self.rest.regressor[:, :, 4 * i : 4 * i + 4]
+            if key == "mass":
+                return block[:, :, 0] + block[:, :, 1:] @ self.model.com[i]
+            return self.model.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
+        raise FlexcalError(f"the position of a point does not depend on '{name}'.")
+
+
+def _left_jacobian(vector: np.ndarray) -> np.ndarray:
+    """How a rotation turns (3, 3), in fixed axes, as its rotation vector (3,) changes."""
+    angle = float(np.linalg.norm(vector))
+    skew = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])
+    if angle < 1e-8:
+        return np.eye(3) + skew / 2
+    return (
+        np.eye(3) + (1 - np.cos(angle)) / angle**2 * skew + (angle - np.sin(angle)) / angle**3 * skew @ skew
+    )
+
+
+def payload_share(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Payload held at each pose (N,), relative to the declared payload."""
+    nominal = model.nominal_payload
+    if poses.payload is None or nominal is None or nominal.mass == 0:
+        return np.ones(len(poses.q)) if poses.payload is None else np.zeros(len(poses.q))
+    return poses.payload / nominal.mass
+
+
+def predict(
+    model: RobotModel,
+    poses: PoseSet,
+    *,
+    flank: np.ndarray | None = None,
+    elastic: bool = True,
+    jacobians: bool = False,
+) -> Prediction:
+    """Where the instrument should see the target of every pose: the deflected, calibrated robot.
+
+    `flank` (N, n) fixes the side of the backlash; without, the drive torque at rest decides. Without `elastic` the arm is rigid.
+    Raises `FlexcalError` for unknown targets and payloads without a declaration.
+    """
+    if poses.payload is not None and poses.payload.any() and model.nominal_payload is None:
+        raise FlexcalError(
+            f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass."
+        )
+    payload = payload_share(model, poses) * model.payload_mass[0]
+    rest = static_equilibrium(model, poses.q, payload, flank=flank, elastic=elastic, sensitivities=jacobians)
+    kinematics = _points(model, poses, rest.deflection, jacobians)
+    turns = {
+        s: vector_rotation(model.station[model.stations.index(s), 3:]) for s in dict.fromkeys(poses.station)
+    }
+    at = np.array([model.station[model.stations.index(s), :3] for s in poses.station])
+    base = np.array([turns[s] for s in poses.station])
+    position = np.matmul(base, kinematics.position[:, :, None])[:, :, 0] + at
+    return Prediction(model, poses, position, base, rest, kinematics)
+
+
+def _points(model: RobotModel, poses: PoseSet, deflection: np.ndarray, jacobians: bool) -> PointKinematics:
+    targets = list(dict.fromkeys(poses.target))
+    if len(targets) == 1:
+        return point_kinematics(model, poses.q, deflection, point=targets[0], jacobians=jacobians)
+    parts = {t: np.flatnonzero(poses.target == t) for t in targets}
+    found = {
+        t: point_kinematics(model, poses.q[own], deflection[own], point=t, jacobians=jacobians)
+        for t, own in parts.items()
+    }
+    order = np.argsort(np.concatenate(list(parts.values())), kind="stable")
+
+    def joined(field: str) -> np.ndarray:
+        stacked = np.concatenate([getattr(found[t], field) for t in targets])
+        return stacked[order] if len(stacked) else stacked
+
+    return PointKinematics(
+        *(joined(f) for f in ("position", "orientation", "geometry_jacobian", "motion_jacobian"))
+    )

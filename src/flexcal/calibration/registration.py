@@ -1,0 +1,60 @@
+"""Where the instrument stands: its frame against the robot's base, before any parameter is fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.data import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel
+from flexcal.model.rotations import rotation_vector
+
+ALREADY_ALIGNED = 0.010
+"""Instrument and base frame are the same where nominal and measured points differ by less than this (m, median)."""
+
+
+def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:
+    """Place every station of `poses` by the rigid motion that best maps `predicted` (N, 3) to the measured points (Kabsch).
+
+    A station whose points already agree to a centimetre is left at the base frame. The rotation of the first station stays where it
+    is put here, for the first joint's errors span it; the rest is refined by the fit. Raises `FlexcalError` for a station that
+    robot.yaml does not know, or with fewer than three poses that do not lie on a line.
+    """
+    values: dict[str, float] = {}
+    for station in dict.fromkeys(poses.station):
+        if station not in model.stations:
+            raise FlexcalError(
+                f"the poses name the station '{station}' but {model.path} has {', '.join(model.stations)}; add it under `stations:`."
+            )
+        own = poses.station == station
+        measured, expected = poses.position[own], predicted[own]
+        if np.median(np.linalg.norm(measured - expected, axis=1)) < ALREADY_ALIGNED:
+            rotation, offset = np.eye(3), np.zeros(3)
+        else:
+            rotation, offset = rigid_motion(expected, measured, station)
+        turn = rotation_vector(rotation)
+        values |= {
+            f"station.{station}.{key}": float(v) for key, v in zip(("x", "y", "z"), offset, strict=True)
+        }
+        values |= {f"station.{station}.r{key}": float(v) for key, v in zip("xyz", turn, strict=True)}
+    return model.with_values(values)
+
+
+def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and translation (3,) that map `source` (N, 3) onto `target` (N, 3) in least squares (Kabsch 1976).
+
+    Raises `FlexcalError` where the points do not span a plane.
+    """
+    if len(source) < 3:
+        raise FlexcalError(
+            f"station '{name}' has {len(source)} poses; at least 3 are needed to find where it stands."
+        )
+    from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
+    left, sizes, right = np.linalg.svd((target - to_centre).T @ (source - from_centre))
+    if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
+        raise FlexcalError(
+            f"the points of station '{name}' lie on a line; measure poses that spread in space."
+        )
+    sign = np.sign(np.linalg.det(left @ right))
+    rotation = left @ np.diag([1.0, 1.0, sign]) @ right
+    return rotation, to_centre - rotation @ from_centre

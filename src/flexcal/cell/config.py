@@ -1,0 +1,136 @@
+"""What a user writes in cell.yaml, one frozen dataclass a block."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING
+
+from flexcal.errors import FlexcalError
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def _not_negative(config: DataclassInstance) -> None:
+    for field in fields(config):
+        value = getattr(config, field.name)
+        if isinstance(value, int | float) and not value >= 0:
+            raise FlexcalError(f"{field.name} must not be negative, not {value}.")
+
+
+@dataclass(frozen=True)
+class LoopConfig:
+    """The joint controller: soft PD gains referred to the joint (N m/rad, N m s/rad), its rate, plant steps per control tick.
+
+    `kp`, `kd`, `rate_hz` are what a plan gets that does not say otherwise; a `MultisinePlan` carries its own. `rate_filter_hz` is the
+    corner of the low-pass on the differentiated encoder. The feed-forward is that of the controller's own model.
+    """
+
+    kp: tuple[float, ...] | None = None
+    kd: tuple[float, ...] | None = None
+    rate_hz: float = 4000.0
+    substeps: int = 1
+    rate_filter_hz: float = 200.0
+
+    def __post_init__(self) -> None:
+        if not (self.rate_hz > 0 and self.rate_filter_hz > 0):
+            raise FlexcalError("the controller's rate_hz and rate_filter_hz must be positive.")
+        if self.substeps < 1:
+            raise FlexcalError(f"the controller needs at least one plant step per tick, not {self.substeps}.")
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """Encoder counts per joint turn (0 = ideal), torque noise (N m, 1σ), tracker noise (m, and m per m of distance; 1σ an axis).
+
+    With `arm_encoders` the excited joints are measured on the arm side too.
+    """
+
+    encoder_counts: int = 2**18
+    arm_encoders: bool = False
+    torque_noise: float = 1.0
+    tracker_noise_m: float = 15e-6
+    tracker_noise_per_m: float = 6e-6
+
+    def __post_init__(self) -> None:
+        _not_negative(self)
+
+
+@dataclass(frozen=True)
+class FrictionConfig:
+    """Motor friction beyond the robot's viscous and Coulomb values.
+
+    `scale` multiplies the robot's viscous and Coulomb friction (0 = a frictionless cell); Coulomb friction is
+    tanh(rate / `coulomb_velocity`); `stribeck` is extra friction at rest, relative to Coulomb, that falls with exp(−(rate /
+    `stribeck_velocity`)²). Velocities in rad/s at the joint.
+    """
+
+    scale: float = 1.0
+    coulomb_velocity: float = 0.01
+    stribeck: float = 0.0
+    stribeck_velocity: float = 0.05
+
+    def __post_init__(self) -> None:
+        _not_negative(self)
+        if not (self.coulomb_velocity > 0 and self.stribeck_velocity > 0):
+            raise FlexcalError("friction's coulomb_velocity and stribeck_velocity must be positive.")
+
+
+@dataclass(frozen=True)
+class SpreadConfig:
+    """How far the hidden truth lies from the nominal robot, 1σ unless said.
+
+    `mass`, `rotor_inertia` relative; `com`, `length` m; `angle` rad; `stiffness`, `damping` of their logarithm; `backlash`: half gaps
+    are uniform between these two, rad.
+    """
+
+    mass: float = 0.07
+    com: float = 0.010
+    rotor_inertia: float = 0.05
+    length: float = 3e-4
+    angle: float = 5e-4
+    backlash: tuple[float, float] = (2e-5, 5e-5)
+    stiffness: float = 0.15
+    damping: float = 0.3
+
+    def __post_init__(self) -> None:
+        _not_negative(self)
+        if not 0 <= self.backlash[0] <= self.backlash[1]:
+            raise FlexcalError(
+                "the spread's backlash is [smallest, largest] half gap with 0 ≤ smallest ≤ largest."
+            )
+
+
+@dataclass(frozen=True)
+class MismatchConfig:
+    """What the identified model does not know, all off by default.
+
+    `cubic_stiffness`: relative stiffening of every drive at 1 mrad of twist; `hysteresis`: Dahl hysteresis of every drive, its torque
+    over the drive stiffness (rad), reached over `hysteresis_width` (rad); `elastic_wrist`: stiffness (N m/rad) with which otherwise
+    rigid joints are held; `repeatability`: m, 1σ an axis, of the point from visit to visit; `temperature_drift`: m that the
+    point has drifted in one direction when the last pose is measured, `temperature_rise` K later.
+    """
+
+    cubic_stiffness: float = 0.0
+    hysteresis: float = 0.0
+    hysteresis_width: float = 1e-4
+    elastic_wrist: float = 0.0
+    repeatability: float = 0.0
+    temperature_drift: float = 0.0
+    temperature_rise: float = 10.0
+
+    def __post_init__(self) -> None:
+        _not_negative(self)
+        if not self.hysteresis_width > 0:
+            raise FlexcalError("the mismatch's hysteresis_width must be positive.")
+
+
+@dataclass(frozen=True)
+class CellConfig:
+    """The virtual cell: controller, sensors, friction, spread of the hidden truth, mismatch."""
+
+    controller: LoopConfig = LoopConfig()
+    sensors: SensorConfig = SensorConfig()
+    friction: FrictionConfig = FrictionConfig()
+    spread: SpreadConfig = SpreadConfig()
+    mismatch: MismatchConfig = MismatchConfig()

@@ -1,0 +1,114 @@
+"""A frequency experiment on the virtual robot: every recording of a multisine plan, some at a time on as many threads."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterator
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from flexcal.cell.config import CellConfig
+from flexcal.cell.feed_forward import inverse_dynamics
+from flexcal.cell.plant import Plant, build_plant
+from flexcal.cell.rest import rest
+from flexcal.cell.sensors import encoder_resolution, read_encoder, read_torque
+from flexcal.cell.stepping import LoopCommand, LoopGains, run_loop
+from flexcal.data import MultisinePlan, Recording, RecordingLabel
+from flexcal.errors import FlexcalError
+from flexcal.frequency import multisine
+from flexcal.model import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation:
+    """What all recordings of one pose share: the pose (n,), plant, loop, start (d,), and the command without excitation."""
+
+    pose: np.ndarray
+    plant: Plant
+    gains: LoopGains
+    start: np.ndarray
+    start_rate: np.ndarray
+    command: LoopCommand
+
+
+def recordings(
+    truth: RobotModel, believed: RobotModel, config: CellConfig, plan: MultisinePlan, seed: int, threads: int
+) -> Iterator[Recording]:
+    """The recordings of a plan in the order pose, realisation, experiment, sign; each a function of `seed` and its label alone."""
+    poses = np.atleast_2d(np.asarray(plan.poses, dtype=float))
+    signs = (1, -1) if plan.signs else (1,)
+    schedule = list(product(range(plan.realisations), range(len(plan.joints)), signs))
+    with ThreadPoolExecutor(threads) as pool:
+        waiting: deque[Future[Recording]] = deque()
+        try:
+            for number, pose in enumerate(poses):
+                excitation = prepare(truth, believed, config, plan, pose)
+                for realisation, experiment, sign in schedule:
+                    label = RecordingLabel(number, realisation, experiment, sign)
+                    waiting.append(pool.submit(run, excitation, config, plan, label, seed))
+                    while len(waiting) > threads:
+                        yield waiting.popleft().result()
+            while waiting:
+                yield waiting.popleft().result()
+        finally:
+            pool.shutdown(cancel_futures=True)
+
+
+def prepare(
+    truth: RobotModel, believed: RobotModel, config: CellConfig, plan: MultisinePlan, pose: np.ndarray
+) -> Excitation:
+    """Build the plant at a pose (n,) and the feed-forward of the controller, whose own model is `believed`."""
+    import mujoco
+
+    free = sorted({int(i) for i in plan.joints})
+    if len(free) < len(plan.joints):
+        raise FlexcalError("the plan excites a joint twice; name every joint once under `joints`.")
+    step = 1 / (plan.rate_hz * config.controller.substeps)
+    plant = build_plant(truth, config, q=pose, free=free, payload=plan.payload, time_step=step)
+    assumed = build_plant(believed, config, q=pose, free=free, payload=plan.payload)
+    samples = plan.periods * multisine.samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
+    reference = multisine.reference(plan, np.arange(samples) / plan.rate_hz)
+    motion, rate, acceleration = (np.repeat(x[:, None], len(free), axis=1) for x in reference)
+    expected = np.zeros(assumed.mjmodel.nv)
+    expected[assumed.motors] = pose[free]
+    torque = inverse_dynamics(assumed, expected, motion, rate, acceleration)
+    start = rest(plant, mujoco.MjData(plant.mjmodel), pose[free] + motion[0]).position
+    start_rate = np.zeros_like(start)
+    start_rate[plant.motors] = rate[0]
+    kp, kd = np.asarray(plan.kp, dtype=float)[free], np.asarray(plan.kd, dtype=float)[free]
+    gains = LoopGains(kp, kd, plan.rate_hz, config.controller.substeps, config.controller.rate_filter_hz)
+    return Excitation(pose, plant, gains, start, start_rate, LoopCommand(torque, pose[free] + motion, rate))
+
+
+def run(
+    excitation: Excitation, config: CellConfig, plan: MultisinePlan, label: RecordingLabel, seed: int
+) -> Recording:
+    """Run one experiment and read the instruments."""
+    sensors, plant, command = config.sensors, excitation.plant, excitation.command
+    period = multisine.torque(plan, label.realisation, label.experiment, label.sign)
+    excited = np.tile(period[:, np.argsort(plan.joints)], (plan.periods, 1))
+    log = run_loop(
+        plant,
+        excitation.gains,
+        LoopCommand(command.torque + excited, command.position, command.rate),
+        start=excitation.start,
+        start_rate=excitation.start_rate,
+        encoder_resolution=encoder_resolution(sensors),
+    )
+    key = (plan.seed, label.pose, label.realisation, label.experiment, int(label.sign < 0))
+    rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
+    samples = len(log.position)
+    q, torque = (
+        np.tile(read_encoder(sensors, excitation.pose), (samples, 1)),
+        np.zeros((samples, len(excitation.pose))),
+    )
+    q[:, plant.joints] = log.position
+    torque[:, plant.joints] = read_torque(sensors, log.torque, rng)
+    arm = None
+    if sensors.arm_encoders:
+        arm = q.copy()
+        arm[:, plant.joints] = read_encoder(sensors, log.arm)
+    return Recording(time_step=1 / plan.rate_hz, q=q, torque=torque, arm=arm, start=0.0, label=label)

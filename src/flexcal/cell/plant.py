@@ -1,0 +1,245 @@
+"""The virtual robot: a MuJoCo model of the elastic arm, and the forces on it that are not MuJoCo's.
+
+MuJoCo does the multibody dynamics: mass matrix, gravity, Coriolis, the step. Springs with their dead band, dampers and motor friction
+are applied to it, so that the laws are those of METHODS (a dead band, tanh friction) and their rates lie at the right instant.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.cell.config import CellConfig
+from flexcal.errors import FlexcalError
+from flexcal.export.mjcf import mjcf_spec
+from flexcal.model import RobotModel
+
+if TYPE_CHECKING:
+    import mujoco
+
+TWIST_OF_CUBIC = 1e-3  # rad at which `cubic_stiffness` is the relative stiffening
+WRIST_DAMPING = 1e-3  # s: damping over stiffness of the joints that `elastic_wrist` makes elastic
+FASTEST = 1.0  # largest resolved ω·step of the plant
+_PASSIVE = (
+    "CONSTRAINT",
+    "EQUALITY",
+    "FRICTIONLOSS",
+    "LIMIT",
+    "CONTACT",
+    "PASSIVE",
+    "SPRING",
+    "DAMPER",
+    "ACTUATION",
+    "SENSOR",
+)
+_UNWANTED = (
+    *_PASSIVE,
+    "EULERDAMP",
+    "AUTORESET",
+    "WARMSTART",
+    "REFSAFE",
+    "CLAMPCTRL",
+    "FILTERPARENT",
+    "MIDPHASE",
+    "ISLAND",
+)
+
+
+@dataclass(frozen=True, eq=False)
+class Plant:
+    """A compiled MuJoCo model of d coordinates and m free motors, with what acts on it.
+
+    `coordinates` (d,) names; `joints` (m,), `motors` (m,), `twists` (m,): joint index, motor coordinate and twist coordinate (-1: rigid
+    drive) of each free motor; `springs` (d, 6) per coordinate: stiffness, damping, half gap, cubic (1/rad²), hysteresis (N m) and
+    its width (rad); `frictions` (m, 5): viscous, Coulomb, its velocity, Stribeck, its velocity. SI, at the joint.
+    """
+
+    mjmodel: mujoco.MjModel
+    coordinates: tuple[str, ...]
+    joints: np.ndarray
+    motors: np.ndarray
+    twists: np.ndarray
+    springs: np.ndarray
+    frictions: np.ndarray
+
+    @property
+    def elastic(self) -> np.ndarray:
+        """Indices of the coordinates with a spring."""
+        return np.flatnonzero(self.springs[:, 0] > 0)
+
+
+@dataclass(frozen=True, eq=False)
+class PlantLinearisation:
+    """M q̈ + D q̇ + K q about a position: mass, damping, stiffness (d, d) with gravity's share, and the force of gravity (d,)."""
+
+    mass: np.ndarray
+    damping: np.ndarray
+    stiffness: np.ndarray
+    gravity: np.ndarray
+
+
+def build_plant(
+    model: RobotModel,
+    config: CellConfig,
+    *,
+    q: np.ndarray | None = None,
+    free: Collection[int] | None = None,
+    payload: float | None = None,
+    time_step: float | None = None,
+) -> Plant:
+    """The plant of a true robot, its joints outside `free` locked at `q` (n,); see `mjcf_spec`.
+
+    Raises `FlexcalError` where `time_step` (s) does not resolve the fastest mode or the friction of the plant.
+    """
+    import mujoco
+
+    held = set() if free is None else set(range(model.n)) - set(free)
+    rigid = set(range(model.n)) - {e.index for e in model.elastic}
+    wrist = rigid if config.mismatch.elastic_wrist > 0 else set()
+    if wrist:
+        model = _with_drive_springs(model, wrist, config.mismatch.elastic_wrist)
+    spec = mjcf_spec(model, q=q, free=free, payload=payload)
+    for i in wrist & held:  # the rotor turns with the arm against the loop that holds it
+        spec.joint(f"{model.joint_names[i]}.drive").armature = float(np.nan_to_num(model.rotor_inertia[i]))
+    spec.compiler.fusestatic = True
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
+    bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", None) for name in _UNWANTED)
+    spec.option.disableflags = sum(int(bit) for bit in bits if bit is not None)
+    if time_step is not None:
+        spec.option.timestep = time_step
+    compiled = spec.compile()
+    names = tuple(compiled.joint(j).name for j in range(compiled.njnt))
+    joints = np.array([i for i, name in enumerate(model.joint_names) if name in names], dtype=np.int64)
+    motors = np.array([names.index(model.joint_names[i]) for i in joints], dtype=np.int64)
+    drives = [f"{model.joint_names[i]}.drive" for i in joints]
+    twists = np.array([names.index(d) if d in names else -1 for d in drives], dtype=np.int64)
+    springs = _springs(model, config, names)
+    plant = Plant(compiled, names, joints, motors, twists, springs, _frictions(model, config, joints))
+    if time_step is not None:
+        _check_step(plant, time_step)
+    return plant
+
+
+def linearise(plant: Plant, position: np.ndarray) -> PlantLinearisation:
+    """Linearisation about a position (d,) at rest: springs in contact, no Coulomb friction; gravity stiffness by central differences."""
+    import mujoco
+
+    data = mujoco.MjData(plant.mjmodel)
+    d = plant.mjmodel.nv
+    gravity = gravity_force(plant, data, position)
+    mass = np.empty((d, d))
+    for i, unit in enumerate(np.eye(d)):
+        mujoco.mj_mulM(plant.mjmodel, data, mass[i], unit)
+    damping = np.diag(plant.springs[:, 1].copy())
+    damping[plant.motors, plant.motors] += plant.frictions[:, 0]
+    stiffness = gravity_stiffness(plant, data, position)
+    stiffness[np.diag_indices(d)] += spring_tangent(plant, position)
+    return PlantLinearisation(mass, damping, stiffness, gravity)
+
+
+def gravity_force(plant: Plant, data: mujoco.MjData, position: np.ndarray) -> np.ndarray:
+    """Force of gravity (d,) at rest in a position (d,), N m: what the springs and motors must hold."""
+    import mujoco
+
+    data.qpos[:] = position
+    data.qvel[:] = 0
+    mujoco.mj_forward(plant.mjmodel, data)
+    return data.qfrc_bias.copy()
+
+
+def gravity_stiffness(
+    plant: Plant, data: mujoco.MjData, position: np.ndarray, step: float = 1e-4
+) -> np.ndarray:
+    """Derivative (d, d) of `gravity_force`, by fourth-order central differences."""
+    columns = []
+    for unit in np.eye(len(position)) * step:
+        near = gravity_force(plant, data, position + unit) - gravity_force(plant, data, position - unit)
+        far = gravity_force(plant, data, position + 2 * unit) - gravity_force(
+            plant, data, position - 2 * unit
+        )
+        columns.append((8 * near - far) / (12 * step))
+    return np.array(columns).T
+
+
+def spring_torque(plant: Plant, position: np.ndarray, flank: np.ndarray) -> np.ndarray:
+    """Torque (d,) of every spring against its twist, the gap taken up on the side `flank` (d,) = sign of the torque on the arm."""
+    stiffness, _, gap, cubic = plant.springs[:, :4].T
+    stretch = position + gap * flank
+    return stiffness * stretch * (1 + cubic * stretch**2)
+
+
+def spring_tangent(plant: Plant, position: np.ndarray) -> np.ndarray:
+    """Tangent stiffness (d,) of every spring at a position (d,), in contact."""
+    stiffness, _, gap, cubic = plant.springs[:, :4].T
+    stretch = np.maximum(np.abs(position) - gap, 0)
+    return stiffness * (1 + 3 * cubic * stretch**2)
+
+
+def _springs(model: RobotModel, config: CellConfig, names: tuple[str, ...]) -> np.ndarray:
+    mismatch = config.mismatch
+    springs = np.zeros((len(names), 6))
+    springs[:, 5] = mismatch.hysteresis_width
+    for spring in model.elastic:
+        for component in spring.components:
+            row = springs[names.index(f"{spring.name}.{('bearing_x', 'bearing_y', 'drive')[component]}")]
+            row[:2] = spring.stiffness[component], spring.damping[component]
+            if component == 2:
+                row[2] = model.backlash[spring.index]
+                row[3] = mismatch.cubic_stiffness / TWIST_OF_CUBIC**2
+                row[4] = mismatch.hysteresis * spring.stiffness[component]
+    rigid = set(range(model.n)) - {e.index for e in model.elastic}
+    loose = [model.joint_names[i] for i in rigid if model.backlash[i] > 0]
+    if loose:
+        raise FlexcalError(
+            f"{loose[0]} has backlash but no drive spring; the virtual cell needs the spring beside the gap."
+        )
+    return springs
+
+
+def _frictions(model: RobotModel, config: CellConfig, joints: np.ndarray) -> np.ndarray:
+    friction = config.friction
+    viscous, coulomb = (
+        friction.scale * np.nan_to_num(values[joints]) for values in (model.viscous, model.coulomb)
+    )
+    one = np.ones(len(joints))
+    columns = (
+        viscous,
+        coulomb,
+        one * friction.coulomb_velocity,
+        friction.stribeck * coulomb,
+        one * friction.stribeck_velocity,
+    )
+    return np.column_stack(columns)
+
+
+def _with_drive_springs(model: RobotModel, joints: Collection[int], stiffness: float) -> RobotModel:
+    from flexcal.model.loading import bearing_frame
+
+    frames, springs, dampers = dict(model.bearing_frames), model.stiffness.copy(), model.damping.copy()
+    for i in joints:
+        frames[i] = bearing_frame(model.joints[i])
+        springs[i, 2], dampers[i, 2] = stiffness, WRIST_DAMPING * stiffness
+    return replace(model, bearing_frames=frames, stiffness=springs, damping=dampers)
+
+
+def _check_step(plant: Plant, time_step: float) -> None:
+    from scipy.linalg import eigh
+
+    linear = linearise(plant, np.zeros(plant.mjmodel.nv))
+    fastest = float(np.sqrt(eigh(linear.stiffness, linear.mass, eigvals_only=True)[-1]))
+    if not fastest * time_step < FASTEST:
+        raise FlexcalError(
+            f"a plant step of {time_step * 1e3:g} ms does not resolve the robot's fastest mode ({fastest / 2 / np.pi:.0f} Hz); "
+            "raise the controller's substeps."
+        )
+    lightest = 1 / np.diag(np.linalg.solve(linear.mass, np.eye(len(linear.mass))))[plant.motors]
+    slopes = plant.frictions[:, 0] + (plant.frictions[:, 1] + plant.frictions[:, 3]) / plant.frictions[:, 2]
+    if np.any(slopes * time_step > 0.8 * lightest):
+        joint = int(np.argmax(slopes / lightest))
+        raise FlexcalError(
+            f"a plant step of {time_step * 1e3:g} ms is too long for the friction of motor {joint + 1}; "
+            "raise the controller's substeps or friction's coulomb_velocity."
+        )

@@ -1,0 +1,90 @@
+"""Poses of the virtual robot at rest, as they truly are and as encoders and tracker see them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.cell.config import CellConfig
+from flexcal.cell.plant import build_plant
+from flexcal.cell.rest import rest
+from flexcal.cell.sensors import read_encoder, read_torque, tracker_sigma
+from flexcal.data import PosePlan, PoseSet
+from flexcal.model import RobotModel
+from flexcal.model.rotations import vector_rotation
+
+
+@dataclass(frozen=True, eq=False)
+class TruePoses:
+    """`q` (N, n) motor side; `payload` (N,) kg or None; `point` (N, 3) m in the base frame; `torque` (N, n) N m against gravity."""
+
+    q: np.ndarray
+    payload: np.ndarray | None
+    point: np.ndarray
+    torque: np.ndarray
+
+
+def true_poses(
+    truth: RobotModel, config: CellConfig, plan: PosePlan, rng: np.random.Generator | None = None
+) -> TruePoses:
+    """The first declared point at every pose of a plan; `rng` draws the state of a hysteretic drive (none without it)."""
+    import mujoco
+
+    q = np.atleast_2d(np.asarray(plan.q, dtype=float))
+    payload = (
+        None
+        if plan.payload is None
+        else np.broadcast_to(np.asarray(plan.payload, dtype=float), len(q)).copy()
+    )
+    slips = np.zeros(q.shape) if rng is None else rng.uniform(-1, 1, q.shape)
+    name = truth.point().name
+    point, torque = np.empty((len(q), 3)), np.empty(q.shape)
+    masses = np.zeros(len(q)) if payload is None else payload
+    for mass in np.unique(masses):
+        plant = build_plant(truth, config, payload=None if payload is None else float(mass))
+        data = mujoco.MjData(plant.mjmodel)
+        driven = plant.twists >= 0
+        slip = np.zeros(plant.mjmodel.nv)
+        for k in np.flatnonzero(masses == mass):
+            slip[plant.twists[driven]] = slips[k, driven]
+            torque[k] = rest(plant, data, q[k], slip).torque
+            point[k] = data.site(name).xpos
+    return TruePoses(q, payload, point, torque)
+
+
+def in_instrument(truth: RobotModel, point: np.ndarray) -> np.ndarray:
+    """Points (N, 3) m from the robot's base frame into the first station's."""
+    station = truth.station[0]
+    return station[:3] + point @ vector_rotation(station[3:]).T
+
+
+def measured_poses(
+    truth: RobotModel, config: CellConfig, plan: PosePlan, rng: np.random.Generator
+) -> PoseSet:
+    """What encoders, torque sensors and the tracker at the first station say of every pose of a plan."""
+    sensors, mismatch = config.sensors, config.mismatch
+    true = true_poses(truth, config, plan, rng)
+    size = len(true.q)
+    band = config.friction.scale * np.nan_to_num(truth.coulomb) * (1 + config.friction.stribeck)
+    torque = read_torque(sensors, true.torque + band * rng.uniform(-1, 1, true.torque.shape), rng)
+    point = true.point + mismatch.repeatability * rng.standard_normal(true.point.shape)
+    temperature = None
+    if mismatch.temperature_drift > 0:
+        share, direction = np.linspace(0, 1, size), rng.standard_normal(3)
+        temperature = mismatch.temperature_rise * share
+        point = point + share[:, None] * mismatch.temperature_drift * direction / np.linalg.norm(direction)
+    station = truth.config.stations.get(truth.stations[0])
+    distance = np.linalg.norm(point - (np.zeros(3) if station is None else np.array(station.xyz)), axis=1)
+    sigma = np.repeat(tracker_sigma(sensors, distance)[:, None], 3, axis=1)
+    return PoseSet(
+        q=read_encoder(sensors, true.q),
+        position=in_instrument(truth, point) + sigma * rng.standard_normal(point.shape),
+        sigma=sigma,
+        torque=torque,
+        payload=true.payload,
+        target=np.full(size, truth.point().name),
+        station=np.full(size, truth.stations[0]),
+        temperature=temperature,
+        pose=np.arange(1, size + 1),
+    )

@@ -1,0 +1,115 @@
+"""The closed loop over a plant: sampled controller, hold, MuJoCo's steps, all in C++ without the interpreter lock."""
+
+from __future__ import annotations
+
+import ctypes
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+
+from flexcal import _kernels
+from flexcal.cell.plant import Plant
+from flexcal.errors import FlexcalError
+
+
+@dataclass(frozen=True, eq=False)
+class LoopGains:
+    """A sampled PD: gains (m,) N m/rad and N m s/rad, `rate_hz` of its ticks, plant steps per tick, corner of the rate filter (Hz)."""
+
+    kp: np.ndarray
+    kd: np.ndarray
+    rate_hz: float
+    substeps: int = 1
+    rate_filter_hz: float = np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class LoopCommand:
+    """What the loop follows, all (ticks, m): torque added to the PD's, reference position and rate."""
+
+    torque: np.ndarray
+    position: np.ndarray
+    rate: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class LoopLog:
+    """What happened, all (ticks, m): encoder position at the tick, torque that acted until the next, true arm position."""
+
+    position: np.ndarray
+    torque: np.ndarray
+    arm: np.ndarray
+
+
+def run_loop(
+    plant: Plant,
+    gains: LoopGains,
+    command: LoopCommand,
+    *,
+    start: np.ndarray,
+    start_rate: np.ndarray,
+    encoder_resolution: float = 0.0,
+) -> LoopLog:
+    """Run the loop from a position and rate (d,) of the plant's coordinates; raises `FlexcalError` where it diverges.
+
+    A plant step is MuJoCo's semi-implicit Euler, M (q₊ − 2 q + q₋)/h² + D (3 q − 4 q₋ + q₋₋)/2h + K q = τ̄, with τ̄ the held torque
+    averaged over the step about q: all errors are of order h².
+    """
+    import mujoco
+
+    model = plant.mjmodel
+    step = 1 / (gains.rate_hz * gains.substeps)
+    if not np.isclose(model.opt.timestep, step, rtol=1e-12):
+        raise FlexcalError(
+            f"the plant steps by {model.opt.timestep:g} s but the controller needs {step:g} s; rebuild the plant."
+        )
+    data = mujoco.MjData(model)
+    data.qpos[:] = start
+    data.qvel[:] = start_rate
+    shape = command.torque.shape
+    log = LoopLog(np.empty(shape), np.empty(shape), np.empty(shape))
+    done = _kernels.closed_loop(
+        step=_step_address(),
+        model=model._address,
+        data=data._address,
+        position=data.qpos,
+        velocity=data.qvel,
+        force=data.qfrc_applied,
+        springs=plant.springs,
+        frictions=plant.frictions,
+        motors=plant.motors,
+        twists=plant.twists,
+        proportional=np.ascontiguousarray(gains.kp, dtype=float),
+        derivative=np.ascontiguousarray(gains.kd, dtype=float),
+        tick=1 / gains.rate_hz,
+        substeps=gains.substeps,
+        encoder_resolution=encoder_resolution,
+        rate_filter=-np.expm1(-2 * np.pi * gains.rate_filter_hz / gains.rate_hz),
+        feed_forward=np.ascontiguousarray(command.torque),
+        reference=np.ascontiguousarray(command.position),
+        reference_rate=np.ascontiguousarray(command.rate),
+        position_log=log.position,
+        torque_log=log.torque,
+        arm_log=log.arm,
+    )
+    if done < shape[0]:
+        raise FlexcalError(
+            f"the virtual robot's loop diverged after {done / gains.rate_hz:.3g} s; lower kp, kd or the excitation."
+        )
+    return log
+
+
+@cache
+def _step_address() -> int:
+    """Address of mj_step in the library that the mujoco package has loaded."""
+    import mujoco
+
+    folder = Path(mujoco.__file__).parent
+    for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
+        for library in sorted(folder.glob(pattern)):
+            address = ctypes.cast(ctypes.CDLL(str(library)).mj_step, ctypes.c_void_p).value
+            if address:
+                return address
+    raise FlexcalError(f"no MuJoCo library lies in {folder}; reinstall the package mujoco.")

@@ -1,0 +1,24 @@
+"""Where measurements come from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol, runtime_checkable
+
+from flexcal.data.multisine_plan import MultisinePlan
+from flexcal.data.pose_plan import PosePlan
+from flexcal.data.pose_set import PoseSet
+from flexcal.data.recording import Recording
+
+
+@runtime_checkable
+class Cell(Protocol):
+    """A robot with its instruments: simulated, or a folder of recorded files."""
+
+    def record(self, plan: MultisinePlan) -> Iterator[Recording]:
+        """The plan's recordings one by one, pose by pose, labelled; none has to stay in memory."""
+        ...
+
+    def measure(self, plan: PosePlan) -> PoseSet:
+        """The plan's poses as the instrument saw them."""
+        ...

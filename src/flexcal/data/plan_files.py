@@ -1,0 +1,45 @@
+"""Plans on disk: YAML whose `kind` says which plan it is."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TypeVar
+
+from flexcal.data.multisine_plan import MultisinePlan
+from flexcal.data.pose_plan import PosePlan
+from flexcal.errors import InputError
+from flexcal.yaml_reader import read_yaml_file
+from flexcal.yaml_writer import write_yaml
+
+Plan = MultisinePlan | PosePlan
+P = TypeVar("P", MultisinePlan, PosePlan)
+
+_KINDS: dict[str, type[MultisinePlan] | type[PosePlan]] = {"multisine": MultisinePlan, "poses": PosePlan}
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read a plan; raises `InputError` with file and line for everything that does not fit."""
+    file = read_yaml_file(path)
+    kind = file.data.get("kind") if isinstance(file.data, dict) else None
+    if kind not in _KINDS:
+        raise file.error(
+            ("kind",),
+            f"the plan's kind must be one of {', '.join(_KINDS)}; add for example 'kind: multisine'.",
+        )
+    return file.structure(_KINDS[kind])
+
+
+def read_plan_of(path: str | Path, kind: type[P]) -> P:
+    """Read a plan that has to be of this class; raises `InputError` otherwise."""
+    plan = read_plan(path)
+    if not isinstance(plan, kind):
+        wanted = next(name for name, cls in _KINDS.items() if cls is kind)
+        raise InputError(
+            f"{path} line 1: this is a plan of kind '{plan.kind}', but one of kind '{wanted}' is needed here."
+        )
+    return plan
+
+
+def write_plan(path: str | Path, plan: Plan) -> None:
+    """Write a plan, atomically; `read_plan` gives back the same numbers bit by bit."""
+    write_yaml(path, plan)

@@ -1,0 +1,50 @@
+"""What to command to measure poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexcal.errors import FlexcalError
+
+
+@dataclass(frozen=True, eq=False)
+class PosePlan:
+    """N poses to stand still in and measure.
+
+    q: (N, n) commanded joint positions, rad.
+    payload: (N,) kg at the declared payload's centre of mass (a single number counts for all); None takes what
+        robot.yaml declares.
+    seed: of the measurement, where something is drawn.
+
+    Raises `FlexcalError` where shapes or values do not fit together.
+    """
+
+    kind: Literal["poses"] = field(default="poses", kw_only=True)
+    q: NDArray[np.float64]
+    payload: NDArray[np.float64] | None = None
+    seed: int = 0
+    name: str = "poses"
+
+    def __post_init__(self) -> None:
+        q = np.asarray(self.q, dtype=np.float64)
+        if q.ndim != 2 or 0 in q.shape:
+            raise FlexcalError("q must be a list of poses, each a list with one angle per joint (rad).")
+        object.__setattr__(self, "q", q)
+        if self.payload is not None:
+            payload = np.asarray(self.payload, dtype=np.float64)
+            if payload.shape not in ((), (q.shape[0],)):
+                raise FlexcalError(
+                    f"payload has {payload.size} masses for {q.shape[0]} poses; give one each."
+                )
+            if payload.min() < 0:
+                raise FlexcalError(f"the payload is {payload.min():g} kg; it must not be negative.")
+            object.__setattr__(self, "payload", np.broadcast_to(payload, q.shape[0]).copy())
+        if self.seed < 0:
+            raise FlexcalError(f"the seed is {self.seed}; it must not be negative.")
+
+    def __len__(self) -> int:
+        return self.q.shape[0]

@@ -1,0 +1,133 @@
+"""Measured poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+
+DEFAULT_SIGMA = 1e-4
+"""1σ of a measured coordinate (m) where a file says nothing; only its size relative to priors matters then."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseSet:
+    """N measured points of an n-joint robot, one row per pose and target, in measuring order.
+
+    q: (N, n) motor positions referred to the joint, rad (m where prismatic).
+    position: (N, 3) the measured point in the instrument's frame, m; NaN where only `length` is measured.
+    sigma: (N, 3) 1σ of the measurement per coordinate, m; `sigma_given` False says that it is a default.
+    torque: (N, n) motor torques referred to the joint, N m, where measured.
+    payload: (N,) kg at the declared payload's centre of mass; None: as declared in robot.yaml.
+    target: (N,) names of the points, station: (N,) names of the instrument's places.
+    temperature: (N,) where measured.
+    pose: (N,) numbers of the poses; rows of one pose share it.
+    quaternion_wxyz: (N, 4) measured orientation, unit norm, where measured.
+    length: (N,) m, of a draw-wire.
+
+    Raises `FlexcalError` where shapes do not fit.
+    """
+
+    q: np.ndarray
+    position: np.ndarray
+    sigma: np.ndarray
+    torque: np.ndarray | None
+    payload: np.ndarray | None
+    target: np.ndarray
+    station: np.ndarray
+    temperature: np.ndarray | None
+    pose: np.ndarray
+    quaternion_wxyz: np.ndarray | None = None
+    length: np.ndarray | None = None
+    sigma_given: bool = True
+
+    def __post_init__(self) -> None:
+        if self.q.ndim != 2:
+            raise FlexcalError(f"q of a pose set has shape {self.q.shape}; (poses, joints) is needed.")
+        n_rows, n = self.q.shape
+        shapes = {
+            "position": (n_rows, 3),
+            "sigma": (n_rows, 3),
+            "torque": (n_rows, n),
+            "payload": (n_rows,),
+            "target": (n_rows,),
+            "station": (n_rows,),
+            "temperature": (n_rows,),
+            "pose": (n_rows,),
+            "quaternion_wxyz": (n_rows, 4),
+            "length": (n_rows,),
+        }
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            if values is not None and values.shape != shape:
+                raise FlexcalError(f"{name} of a pose set has shape {values.shape}; {shape} is needed.")
+
+    def __len__(self) -> int:
+        return self.q.shape[0]
+
+    @property
+    def stations(self) -> tuple[str, ...]:
+        """The stations in the order in which they first appear."""
+        return tuple(dict.fromkeys(self.station.tolist()))
+
+    @property
+    def targets(self) -> tuple[str, ...]:
+        """The targets in the order in which they first appear."""
+        return tuple(dict.fromkeys(self.target.tolist()))
+
+    def subset(self, rows: np.ndarray | Sequence[int] | slice) -> PoseSet:
+        """The rows with these indices, or where this mask is true, in their order."""
+        index = rows if isinstance(rows, slice) else np.asarray(rows)
+        if isinstance(index, np.ndarray) and index.size == 0:
+            index = np.zeros(0, dtype=int)
+        changed: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        for name, value in changed.items():
+            if isinstance(value, np.ndarray):
+                changed[name] = value[index]
+        return PoseSet(**changed)
+
+
+def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
+    """The rows of all sets, in order.
+
+    Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
+    where there is nothing to join, joint counts differ, or only some sets have torques, payload, temperature,
+    orientation or length.
+    """
+    if not sets:
+        raise FlexcalError("there are no poses to join; give at least one set.")
+    if len({poses.q.shape[1] for poses in sets}) > 1:
+        counts = ", ".join(str(poses.q.shape[1]) for poses in sets)
+        raise FlexcalError(
+            f"the pose sets have different numbers of joints ({counts}); use sets of one robot."
+        )
+    joined: dict[str, Any] = {}
+    for field in fields(PoseSet):
+        values = [getattr(poses, field.name) for poses in sets]
+        present = [value is not None for value in values]
+        if field.name == "sigma_given":
+            joined[field.name] = all(values)
+        elif field.name == "pose":
+            joined[field.name] = _numbered_on(values)
+        elif all(present):
+            joined[field.name] = np.concatenate(values)
+        elif any(present):
+            raise FlexcalError(
+                f"only {sum(present)} of {len(sets)} pose sets have {field.name}; give it for all, or for none."
+            )
+        else:
+            joined[field.name] = None
+    return PoseSet(**joined)
+
+
+def _numbered_on(numbers: Sequence[np.ndarray]) -> np.ndarray:
+    joined = numbers[0]
+    for later in numbers[1:]:
+        if np.isin(later, joined).any():
+            later = later - later.min() + joined.max() + 1
+        joined = np.concatenate([joined, later])
+    return joined

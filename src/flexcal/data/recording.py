@@ -1,0 +1,83 @@
+"""One joint log on a uniform time base."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data.time_base import TimeBase
+from flexcal.errors import FlexcalError
+
+
+@dataclass(frozen=True)
+class RecordingLabel:
+    """Which recording of a plan this is: indices from 0 of pose, realisation and experiment, and the sign, ±1."""
+
+    pose: int
+    realisation: int
+    experiment: int
+    sign: int
+
+    def __post_init__(self) -> None:
+        if self.sign not in (-1, 1):
+            raise FlexcalError(f"the sign of a recording is +1 or -1, not {self.sign}.")
+        if min(self.pose, self.realisation, self.experiment) < 0:
+            raise FlexcalError("pose, realisation and experiment of a recording are counted from 0.")
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """N samples of n joints at t = start + k · time_step (s).
+
+    q: (N, n) motor positions referred to the joint, rad (m where prismatic).
+    torque: (N, n) motor torques referred to the joint, N m (N).
+    arm: (N, n) positions on the arm side of elastic joints, where measured.
+    velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
+        `tau_ext`); temperature: (N,).
+    time_base: how the time stamps of the file were, where the recording comes from one.
+
+    Raises `FlexcalError` where shapes do not fit or the time step is not positive.
+    """
+
+    time_step: float
+    q: np.ndarray
+    torque: np.ndarray
+    arm: np.ndarray | None = None
+    start: float = 0.0
+    label: RecordingLabel | None = None
+    velocity: np.ndarray | None = None
+    acceleration: np.ndarray | None = None
+    arm_velocity: np.ndarray | None = None
+    external_torque: np.ndarray | None = None
+    temperature: np.ndarray | None = None
+    time_base: TimeBase | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.time_step < np.inf:
+            raise FlexcalError(f"the time step of a recording is {self.time_step} s; it must be positive.")
+        if self.q.ndim != 2:
+            raise FlexcalError(f"q of a recording has shape {self.q.shape}; (samples, joints) is needed.")
+        for name in ("torque", "arm", "velocity", "acceleration", "arm_velocity", "external_torque"):
+            values = getattr(self, name)
+            if values is not None and values.shape != self.q.shape:
+                raise FlexcalError(
+                    f"{name} of a recording has shape {values.shape}, but q has {self.q.shape}."
+                )
+        if self.temperature is not None and self.temperature.shape != self.q.shape[:1]:
+            raise FlexcalError(
+                f"temperature of a recording has shape {self.temperature.shape}, not ({len(self)},)."
+            )
+
+    def __len__(self) -> int:
+        return self.q.shape[0]
+
+    @property
+    def time(self) -> np.ndarray:
+        """Sample times (N,), s."""
+        return self.start + self.time_step * np.arange(len(self))
+
+    @property
+    def duration(self) -> float:
+        """From the first sample to the last, s."""
+        return self.time_step * (len(self) - 1)

@@ -1,0 +1,69 @@
+"""Random joint configurations that the robot can take and the instrument can see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from flexcal.design.collision import CollisionChecker
+from flexcal.design.joint_space import LIMIT_MARGIN, joint_ranges
+from flexcal.design.preload import preloaded
+from flexcal.design.visibility import Acceptance, visible
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel, point_kinematics
+
+_TRIES = 100
+
+
+def random_candidates(
+    checker: CollisionChecker,
+    count: int,
+    rng: np.random.Generator,
+    *,
+    payload: float | None = None,
+    preload: bool = False,
+    point: str | None = None,
+    station: str | None = None,
+    acceptance: Acceptance | None = None,
+    limit_margin: float = LIMIT_MARGIN,
+) -> np.ndarray:
+    """`count` configurations (count, n), uniform over the joint ranges where nothing collides and the target is seen.
+
+    With `preload`, only those where gravity surely settles the flank of every backlash. The target too stays above the floor. Only the
+    poses are checked, not the ways between them. Raises `FlexcalError`, with what each check threw out, when too few are left.
+    """
+    model = checker.model
+    lower, upper = joint_ranges(model, margin=limit_margin)
+    checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {"floor": lambda q: _above_floor(checker, q, point)}
+    if preload:
+        checks["flank preload"] = lambda q: preloaded(model, q, payload)
+    checks["collision"] = lambda q: ~checker.collides(q)
+    checks["visibility"] = lambda q: visible(checker, q, point=point, station=station, acceptance=acceptance)
+    lost = dict.fromkeys(checks, 0)
+    found: list[np.ndarray] = []
+    have = drawn = 0
+    while have < count:
+        if drawn >= _TRIES * count + 1000:
+            losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
+            raise FlexcalError(
+                f"of {drawn} random poses of {model.name} only {have} of the wanted {count} are usable: {losses}; "
+                "loosen what throws out most (station, acceptance, obstacles, floor, payload)."
+            )
+        share = max(have / drawn, 0.02) if drawn else 0.5
+        q = rng.uniform(lower, upper, (int(1.1 * (count - have) / share) + 16, model.n))
+        drawn += len(q)
+        for name, check in checks.items():
+            passed = check(q)
+            lost[name] += int(np.sum(~passed))
+            q = q[passed]
+        found.append(q)
+        have += len(q)
+    return np.concatenate(found or [np.zeros((0, model.n))])[:count]
+
+
+def _above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None) -> np.ndarray:
+    if checker.floor is None:
+        return np.ones(len(q), dtype=bool)
+    position = point_kinematics(checker.model, q, point=point, jacobians=False).position
+    return position[:, 2] > checker.floor + checker.margin

@@ -1,0 +1,178 @@
+"""Which joint configurations make the robot hit itself, the floor or an obstacle: coal on the collision shapes of the URDF."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.design.joint_space import even_configurations
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.model.kinematics import joint_batch
+
+_SAMPLES = 200
+_FLOOR = "floor"
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A collision shape (coal) at `rotation` (3, 3), `translation` (3,) in the link of joint `joint` (-1: it does not move)."""
+
+    name: str
+    geometry: Any
+    joint: int
+    rotation: np.ndarray
+    translation: np.ndarray
+
+
+class CollisionChecker:
+    """Collision of the nominal robot with itself, with `floor` and with the obstacles that robot.yaml declares.
+
+    `margin` (m): bodies nearer than this count as touching. `floor` is the height (m, along z of the base frame) below which nothing but
+    the base and the first link may reach: the surface on which the robot stands; None for no such surface. Shapes of one link (fixed
+    joints belong to the link that carries them) and of neighbouring links are never compared. Nor are pairs that touch in each of 200
+    configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names them. A mesh counts as its
+    convex hull. A payload, the reflector's mount and cables have no shape and are not seen. Without collision shapes in the URDF nothing
+    collides. Raises `InputError` where shapes or obstacles cannot be read.
+    """
+
+    def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
+        import coal
+        import pinocchio as pin
+
+        self.model = model
+        self.margin = margin
+        self.floor = floor
+        self._model: Any = pin.buildModelFromUrdf(str(model.urdf))
+        self._geometry = _shapes(self._model, model.urdf)
+        own = self._geometry.ngeoms
+        for name in model.config.obstacles:
+            _add_obstacle(self._geometry, model.path.parent / name)
+        self._obstacles = range(own, self._geometry.ngeoms)
+        if floor is not None:
+            plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), floor)
+            self._geometry.addGeometryObject(pin.GeometryObject(_FLOOR, 0, 0, pin.SE3.Identity(), plane))
+        self._data = self._model.createData()
+        pairs = self._comparable()
+        self._set_pairs(pairs)
+        always = np.ones(len(pairs), dtype=bool)
+        for values in self._configurations(even_configurations(model, _SAMPLES)):
+            if not always.any():
+                break
+            always &= self._touching(values)
+        self.permanent = tuple(self._names(pair) for pair, touches in zip(pairs, always, strict=True) if touches)
+        self._set_pairs([pair for pair, touches in zip(pairs, always, strict=True) if not touches])
+
+    @property
+    def shapes(self) -> tuple[Shape, ...]:
+        """Every shape but the floor, the base's and the obstacles' included."""
+        return tuple(
+            Shape(o.name, o.geometry, o.parentJoint - 1, np.array(o.placement.rotation), np.array(o.placement.translation))
+            for o in self._geometry.geometryObjects
+            if o.name != _FLOOR
+        )
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Names of the shapes that are compared."""
+        return tuple(self._names((p.first, p.second)) for p in self._geometry.collisionPairs)
+
+    def collides(self, q: np.ndarray) -> np.ndarray:
+        """Whether each configuration of `q` (samples, n) collides, as (samples,) of bool."""
+        import pinocchio as pin
+
+        q = joint_batch(self.model, q)
+        if not len(self._geometry.collisionPairs):
+            return np.zeros(len(q), dtype=bool)
+        return np.array(
+            [
+                pin.computeCollisions(self._model, self._data, self._geometry, self._checked, values, True)
+                for values in self._configurations(q)
+            ],
+            dtype=bool,
+        )
+
+    def colliding(self, q: np.ndarray) -> tuple[tuple[str, str], ...]:
+        """Names of the shapes that touch at one configuration `q` (n,)."""
+        touching = self._touching(self._configurations(joint_batch(self.model, q))[0])
+        return tuple(names for names, touches in zip(self.pairs, touching, strict=True) if touches)
+
+    def _comparable(self) -> list[tuple[int, int]]:
+        objects, parents = self._geometry.geometryObjects, self._model.parents
+        result = []
+        for i, one in enumerate(objects):
+            for j in range(i + 1, len(objects)):
+                first, second = sorted((one.parentJoint, objects[j].parentJoint))
+                neighbours = first == second or parents[second] == first
+                if not neighbours or (j in self._obstacles and first != second):
+                    result.append((i, j))
+        return result
+
+    def _set_pairs(self, pairs: list[tuple[int, int]]) -> None:
+        import pinocchio as pin
+
+        self._geometry.removeAllCollisionPairs()
+        for first, second in pairs:
+            self._geometry.addCollisionPair(pin.CollisionPair(first, second))
+        self._checked = self._geometry.createData()
+        for request in self._checked.collisionRequests:
+            request.security_margin = self.margin
+
+    def _touching(self, values: np.ndarray) -> np.ndarray:
+        import pinocchio as pin
+
+        pin.computeCollisions(self._model, self._data, self._geometry, self._checked, values, False)
+        return np.array([result.isCollision() for result in self._checked.collisionResults], dtype=bool)
+
+    def _names(self, pair: tuple[int, int]) -> tuple[str, str]:
+        objects = self._geometry.geometryObjects
+        return objects[pair[0]].name, objects[pair[1]].name
+
+    def _configurations(self, q: np.ndarray) -> np.ndarray:
+        """Pinocchio's configurations (samples, nq): an unbounded joint is a cosine and a sine there."""
+        result = np.empty((len(q), self._model.nq))
+        for i in range(self.model.n):
+            joint = self._model.joints[i + 1]
+            if joint.nq == 1:
+                result[:, joint.idx_q] = q[:, i]
+            else:
+                result[:, joint.idx_q], result[:, joint.idx_q + 1] = np.cos(q[:, i]), np.sin(q[:, i])
+        return result
+
+
+def _shapes(pin_model: Any, urdf: Path) -> Any:
+    import coal
+    import pinocchio as pin
+
+    try:
+        geometry = pin.buildGeomFromUrdf(pin_model, str(urdf), pin.GeometryType.COLLISION, [str(urdf.parent)])
+    except (ValueError, RuntimeError) as problem:
+        reason = str(problem).strip().splitlines()[0]
+        raise InputError(
+            f"{urdf}: its collision shapes cannot be read ({reason}); put the meshes beside it or use primitives."
+        ) from problem
+    for item in geometry.geometryObjects:
+        if isinstance(item.geometry, coal.BVHModelBase):
+            item.geometry.buildConvexRepresentation(False)
+            item.geometry = item.geometry.convex
+    return geometry
+
+
+def _add_obstacle(geometry: Any, path: Path) -> None:
+    import pinocchio as pin
+
+    if not path.is_file():
+        raise InputError(f"{path}: there is no such obstacle; correct `obstacles:` in robot.yaml.")
+    try:
+        model = pin.buildModelFromUrdf(str(path))
+    except (ValueError, RuntimeError) as problem:
+        raise InputError(f"{path}: not a valid URDF; correct it or remove it from `obstacles:`.") from problem
+    if model.njoints > 1:
+        raise InputError(f"{path}: an obstacle must not move, but this one has joints; make them fixed.")
+    for item in _shapes(model, path).geometryObjects:
+        name = f"{path.stem}.{item.name}"
+        geometry.addGeometryObject(pin.GeometryObject(name, 0, 0, item.placement, item.geometry))
+

@@ -1,0 +1,59 @@
+"""Where the links of the robot are, joint by joint: for drawing, gravity preload and line of sight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.model import Joint, RobotModel, point_kinematics
+from flexcal.model.kinematics import joint_batch
+from flexcal.model.rotations import axis_rotation
+
+
+def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (samples, n, 3, 3) and origin (samples, n, 3), m, of every joint's link in the base frame at `q` (samples, n).
+
+    Geometric errors count, deflection does not (Eqs. 15-17 with q_arm = q_motor). Raises `FlexcalError` for a wrong joint count.
+    """
+    q = joint_batch(model, q)
+    rotation = np.empty((len(q), model.n, 3, 3))
+    origin = np.empty((len(q), model.n, 3))
+    for i, joint in enumerate(model.joints):
+        _, about_first, about_second = model.geometry[i, :3]
+        aligned = axis_rotation(joint.normals[1], about_second) @ axis_rotation(joint.normals[0], about_first)
+        turn = joint.rotation @ aligned
+        shift = joint.translation
+        moved = q[:, i] + model.geometry[i, 0]
+        if joint.parent < 0:
+            turned, origin[:, i] = np.broadcast_to(turn, (len(q), 3, 3)), shift
+        else:
+            parent = rotation[:, joint.parent]
+            turned = parent @ turn
+            origin[:, i] = origin[:, joint.parent] + parent @ (shift + model.geometry[joint.parent, 3:])
+        if joint.kind == "prismatic":
+            rotation[:, i] = turned
+            origin[:, i] += moved[:, None] * (turned @ joint.axis)
+        else:
+            rotation[:, i] = turned @ _turns(joint, moved)
+    return rotation, origin
+
+
+def joint_origins(model: RobotModel, q: np.ndarray, *, point: str | None = None) -> np.ndarray:
+    """Corners (samples, joints + 2, 3), m, of the chain from the base through every joint to the target `point`.
+
+    Joints of a tree that do not carry the target are left out. Raises `FlexcalError` for an unknown point or a wrong joint count.
+    """
+    chain: list[int] = []
+    joint = model.point(point).joint
+    while joint >= 0:
+        chain.insert(0, joint)
+        joint = model.joints[joint].parent
+    _, origin = link_frames(model, q)
+    target = point_kinematics(model, q, point=point, jacobians=False).position
+    return np.concatenate([np.zeros((len(origin), 1, 3)), origin[:, chain], target[:, None]], axis=1)
+
+
+def _turns(joint: Joint, angle: np.ndarray) -> np.ndarray:
+    """Rotations (samples, 3, 3) about the joint's axis: Rodrigues."""
+    x, y, z = joint.axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return np.eye(3) + np.sin(angle)[:, None, None] * skew + (1 - np.cos(angle))[:, None, None] * (skew @ skew)

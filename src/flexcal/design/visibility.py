@@ -1,0 +1,119 @@
+"""Which poses an instrument can see: the reflector's acceptance angle, and a clear line of sight past the robot itself."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.design.collision import CollisionChecker
+from flexcal.design.skeleton import link_frames
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.units import DEGREE
+
+
+@dataclass(frozen=True, eq=False)
+class Acceptance:
+    """A reflector fixed to the tool sees within `half_angle` (rad) of `axis` (3,), given in the frame of its point.
+
+    A spherically mounted reflector accepts ±30°. One that the user turns towards the instrument by hand needs none of this.
+    """
+
+    axis: np.ndarray
+    half_angle: float = 30 * DEGREE
+
+    def __post_init__(self) -> None:
+        axis = np.asarray(self.axis, dtype=float)
+        if axis.shape != (3,) or not np.linalg.norm(axis) > 0 or not 0 < self.half_angle <= np.pi:
+            raise FlexcalError("an acceptance needs an axis of three numbers, not all zero, and a half angle between 0 and π.")
+        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
+
+
+def station_position(model: RobotModel, station: str | None = None) -> np.ndarray | None:
+    """Where the instrument stands in the base frame (3,), m; None where robot.yaml does not say. The first station without a name.
+
+    Raises `FlexcalError` for an unknown name.
+    """
+    declared = model.config.stations
+    if station is not None and station not in model.stations:
+        raise FlexcalError(f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}.")
+    entry = declared.get(model.stations[0] if station is None else station)
+    return None if entry is None else np.array(entry.xyz)
+
+
+def visible(
+    checker: CollisionChecker,
+    q: np.ndarray,
+    *,
+    point: str | None = None,
+    station: str | None = None,
+    acceptance: Acceptance | None = None,
+    beam_radius: float = 0.01,
+    target_clearance: float = 0.03,
+) -> np.ndarray:
+    """Whether the instrument sees the target at each configuration of `q` (samples, n), as (samples,) of bool.
+
+    The line of sight is a cylinder of `beam_radius` (m) that ends `target_clearance` (m) before the target, since the reflector sits on
+    something; it is only asked for where the station declares `line_of_sight`. Obstacles block it too. A robot.yaml without
+    the station's place sees everything. Raises `FlexcalError` for an unknown point or station.
+    """
+    model = checker.model
+    origin = station_position(model, station)
+    if origin is None:
+        return np.ones(len(q), dtype=bool)
+    target = point_kinematics(model, q, point=point, jacobians=False)
+    seen = np.ones(len(q), dtype=bool)
+    if acceptance is not None:
+        towards = origin - target.position
+        cosine = np.einsum("sij,j,si->s", target.orientation, acceptance.axis, towards) / np.linalg.norm(towards, axis=1)
+        seen &= cosine >= np.cos(acceptance.half_angle)
+    if model.config.stations[model.stations[0] if station is None else station].line_of_sight:
+        left = np.flatnonzero(seen)
+        seen[left] = ~blocked(checker, q[left], origin, target.position[left], beam_radius, target_clearance)
+    return seen
+
+
+def blocked(
+    checker: CollisionChecker, q: np.ndarray, origin: np.ndarray, target: np.ndarray, radius: float, clearance: float
+) -> np.ndarray:
+    """Whether a beam from `origin` (3,) to `clearance` before `target` (samples, 3) meets a shape of the robot or an obstacle.
+
+    A shape whose bounding sphere the beam misses is settled in one sweep over all samples; coal looks at the others.
+    """
+    import coal
+
+    rotation, position = link_frames(checker.model, q)
+    span = target - origin
+    distance = np.linalg.norm(span, axis=1)
+    direction = span / distance[:, None]
+    length = np.maximum(distance - clearance, 1e-3)
+    beams = [coal.Capsule(radius, float(reach)) for reach in length]
+    middles = origin + direction * (length / 2)[:, None]
+    turns = _towards(direction)
+    request = coal.CollisionRequest()
+    result = np.zeros(len(q), dtype=bool)
+    for shape in checker.shapes:
+        if shape.joint < 0:
+            turned = np.broadcast_to(shape.rotation, (len(q), 3, 3))
+            placed = np.broadcast_to(shape.translation, (len(q), 3))
+        else:
+            turned = rotation[:, shape.joint] @ shape.rotation
+            placed = position[:, shape.joint] + rotation[:, shape.joint] @ shape.translation
+        shape.geometry.computeLocalAABB()
+        centre = placed + turned @ np.array(shape.geometry.aabb_center)
+        along = np.clip(np.einsum("si,si->s", centre - origin, direction), 0.0, length)
+        apart = np.linalg.norm(origin + along[:, None] * direction - centre, axis=1)
+        for s in np.flatnonzero(~result & (apart <= shape.geometry.aabb_radius + radius)):
+            hit = coal.CollisionResult()
+            body, beam = coal.Transform3s(turned[s], placed[s]), coal.Transform3s(turns[s], middles[s])
+            result[s] = coal.collide(shape.geometry, body, beams[s], beam, request, hit) > 0
+    return result
+
+
+def _towards(direction: np.ndarray) -> np.ndarray:
+    """Rotations (samples, 3, 3) whose z axes are the unit vectors `direction` (samples, 3)."""
+    least = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
+    x = np.cross(least, direction)
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    return np.stack([x, np.cross(direction, x), direction], axis=2)

@@ -1,0 +1,110 @@
+"""From predicted and measured frequency responses to a whitened real residual (Eqs. 26, 27)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.elasticity.prediction import Prediction, ResponseModel
+from flexcal.elasticity.weighting import Weighting
+from flexcal.frequency import FrequencyResponse
+
+LOGARITHM_LIMIT = 0.3
+"""Largest relative standard deviation of an element whose logarithm is compared; near a zero log Ĝ is biased."""
+
+CLUSTER_LINES = 4
+"""Neighbouring lines of one pose that make one cluster of the sandwich covariance."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseResidual:
+    """Measured response of one pose (L lines, n axes), prepared.
+
+    `logarithmic` (L, n, n) tells the elements whose error is log(Ĝ/G); the error of the others is (Ĝ - G)/`scale`, with scale
+    √|Ĝ_ii Ĝ_jj| so that a coupling near zero counts as what it is beside its axes. `factor` (L, n², n²) whitens vec of the errors.
+    """
+
+    measured: np.ndarray
+    logarithmic: np.ndarray
+    scale: np.ndarray
+    factor: np.ndarray
+
+    @classmethod
+    def of(cls, response: FrequencyResponse, weighting: Weighting) -> PoseResidual:
+        """Choose logarithmic or linear errors by their standard deviation, and weigh them."""
+        measured = response.response
+        diagonal = np.abs(np.diagonal(measured, axis1=1, axis2=2))
+        scale = np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
+        logarithmic = response.std < LOGARITHM_LIMIT * np.abs(measured)
+        unit = _vec(np.where(logarithmic, measured, scale))
+        covariance = response.covariance / (unit[:, :, None] * unit[:, None, :].conj())
+        return cls(measured, logarithmic, scale, weighting.factor(response, covariance))
+
+    def errors(self, predicted: np.ndarray) -> np.ndarray:
+        """Complex errors Δ (L, n, n): the phase of a logarithm is in (-π, π] because it is that of the ratio."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            ratio = np.log(np.where(self.logarithmic, self.measured / predicted, 1.0))
+        return np.where(self.logarithmic, ratio, (self.measured - predicted) / self.scale)
+
+    def residual(self, predicted: np.ndarray) -> np.ndarray:
+        """Whitened rows (2 L n²,), line by line: real parts, then imaginary parts."""
+        white = self.factor @ _vec(self.errors(predicted))[:, :, None]
+        return _real(white)[:, 0]
+
+    def jacobian(self, prediction: Prediction) -> np.ndarray:
+        """∂(residual)/∂x (2 L n², c) by the parameters of `prediction.columns`."""
+        unit = np.where(self.logarithmic, prediction.response, self.scale)
+        change = prediction.derivatives / -unit[..., None]
+        lines, n, _, columns = change.shape
+        return _real(self.factor @ np.swapaxes(change, 1, 2).reshape(lines, n * n, columns))
+
+
+@dataclass(frozen=True, eq=False)
+class StageOneResidual:
+    """The residual of all poses as a function of the estimation coordinates."""
+
+    model: ResponseModel
+    poses: tuple[PoseResidual, ...]
+
+    @classmethod
+    def of(cls, model: ResponseModel, responses: Sequence[FrequencyResponse], weighting: Weighting) -> StageOneResidual:
+        """For measured responses, in the order of the model's poses."""
+        return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
+
+    def residual(self, x: np.ndarray) -> np.ndarray:
+        """All rows (m,), pose by pose."""
+        predicted = self.model.responses(x)
+        return np.concatenate([pose.residual(g) for pose, g in zip(self.poses, predicted, strict=True)])
+
+    def linearise(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """All rows (m,) and their derivatives (m, p)."""
+        predictions = self.model.predict(x)
+        residuals, start = [], 0
+        rows = [2 * pose.measured.size for pose in self.poses]
+        jacobian = np.zeros((sum(rows), len(self.model.parameters)))
+        for pose, prediction, count in zip(self.poses, predictions, rows, strict=True):
+            residuals.append(pose.residual(prediction.response))
+            jacobian[start : start + count, prediction.columns] = pose.jacobian(prediction)
+            start += count
+        return np.concatenate(residuals), jacobian
+
+    def clusters(self, lines: int = CLUSTER_LINES) -> np.ndarray:
+        """Cluster number (m,) of every row: `lines` neighbouring lines of one pose."""
+        labels, first = [], 0
+        for pose in self.poses:
+            number = np.arange(len(pose.measured)) // lines
+            labels.append(first + np.repeat(number, 2 * pose.measured[0].size))
+            first += int(number[-1]) + 1
+        return np.concatenate(labels)
+
+
+def _vec(matrix: np.ndarray) -> np.ndarray:
+    return np.swapaxes(matrix, -1, -2).reshape(len(matrix), -1)
+
+
+def _real(white: np.ndarray) -> np.ndarray:
+    """(L, k, c) complex of unit variance to (2 L k, c) real of unit variance: √2 times real and imaginary part of each line."""
+    both = np.sqrt(2.0) * np.concatenate([white.real, white.imag], axis=1)
+    return both.reshape(-1, white.shape[-1])

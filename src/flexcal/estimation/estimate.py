@@ -1,0 +1,127 @@
+"""The result of every identification."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexcal.estimation.parameter import Parameters
+
+NORMAL_QUANTILE = 1.959963984540054
+
+
+@dataclass(frozen=True)
+class Dropped:
+    """A parameter that the data cannot tell apart from others: it stays at its start value and the kept ones absorb it.
+
+    A kept parameter with (name, coefficient) in `absorbed_by` estimates kept + coefficient · (dropped − its start value),
+    all in estimation coordinates. Nothing in `absorbed_by`: the data do not depend on it.
+    """
+
+    name: str
+    absorbed_by: tuple[tuple[str, float], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Estimated parameters with their joint uncertainty.
+
+    `parameters` carry the estimates as values; `covariance` (p, p) is in estimation coordinates, with zero rows and columns
+    for `dropped` parameters: given their fixed values, predictions inside the model's reach have exactly this uncertainty.
+    `identifiable` is False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.5
+    (95 % interval wider than a factor e either way). `cost` is the minimised objective, prior included. `chi2` is the data's
+    whitened residual sum of squares, prior rows excluded and with robust weights where a robust loss is used;
+    `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
+    `outliers` are labels of groups, or row numbers where the problem has no groups.
+    """
+
+    parameters: Parameters
+    covariance: np.ndarray
+    rank: int
+    dropped: tuple[Dropped, ...]
+    identifiable: tuple[bool, ...]
+    cost: float
+    chi2: float
+    degrees_of_freedom: int
+    status: str
+    message: str
+    iterations: int
+    outliers: tuple[int, ...] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Estimates in natural units, by name."""
+        return {item.name: item.value for item in self.parameters}
+
+    @property
+    def reduced_chi2(self) -> float:
+        """chi2 / degrees of freedom: near one when model and noise are right; NaN without degrees of freedom."""
+        return self.chi2 / self.degrees_of_freedom if self.degrees_of_freedom > 0 else math.nan
+
+    @property
+    def converged(self) -> bool:
+        return self.status == "converged"
+
+    def std(self, name: str) -> float | None:
+        """Standard deviation in natural units, to first order; None when not identifiable."""
+        number = self.parameters.index(name)
+        if not self.identifiable[number]:
+            return None
+        slope = self.parameters.natural_slope(self.parameters.coordinates())[number]
+        return float(slope * math.sqrt(self.covariance[number, number]))
+
+    def interval(self, name: str) -> tuple[float, float] | None:
+        """95 % interval (low, high) in natural units, symmetric in the estimation coordinate; None when not identifiable.
+
+        Quantile of Student's t below 100 degrees of freedom, where the noise level is hardly better known, else normal.
+        """
+        number = self.parameters.index(name)
+        if not self.identifiable[number]:
+            return None
+        item = self.parameters[number]
+        centre = item.coordinate(item.value)
+        half = self._quantile() * math.sqrt(self.covariance[number, number])
+        return item.natural(centre - half), item.natural(centre + half)
+
+    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
+        """The quantity as every results file has it; std, low and high are None when not identifiable."""
+        interval = self.interval(name)
+        return {
+            "estimate": float(self.parameters[name].value),
+            "std": self.std(name),
+            "low": interval[0] if interval else None,
+            "high": interval[1] if interval else None,
+            "truth": None if truth is None else float(truth),
+            "identifiable": self.identifiable[self.parameters.index(name)],
+        }
+
+    def marginal(self, names: Iterable[str]) -> tuple[np.ndarray, np.ndarray]:
+        """Coordinates (k,) and covariance (k, k) of the named parameters, both in estimation coordinates."""
+        numbers = [self.parameters.index(name) for name in names]
+        return self.parameters.coordinates()[numbers], self.covariance[np.ix_(numbers, numbers)]
+
+    def regrouped(self, truth: Mapping[str, float]) -> dict[str, float]:
+        """What this estimate should have found for `truth` (natural units): dropped parameters mapped into the kept ones.
+
+        Names that `truth` lacks are taken at the estimate. Dropped parameters come back at the value they were held at.
+        """
+        held = self.parameters.coordinates()
+        known = {name: value for name, value in truth.items() if name in self.parameters}
+        x = self.parameters.coordinates(known)
+        for dropped in self.dropped:
+            number = self.parameters.index(dropped.name)
+            for kept, coefficient in dropped.absorbed_by:
+                x[self.parameters.index(kept)] += coefficient * (x[number] - held[number])
+            x[number] = held[number]
+        return dict(zip(self.parameters.names, (float(v) for v in self.parameters.natural(x)), strict=True))
+
+    def _quantile(self) -> float:
+        if not 0 < self.degrees_of_freedom < 100:
+            return NORMAL_QUANTILE
+        from scipy.special import stdtrit
+
+        return float(stdtrit(self.degrees_of_freedom, 0.975))

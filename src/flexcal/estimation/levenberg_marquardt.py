@@ -1,0 +1,118 @@
+"""Levenberg–Marquardt with bounds, on the triangular factor of each linearisation."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.estimation.objective import Objective
+
+_FIRST_DAMPING = 1e-3
+_LARGEST_DAMPING = 1e14
+_SMALLEST_DAMPING = 1e-18
+_ROUNDING = 1e-13
+_STATIONARY = 1e-4
+_EXACT = 1e-16
+_CANNOT_STEP = {
+    True: ("converged", "the cost no longer changes beyond rounding"),
+    False: ("stalled", "no step lowers the cost; check the Jacobian against finite differences"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Optimum:
+    """Where a minimisation ended: coordinates, residual, Jacobian and robust group weights there, cost, and how it went."""
+
+    x: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+    weights: np.ndarray
+    cost: float
+    status: str
+    message: str
+    iterations: int
+
+
+def minimise(
+    objective: Objective,
+    x: np.ndarray,
+    free: np.ndarray,
+    *,
+    max_iterations: int,
+    tolerance: float,
+    progress: Callable[[int, float], None] | None = None,
+) -> Optimum:
+    """Minimise over the coordinates marked in `free` (p,), from `x` (p,).
+
+    Damping follows the gain ratio (Nielsen 1999; Madsen, Nielsen, Tingleff 2004, alg. 3.16) in coordinates scaled by the
+    largest column norms seen (Moré 1978). Robust losses are reweighted at every linearisation; the weighted quadratic
+    bounds them from above, so the gain ratio keeps its meaning. Steps are clipped at the bounds, and a coordinate that is
+    at one and pushed outwards rests for that step. Directions without information are not moved.
+
+    Converged: the relative offset ‖Qᵀb‖/‖b‖ (Bates & Watts 1981) or the scaled step is below `tolerance`, or the cost no
+    longer changes beyond rounding. Stalled: no step lowers the cost although the relative offset is above 1e-4 and the
+    cost not yet 1e-16 of the first one. Raises FlexcalError when the start itself cannot be evaluated.
+    """
+    lower, upper = objective.problem.parameters.bounds()
+    x = np.clip(x, lower, upper)
+    residual, jacobian = objective.linearise(x)
+    cost = first_cost = objective.cost(residual, x)
+    scale = np.zeros(x.size)
+    damping, growth, best_offset = _FIRST_DAMPING, 2.0, np.inf
+    status, message, iteration, polishing = "iteration limit", "", 0, False
+    while True:
+        if progress is not None:
+            progress(iteration, cost)
+        weights = objective.weights(residual)
+        factor, target, norm = objective.triangular(x, residual, jacobian, weights)
+        scale = np.maximum(scale, np.linalg.norm(factor, axis=0))
+        unit = np.where(scale > 0, scale, 1.0)
+        gradient = factor.T @ target
+        outwards = ((x <= lower) & (gradient > 0)) | ((x >= upper) & (gradient < 0))
+        moving = np.flatnonzero(free & ~outwards)
+        left, singular, right = np.linalg.svd(factor[:, moving] / unit[moving], full_matrices=False)
+        known = singular > 1e-13 * np.max(singular, initial=0.0)
+        left, singular, right = left[:, known].T @ target, singular[known], right[known]
+        offset = float(np.linalg.norm(left)) / norm if norm > 0 else 0.0
+        if offset <= tolerance:
+            status, message = "converged", f"relative offset {offset:.1e}"
+            break
+        if polishing and offset >= 0.5 * best_offset:
+            status, message = "converged", "the cost no longer changes beyond rounding"
+            break
+        best_offset = min(best_offset, offset)
+        if iteration >= max_iterations:
+            message = f"not converged after {iteration} iterations (relative offset {offset:.1e}); allow more"
+            break
+        iteration += 1
+        linearised, rejected = None, False
+        while True:
+            step = np.zeros(x.size)
+            step[moving] = -(right.T @ (singular * left / (singular**2 + damping))) / unit[moving]
+            trial = np.clip(x + step, lower, upper)
+            step = trial - x
+            if damping > _LARGEST_DAMPING or np.linalg.norm(unit * step) <= tolerance * 1e-3 * np.linalg.norm(
+                unit * x
+            ):
+                negligible = not rejected or offset <= _STATIONARY or cost <= _EXACT * first_cost
+                status, message = _CANNOT_STEP[negligible]
+                break
+            predicted = -float(gradient @ step) - 0.5 * float(np.sum((factor @ step) ** 2))
+            trial_cost, linearised = objective.trial(trial)
+            actual = cost - trial_cost
+            polishing = abs(predicted) <= _ROUNDING * cost and abs(actual) <= 10 * _ROUNDING * cost
+            gain = 1.0 if polishing else actual / predicted if predicted > 0 else -1.0
+            if gain > 1e-4:
+                damping = max(damping * max(1.0 / 3.0, 1.0 - (2.0 * gain - 1.0) ** 3), _SMALLEST_DAMPING)
+                growth = 2.0
+                break
+            damping, growth = damping * growth, growth * 2.0
+            rejected = True
+        if status != "iteration limit":
+            break
+        x = trial
+        residual, jacobian = linearised if linearised is not None else objective.linearise(x)
+        cost = objective.cost(residual, x)
+    return Optimum(x, residual, jacobian, weights, cost, status, message, iteration)

@@ -1,0 +1,99 @@
+"""The cost that is minimised: loss of the residual groups plus prior."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.estimation.grouping import Grouping
+from flexcal.estimation.loss import Loss
+from flexcal.estimation.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Objective:
+    """F(x) = Σ_g ρ(‖r_g(x)‖) + ½‖L(x − x₀)‖², evaluated with checks."""
+
+    problem: Problem
+    loss: Loss
+    grouping: Grouping
+    thresholds: np.ndarray
+    prior_rows: np.ndarray
+    prior_mean: np.ndarray
+
+    @classmethod
+    def of(cls, problem: Problem, loss: Loss, rows: int) -> Objective:
+        """For a residual of `rows` rows."""
+        grouping = Grouping.of(problem.groups, rows)
+        thresholds = loss.thresholds(grouping.sizes)
+        return cls(problem, loss, grouping, thresholds, problem.prior_rows(), problem.parameters.prior_mean())
+
+    def linearise(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual (m,) and Jacobian (m, p); raises FlexcalError when they are not finite."""
+        residual, jacobian = self.problem.linearise(x)
+        names = self.problem.parameters.names
+        rows = self.grouping.number.size
+        if np.shape(residual) != (rows,) or np.shape(jacobian) != (rows, len(names)):
+            raise FlexcalError(
+                f"linearise returned shapes {np.shape(residual)} and {np.shape(jacobian)}; "
+                f"{rows} rows and {len(names)} parameters need ({rows},) and ({rows}, {len(names)})."
+            )
+        if not np.all(np.isfinite(residual)):
+            row = int(np.argmin(np.isfinite(residual)))
+            raise FlexcalError(f"The residual's row {row} is not finite; check the data and the model there.")
+        if not np.all(np.isfinite(jacobian)):
+            name = names[int(np.argmin(np.all(np.isfinite(jacobian), axis=0)))]
+            raise FlexcalError(
+                f"The derivative of the residual by {name} is not finite; check the model there."
+            )
+        return residual, jacobian
+
+    def trial(self, x: np.ndarray) -> tuple[float, tuple[np.ndarray, np.ndarray] | None]:
+        """Cost at `x`, infinite where the model cannot be evaluated, and the linearisation if that came with it."""
+        linearised = None
+        with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+            try:
+                if self.problem.residual is None:
+                    linearised = self.linearise(x)
+                    residual = linearised[0]
+                else:
+                    residual = self.problem.residual(x)
+            except FlexcalError:
+                return math.inf, None
+            cost = self.cost(residual, x)
+        return (cost, linearised) if math.isfinite(cost) else (math.inf, None)
+
+    def cost(self, residual: np.ndarray, x: np.ndarray) -> float:
+        """F(x)."""
+        prior = self.prior_rows @ (x - self.prior_mean)
+        data = self.loss.cost(self.grouping.norms(residual), self.thresholds)
+        return float(np.sum(data) + 0.5 * prior @ prior)
+
+    def weights(self, residual: np.ndarray) -> np.ndarray:
+        """Robust weight (G,) of every group."""
+        return self.loss.weight(self.grouping.norms(residual), self.thresholds)
+
+    def triangular(
+        self, x: np.ndarray, residual: np.ndarray, jacobian: np.ndarray, weights: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """R (p, p), c (p,) and ‖b‖ of the rows [A b] = [√w J, √w r; L, L(x − x₀)], where A = QR and c = Qᵀb.
+
+        One QR of [A b] without Q, by recursive panels (dgeqrt takes a third of dgeqrf's time on tall tables); with
+        fewer rows than parameters R and c have fewer rows.
+        """
+        from scipy.linalg.lapack import dgeqrt  # pyright: ignore[reportAttributeAccessIssue]
+
+        rows, size = jacobian.shape
+        table = np.empty((rows + self.prior_rows.shape[0], size + 1), order="F")
+        table[:rows, :size] = jacobian
+        table[:rows, size] = residual
+        if np.any(weights != 1.0):
+            table[:rows] *= np.sqrt(weights)[self.grouping.number][:, None]
+        table[rows:, :size] = self.prior_rows
+        table[rows:, size] = self.prior_rows @ (x - self.prior_mean)
+        norm = float(np.linalg.norm(table[:, size]))
+        factor = np.triu(dgeqrt(min(16, *table.shape), table, overwrite_a=1)[0][: size + 1])
+        return factor[:size, :size], factor[:size, size], norm

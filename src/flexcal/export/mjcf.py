@@ -1,0 +1,178 @@
+"""RobotModel to MuJoCo: rotors, drive springs and bearings as joints of one kinematic tree.
+
+A joint with springs is up to four hinges on the link's body, outermost first: the motor about the joint axis with the rotor's
+`armature`, the twist of the drive spring about the same axis, the tilts about the bearing's y and x. So the rotor carries the
+kinetic energy of its own spin only, the spring is an ordinary joint spring (no tendon between two trees, whose damping
+`implicitfast` would get wrong) and the geometry is the chain of `flexcal.model`: misalignments and offset lie in the body's
+placement, the length errors in the placement of the next body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.atomic import write_text
+from flexcal.errors import FlexcalError
+from flexcal.model import Inertia, RobotModel
+from flexcal.model.inertia import parallel_axis
+from flexcal.model.rotations import axis_rotation, rotation_wxyz
+
+if TYPE_CHECKING:
+    import mujoco
+
+TILTS = ("bearing_x", "bearing_y")
+
+
+def mjcf_spec(
+    model: RobotModel,
+    *,
+    q: np.ndarray | None = None,
+    free: Collection[int] | None = None,
+    payload: float | None = None,
+) -> mujoco.MjSpec:
+    """The robot as an `MjSpec`, with every identified value in it.
+
+    `q` (n,) rad or m: where the joints that are not in `free` are locked (default: all joints are free); `payload` kg at the declared
+    payload's centre of mass (default: the declared mass). MuJoCo joints are named `<joint>` (motor side), `<joint>.drive` (twist
+    of the arm beyond the motor), `<joint>.bearing_y`, `<joint>.bearing_x`; sites have the points' names. Backlash has no form in
+    MJCF and is left out; Coulomb friction becomes `frictionloss`, which is not a tanh. Raises `FlexcalError` where a joint is
+    locked without `q`, or a payload is given but none declared.
+    """
+    import mujoco
+
+    motors = set(range(model.n)) if free is None else set(free)
+    if len(motors) < model.n and q is None:
+        raise FlexcalError("joints are to be locked but no pose is given; pass q, one value per joint.")
+    at = np.zeros(model.n) if q is None else np.asarray(q, dtype=float)
+    spec = mujoco.MjSpec()
+    spec.modelname = model.name
+    spec.compiler.degree = False
+    spec.compiler.autolimits = True
+    spec.option.gravity = model.gravity
+    bodies: list[mujoco.MjsBody] = []
+    for i, inertia in enumerate(carried_inertias(model, payload)):
+        joint = model.joints[i]
+        parent = spec.worldbody if joint.parent < 0 else bodies[joint.parent]
+        position, rotation = joint_placement(model, i)
+        if i not in motors and joint.kind == "prismatic":
+            position = position + rotation @ joint.axis * at[i]
+        elif i not in motors:
+            rotation = rotation @ axis_rotation(joint.axis, at[i])
+        body = parent.add_body(name=joint.link, pos=position, quat=rotation_wxyz(rotation))
+        body.mass = inertia.mass
+        body.ipos = inertia.com
+        body.fullinertia = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        body.explicitinertial = True
+        if i in motors:
+            _add_motor(spec, body, model, i)
+        _add_springs(body, model, i)
+        bodies.append(body)
+    for name in model.points:
+        joint, position, rotation = point_placement(model, name)
+        bodies[joint].add_site(name=name, pos=position, quat=rotation_wxyz(rotation))
+    return spec
+
+
+def write_mjcf(model: RobotModel, path: str | Path) -> None:
+    """Write the robot as an MJCF file with elastic joints; see `mjcf_spec` for its joints and for what it cannot hold."""
+    import mujoco
+
+    spec = mjcf_spec(model)
+    spec.option.timestep = 0.25e-3
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
+    spec.compile()
+    write_text(path, spec.to_xml())
+
+
+def joint_placement(model: RobotModel, i: int) -> tuple[np.ndarray, np.ndarray]:
+    """Position (3,) m and rotation (3, 3) of joint `i` at q = 0 in its parent link, with every geometric error."""
+    joint, geometry = model.joints[i], model.geometry[i]
+    length = np.zeros(3) if joint.parent < 0 else model.geometry[joint.parent, 3:]
+    rotation = (
+        joint.rotation
+        @ axis_rotation(joint.normals[1], geometry[2])
+        @ axis_rotation(joint.normals[0], geometry[1])
+    )
+    position = joint.translation + length
+    if joint.kind == "prismatic":
+        return position + rotation @ joint.axis * geometry[0], rotation
+    return position, rotation @ axis_rotation(joint.axis, geometry[0])
+
+
+def point_placement(model: RobotModel, name: str) -> tuple[int, np.ndarray, np.ndarray]:
+    """Joint whose link carries a target, its position (3,) m and frame (3, 3) in that link, with the errors of link and tool."""
+    point = model.point(name)
+    tool, own = model.tool, model.point_error[list(model.points).index(name)]
+    x, y, z = np.eye(3)
+    rotation = (
+        point.rotation @ axis_rotation(y, tool[2]) @ axis_rotation(x, tool[1]) @ axis_rotation(z, tool[0])
+    )
+    length = tool[3:] if name == next(iter(model.points)) else np.zeros(3)
+    position = point.translation + model.geometry[point.joint, 3:] + rotation @ (point.xyz + own + length)
+    return point.joint, position, rotation
+
+
+def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
+    """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
+    held = model.payload
+    if held is None:
+        if payload:
+            raise FlexcalError(
+                f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`."
+            )
+        return model.inertias
+    mass = held.mass if payload is None else payload
+    if mass == 0:
+        return model.inertias
+    own = held.rotation @ held.inertia @ held.rotation.T * (mass / held.mass if held.mass > 0 else 1.0)
+    link = model.inertias[held.joint]
+    total = link.mass + mass
+    com = (link.mass * link.com + mass * held.com_in_link) / total
+    inertia = link.inertia + own
+    inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, held.com_in_link - com)
+    return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
+
+
+def _add_motor(spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int) -> None:
+    import mujoco
+
+    joint = model.joints[i]
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
+    motor = body.add_joint(name=joint.name, type=kind, axis=joint.axis)
+    motor.armature = _known(model.rotor_inertia[i])
+    motor.damping = _linear(motor.damping, _known(model.viscous[i]))
+    motor.frictionloss = _known(model.coulomb[i])
+    if np.isfinite([joint.lower, joint.upper]).all():
+        motor.range = [joint.lower, joint.upper]
+    drive = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    if np.isfinite(joint.effort) and joint.effort > 0:
+        drive.ctrlrange = [-joint.effort, joint.effort]
+
+
+def _add_springs(body: mujoco.MjsBody, model: RobotModel, i: int) -> None:
+    import mujoco
+
+    hinge = mujoco.mjtJoint.mjJNT_HINGE
+    for spring in (e for e in model.elastic if e.index == i):
+        for component in spring.components:
+            name = f"{spring.name}.{(*TILTS, 'drive')[component]}"
+            joint = body.add_joint(name=name, type=hinge, axis=spring.frame[:, component])
+            joint.stiffness = _linear(joint.stiffness, float(spring.stiffness[component]))
+            joint.damping = _linear(joint.damping, float(spring.damping[component]))
+
+
+def _linear(default: float | np.ndarray, value: float) -> float | np.ndarray:
+    """`value` in the form of a joint's coefficient: a number up to MuJoCo 3, a polynomial with the linear one first from 4 on."""
+    if np.ndim(default) == 0:
+        return value
+    coefficients = np.zeros(np.shape(default))
+    coefficients.flat[0] = value
+    return coefficients
+
+
+def _known(value: float) -> float:
+    return float(value) if np.isfinite(value) else 0.0

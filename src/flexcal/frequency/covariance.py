@@ -1,0 +1,138 @@
+"""Covariance of measured frequency response matrices: noise from empty bins, total from the scatter of realisations.
+
+vec() stacks columns throughout: element (i, j) of G is entry j·n_y + i. Covariances are E[δ δᴴ] of complex, circular δ.
+"""
+
+import numpy as np
+
+_SMALLEST_RELATIVE_STD = (
+    1e-10  # no entry of a covariance is claimed to be known better: rounding is not noise
+)
+
+
+def pool(squares: np.ndarray, bins: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
+    """Means (L, …) of `squares` (B, …) over the `count` successive bins around each of the positions `at` (L,).
+
+    `bins` is sorted; near the ends the window keeps its size and leans inwards. O(B) for any window.
+    """
+    count = min(count, bins.size)
+    nearest = np.searchsorted(bins, at)
+    start = np.clip(nearest - count // 2, 0, bins.size - count)
+    running = np.zeros((bins.size + 1, *squares.shape[1:]), squares.dtype)
+    np.cumsum(squares, axis=0, out=running[1:])
+    return (running[start + count] - running[start]) / count
+
+
+def column_noise(empty: np.ndarray, bins: np.ndarray, lines: np.ndarray, count: int) -> np.ndarray:
+    """Noise covariance (L, c, c) of one measured column from spectra (B, S, c) of S records at B empty bins.
+
+    Pooled over the `count` bins around each line and over the records; the spectra are those of position and torque,
+    whose noise is smoother over frequency than that of the acceleration.
+    """
+    squares = np.swapaxes(empty, 1, 2) @ empty.conj() / empty.shape[1]
+    return pool(squares, bins, lines, count)
+
+
+def output_noise(response: np.ndarray, column: np.ndarray) -> np.ndarray:
+    """Covariance (L, n, n) of the equation error N_y - G N_u of one experiment, from that of [N_y; N_u], (L, 2n, 2n)."""
+    n = response.shape[-1]
+    left = np.concatenate([np.broadcast_to(np.eye(n), response.shape), -response], -1)
+    return left @ column @ _dagger(left)
+
+
+def input_gain(torque: np.ndarray) -> np.ndarray:
+    """Right factor (L, n, n) of the covariance of vec G: the mean over realisations of conj((Γ Γᴴ)⁻¹), Γ (R, L, n, E).
+
+    From δG = (δQ̈ - G δΓ) Γ⁻¹ with the same noise, independent, in every experiment:
+    cov(vec G) = conj((Γ Γᴴ)⁻¹) ⊗ cov(N_y - G N_u).
+    """
+    square = torque @ _dagger(torque)
+    identity = np.broadcast_to(np.eye(square.shape[-1]), square.shape)
+    gain = np.linalg.solve(square, identity).conj().mean(0)
+    return 0.5 * (gain + _dagger(gain))
+
+
+def kronecker(right: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Batched Kronecker product right ⊗ left of (L, n, n) matrices, (L, n², n²)."""
+    lines, n, m = right.shape[0], right.shape[-1], left.shape[-1]
+    product = right[:, :, None, :, None] * left[:, None, :, None, :]
+    return product.reshape(lines, n * m, n * m)
+
+
+def total_covariance(
+    realisations: np.ndarray, response: np.ndarray, noise: np.ndarray, gain: np.ndarray, count: int
+) -> tuple[np.ndarray, float]:
+    """Covariance (L, n², n²) of vec G of ONE realisation, noise and nonlinear distortion, and its degrees of freedom.
+
+    The scatter G^[r] - mean (R, L, n, n) has no structure over frequency but the gain of the plant itself, so it is
+    pooled over `count` neighbouring lines after whitening by that gain: from the left by L with
+    L Lᴴ = G Θ Gᴴ + `noise`, where Θ is the (diagonal) input-referred disturbance found in the window, friction above
+    all, and `noise` (L, n, n) the equation error of output_noise; from the right by P with P Pᴴ = `gain`. Poles and
+    zeros stay as sharp as they are in G. In the whitened coordinates the pooled covariance is shrunk to its diagonal
+    (Ledoit and Wolf; intensity of Schäfer and Strimmer 2005 for complex normal scatter), then carried back.
+    Degrees of freedom: (R - 1) · count, before shrinkage.
+    """
+    members, lines, n, _ = realisations.shape
+    count = min(count, lines)
+    at = np.arange(lines)
+    scatter = (realisations - realisations.mean(0)) * np.sqrt(members / (members - 1.0))
+    right = np.linalg.cholesky(gain)
+    balanced = np.swapaxes(np.linalg.solve(right, np.swapaxes(scatter, -1, -2)), -1, -2)
+
+    input_scatter = np.linalg.solve(response, balanced)
+    input_noise = np.linalg.solve(response, np.swapaxes(np.linalg.solve(response, noise).conj(), -1, -2))
+    disturbance = (np.abs(input_scatter) ** 2).mean((0, -1)) - _diagonal(input_noise)
+    disturbance = np.maximum(pool(disturbance, at, at, count), 0.0)
+
+    floor = (_SMALLEST_RELATIVE_STD * np.linalg.norm(response, axis=(1, 2))) ** 2
+    shape = (response * disturbance[:, None, :]) @ _dagger(response) + noise
+    shape = shape + floor[:, None, None] * np.eye(n)
+    left = np.linalg.cholesky(0.5 * (shape + _dagger(shape)))
+
+    white = np.linalg.solve(left, balanced)
+    vectors = np.swapaxes(white, -1, -2).reshape(members, lines, n * n).transpose(1, 2, 0)
+    squares = vectors @ _dagger(vectors) / members
+    freedom = float((members - 1) * count)
+    pooled = shrink_to_diagonal(pool(squares, at, at, count), freedom)
+    pooled = pooled + 1e-12 * np.eye(n * n)  # keeps it definite where a scatter is exactly nil
+    return transform(pooled, right, left), freedom
+
+
+def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
+    """Sample covariances (L, p, p) of complex normal vectors with `freedom` degrees of freedom, off-diagonals damped.
+
+    The intensity min(1, Σ var(s_ij) / Σ |s_ij|²) over i ≠ j, with var(s_ij) = s_ii s_jj / freedom, leaves a true
+    correlation alone and removes what chance alone would give; the result is positive definite where the diagonal is.
+    """
+    variance = _diagonal(covariance)
+    off = covariance.copy()
+    index = np.arange(covariance.shape[-1])
+    off[:, index, index] = 0.0
+    chance = (variance.sum(-1) ** 2 - (variance**2).sum(-1)) / freedom
+    found = (np.abs(off) ** 2).sum((-1, -2))
+    intensity = np.divide(chance, found, out=np.ones_like(chance), where=found > chance)
+    shrunk = off * (1.0 - intensity)[:, None, None]
+    shrunk[:, index, index] = variance
+    return shrunk
+
+
+def transform(covariance: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """Covariance of vec(L Y Pᵀ) from that of vec(Y), (L, n², n²), for batched L = `left` and P = `right`."""
+    half = _from_left(covariance, right, left)
+    result = _dagger(_from_left(_dagger(half), right, left))
+    return 0.5 * (result + _dagger(result))
+
+
+def _from_left(matrix: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
+    """(right ⊗ left) · matrix without the Kronecker product."""
+    lines, n = right.shape[:2]
+    columns = (right @ matrix.reshape(lines, n, -1)).reshape(lines, n, n, -1)
+    return (left[:, None] @ columns).reshape(matrix.shape)
+
+
+def _dagger(matrix: np.ndarray) -> np.ndarray:
+    return np.swapaxes(matrix, -1, -2).conj()
+
+
+def _diagonal(matrix: np.ndarray) -> np.ndarray:
+    return np.real(np.diagonal(matrix, axis1=-2, axis2=-1)).copy()

@@ -1,0 +1,31 @@
+"""The joint covariance that a robot carries of its estimated values."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.estimation import Estimate, Parameters
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Estimated `parameters` and their joint `covariance` (p, p) in estimation coordinates."""
+
+    parameters: Parameters
+    covariance: np.ndarray
+
+    def updated(self, estimate: Estimate, names: tuple[str, ...]) -> Posterior:
+        """With the named parameters taken from `estimate`; what only the older holds stays, taken as independent of it."""
+        newer = estimate.parameters.subset(names)
+        older = [name for name in self.parameters.names if name not in newer]
+        numbers = [self.parameters.index(name) for name in older]
+        size = len(older)
+        covariance = np.zeros((size + len(newer), size + len(newer)))
+        covariance[:size, :size] = self.covariance[np.ix_(numbers, numbers)]
+        covariance[size:, size:] = estimate.marginal(names)[1]
+        return Posterior(self.parameters.subset(older) + newer, covariance)
+
+
+NOTHING_ESTIMATED = Posterior(Parameters(), np.zeros((0, 0)))

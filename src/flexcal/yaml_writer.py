@@ -1,0 +1,88 @@
+"""Writing dataclasses as YAML 1.2."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.atomic import write_text
+from flexcal.errors import FlexcalError
+from flexcal.structuring import Keys, dotted, file_key
+
+_WORDS = re.compile(r"[A-Za-z_/]([A-Za-z0-9_./()-]| (?=[A-Za-z0-9_./(-]))*")
+
+
+def write_yaml(path: str | Path, value: Any) -> None:
+    """Write a dataclass, mapping or list as YAML, atomically; every float comes back bit by bit.
+
+    Fields that are None are left out. Raises `FlexcalError` for NaN, infinity and objects of no YAML form.
+    """
+    write_text(path, yaml_text(value))
+
+
+def yaml_text(value: Any) -> str:
+    """`value` as the YAML text that `write_yaml` writes."""
+    from io import StringIO
+
+    from ruamel.yaml import YAML
+
+    yaml = YAML(typ="rt", pure=True)
+    yaml.default_flow_style = None
+    yaml.width = 110
+    stream = StringIO()
+    yaml.dump(_quoted(to_plain(value)), stream)
+    return stream.getvalue()
+
+
+def to_plain(value: Any) -> Any:
+    """`value` as dicts, lists, texts and numbers, as it would stand in a YAML or JSON file."""
+    return _plain(value, ())
+
+
+def _quoted(value: Any) -> Any:
+    """Plain data whose texts stand in double quotes unless they are plain words, read alike everywhere."""
+    from ruamel.yaml.scalarstring import DoubleQuotedScalarString
+
+    if isinstance(value, str):
+        return value if _WORDS.fullmatch(value) else DoubleQuotedScalarString(value)
+    if isinstance(value, dict):
+        return {_quoted(key): _quoted(item) for key, item in value.items()}
+    return [_quoted(item) for item in value] if isinstance(value, list) else value
+
+
+def _plain(value: Any, keys: Keys) -> Any:
+    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+        fields = [field for field in dataclasses.fields(value) if getattr(value, field.name) is not None]
+        return {file_key(field): _field(value, field, keys) for field in fields}
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item, (*keys, str(key))) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return _plain(value.tolist(), keys)
+    if isinstance(value, (list, tuple)):
+        return [_plain(item, (*keys, i)) for i, item in enumerate(value)]
+    if isinstance(value, np.generic):
+        return _plain(value.item(), keys)
+    if isinstance(value, Path):
+        return value.as_posix()
+    if isinstance(value, float) and not math.isfinite(value):
+        raise FlexcalError(
+            f"{dotted(keys) or 'the value'} is {value}, which is not written; give a finite number."
+        )
+    if value is None or isinstance(value, (str, bool, int, float)):
+        return value
+    raise FlexcalError(
+        f"{dotted(keys) or 'the value'} is a {type(value).__name__}, which has no form in YAML."
+    )
+
+
+def _field(value: Any, field: dataclasses.Field[Any], keys: Keys) -> Any:
+    item = getattr(value, field.name)
+    if field.metadata.get("joints"):
+        return [int(index) + 1 for index in item]
+    return _plain(item, (*keys, file_key(field)))

@@ -1,0 +1,89 @@
+"""The MuJoCo plant against Pinocchio: the same robot twice, errors of geometry and payload included."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexcal.cell.config import CellConfig, MismatchConfig, SpreadConfig
+from flexcal.cell.plant import Plant, build_plant, linearise
+from flexcal.cell.rest import rest
+from flexcal.cell.truth import draw_truth
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel, static_equilibrium
+from flexcal.model.linearisation import linearise as pinocchio_linearise
+from flexcal.units import DEGREE
+
+mujoco = pytest.importorskip("mujoco")
+
+NO_GAP = SpreadConfig(backlash=(0.0, 0.0))
+POSE = np.array([10, 45, 60, 20, -45, 30]) * DEGREE
+
+
+def rotor_and_arm_coordinates(plant: Plant, model: RobotModel) -> np.ndarray:
+    """Matrix from (rotors, arm coordinates of the elastic joints) to the plant's, whose twist is the arm beyond the rotor."""
+    names = list(plant.coordinates)
+    columns = [*model.elastic, *((e, c) for e in model.elastic for c in e.components)]
+    matrix = np.zeros((len(names), len(columns)))
+    for k, column in enumerate(columns):
+        if isinstance(column, tuple):
+            spring, component = column
+            matrix[names.index(f"{spring.name}.{('bearing_x', 'bearing_y', 'drive')[component]}"), k] = 1
+        else:
+            matrix[names.index(column.name), k] = 1
+            matrix[names.index(f"{column.name}.drive"), k] = -1
+    return matrix
+
+
+@pytest.mark.parametrize("payload", [0.0, 6.0])
+def test_mass_damping_stiffness_and_gravity_are_pinocchios(
+    tx90l: RobotModel, rng: np.random.Generator, payload: float
+) -> None:
+    truth = tx90l.with_values(draw_truth(tx90l, NO_GAP, rng))
+    plant = build_plant(truth, CellConfig(), q=POSE, free=(0, 1, 2), payload=payload)
+    found = rest(plant, mujoco.MjData(plant.mjmodel), POSE[:3])
+    ours = linearise(plant, found.position)
+    theirs = pinocchio_linearise(truth, POSE, payload)
+    to = rotor_and_arm_coordinates(plant, truth)
+    for mine, other in (
+        (ours.mass, theirs.mass),
+        (ours.damping, theirs.damping),
+        (ours.stiffness, theirs.stiffness),
+    ):
+        mapped = to.T @ mine @ to
+        scale = np.sqrt(np.outer(np.abs(np.diag(other)), np.abs(np.diag(other))))
+        assert np.all(np.abs(mapped - other) <= 1e-6 * scale)
+    equilibrium = static_equilibrium(truth, POSE, payload)
+    np.testing.assert_allclose(found.torque, equilibrium.torque[0, :3], rtol=1e-6, atol=1e-9)
+
+
+def test_gravity_of_the_rigid_arm_is_pinocchios(ur5: RobotModel, rng: np.random.Generator) -> None:
+    import pinocchio as pin
+
+    arm = pin.buildModelFromUrdf(str(ur5.urdf))
+    arm.gravity = pin.Motion(ur5.gravity, np.zeros(3))
+    plant = build_plant(ur5, CellConfig())
+    q = rng.uniform(-2, 2, ur5.n)
+    torque = rest(plant, mujoco.MjData(plant.mjmodel), q).torque
+    np.testing.assert_allclose(torque, pin.computeGeneralizedGravity(arm, arm.createData(), q), rtol=1e-6, atol=1e-9)
+
+
+def test_the_wrist_is_locked_by_welding_it(tx90l: RobotModel) -> None:
+    plant = build_plant(tx90l, CellConfig(), q=POSE, free=(0, 1, 2))
+    assert plant.mjmodel.nv == 12
+    assert plant.mjmodel.nbody == 4
+
+
+def test_an_elastic_wrist_adds_its_springs(tx90l: RobotModel) -> None:
+    config = CellConfig(mismatch=MismatchConfig(elastic_wrist=30e3))
+    plant = build_plant(tx90l, config, q=POSE, free=(0, 1, 2), time_step=0.25e-3)
+    assert [name for name in plant.coordinates if name[6] in "456"] == ["joint_4.drive", "joint_5.drive", "joint_6.drive"]
+
+
+def test_steps_too_long_for_robot_or_friction_are_refused(tx90l: RobotModel) -> None:
+    with pytest.raises(FlexcalError, match="does not resolve the robot's fastest mode"):
+        build_plant(tx90l, CellConfig(), q=POSE, free=(0, 1, 2), time_step=1e-3)
+    config = CellConfig()
+    harsh = replace(config, friction=replace(config.friction, coulomb_velocity=1e-3))
+    with pytest.raises(FlexcalError, match="too long for the friction of motor"):
+        build_plant(tx90l, harsh, q=POSE, free=(0, 1, 2), time_step=0.25e-3)

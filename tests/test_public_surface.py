@@ -1,0 +1,42 @@
+"""The public surface: every name resolves, and the light import stays light."""
+
+import importlib
+import pkgutil
+import subprocess
+import sys
+from inspect import isclass, isroutine
+
+import pytest
+
+import flexcal
+
+LAYERS = sorted(module.name for module in pkgutil.iter_modules(flexcal.__path__, "flexcal.") if module.ispkg)
+HEAVY = ("casadi", "cvxpy", "mujoco", "plotly", "polars", "scipy.optimize", "scipy.signal")
+
+
+@pytest.mark.parametrize("name", ["flexcal", *LAYERS])
+def test_every_public_name_resolves(name: str) -> None:
+    module = importlib.import_module(name)
+    public = getattr(module, "__all__", ())
+    assert len(public) == len(set(public)), f"{name}.__all__ lists a name twice"
+    assert [item for item in public if not hasattr(module, item)] == []
+
+
+@pytest.mark.parametrize("name", LAYERS)
+def test_every_public_object_has_a_docstring(name: str) -> None:
+    module = importlib.import_module(name)
+    objects = {item: getattr(module, item) for item in getattr(module, "__all__", ())}
+    assert module.__doc__, f"{name} says nowhere what it is"
+    written = {item: value for item, value in objects.items() if isclass(value) or isroutine(value)}
+    assert [item for item, value in written.items() if not (value.__doc__ or "").strip()] == []
+
+
+def test_unknown_name_is_an_attribute_error() -> None:
+    with pytest.raises(AttributeError):
+        flexcal.no_such_name  # noqa: B018
+
+
+def test_robot_model_does_not_import_what_is_heavy() -> None:
+    program = f"import sys\nfrom flexcal import RobotModel\nprint(*(name for name in {HEAVY!r} if name in sys.modules))"
+    run = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert run.stdout.split() == []

@@ -1,0 +1,242 @@
+"""The strict YAML reader: numbers of YAML 1.2, dataclasses, one sentence with file and line for every fault."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from flexcal.errors import FlexcalError, InputError
+from flexcal.yaml_reader import read_yaml, read_yaml_file, write_yaml
+from flexcal.yaml_writer import yaml_text
+
+
+@dataclass(frozen=True)
+class Spring:
+    stiffness: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.stiffness <= 0:
+            raise FlexcalError(f"the stiffness is {self.stiffness}; give a positive one.")
+
+
+@dataclass(frozen=True)
+class Joint:
+    joint: str
+    drive: Spring
+    bearing: Spring | None = None
+
+
+@dataclass(frozen=True)
+class Config:
+    name: str
+    elastic: tuple[Joint, ...] = ()
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    stations: dict[str, Spring] = field(default_factory=dict)
+    terms: Literal["auto", "none"] | list[str] = "auto"
+    count: int = 1
+    sure: bool = False
+    cutoff: float | None = None
+    kind: Literal["held", "mean"] = "held"
+    matrix: np.ndarray | None = None
+    lines: NDArray[np.int64] | None = None
+    file: Path | None = None
+
+
+def read(folder: Path, text: str) -> Config:
+    path = folder / "config.yaml"
+    path.write_text(text)
+    return read_yaml(path, Config)
+
+
+def fault(folder: Path, text: str) -> str:
+    with pytest.raises(InputError) as caught:
+        read(folder, text)
+    message = str(caught.value)
+    assert "config.yaml" in message
+    assert message.endswith((".", "?"))
+    assert "\n" not in message
+    return message
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("143.7e3", 143.7e3),
+        ("143.7e+3", 143.7e3),
+        ("143.7E3", 143.7e3),
+        ("1e3", 1000.0),
+        ("1e-3", 1e-3),
+        ("-.5", -0.5),
+        ("+7", 7.0),
+        ("7.", 7.0),
+        ("010", 10.0),
+        (".5e1", 5.0),
+    ],
+)
+def test_numbers_of_yaml_1_2(tmp_path: Path, text: str, value: float) -> None:
+    config = read(tmp_path, f"name: a\ncutoff: {text}\n")
+    assert isinstance(config.cutoff, float)
+    assert config.cutoff == value
+
+
+@pytest.mark.parametrize(
+    "text", ["'1e3'", "true", "abc", "1e", "1_000", "12:30", "2001-01-01", "[1]", "{a: 1}"]
+)
+def test_not_a_number(tmp_path: Path, text: str) -> None:
+    message = fault(tmp_path, f"name: a\n\ncutoff: {text}\n")
+    assert "line 3" in message
+    assert "cutoff" in message
+    assert "a number is expected" in message
+
+
+@pytest.mark.parametrize("text", [".nan", ".inf", "-.INF", "1e999", "1" + "0" * 400])
+def test_not_finite(tmp_path: Path, text: str) -> None:
+    assert "finite" in fault(tmp_path, f"name: a\ncutoff: {text}\n")
+
+
+def test_everything_of_a_dataclass(tmp_path: Path) -> None:
+    config = read(
+        tmp_path,
+        "name: 'yes'\nelastic:\n- joint: j1\n  drive: {stiffness: 1e3}\n"
+        "  bearing: {stiffness: 2, damping: 3}\n"
+        "gravity: [0, 0, -9.81]\nstations: {1: {stiffness: 4}}\nterms: [a, b]\ncount: 4\nsure: true\n"
+        "kind: mean\nmatrix: [[1, 2], [3, 4.5]]\nlines: [1, 3]\nfile: tx90l.urdf\n",
+    )
+    assert config.name == "yes"
+    assert config.elastic == (Joint("j1", Spring(1000.0), Spring(2.0, 3.0)),)
+    assert config.gravity == (0.0, 0.0, -9.81)
+    assert config.stations == {"1": Spring(4.0)}
+    assert config.terms == ["a", "b"]
+    assert (config.count, config.sure, config.kind, config.file) == (4, True, "mean", Path("tx90l.urdf"))
+    assert config.matrix is not None
+    assert config.matrix.dtype == float
+    assert config.matrix.tolist() == [[1.0, 2.0], [3.0, 4.5]]
+    assert config.lines is not None
+    assert config.lines.dtype == np.int64
+    assert read(tmp_path, "name: a\nterms: auto\n").terms == "auto"
+
+
+@pytest.mark.parametrize(
+    ("text", "line", "words"),
+    [
+        ("name: a\nelastik: []\n", 2, ["unknown key 'elastik'", "did you mean 'elastic'?"]),
+        (
+            "name: a\nelastic:\n- joint: j\n  drive:\n    stifness: 3\n",
+            5,
+            ["unknown key 'stifness' in elastic[0].drive", "'stiffness'?"],
+        ),
+        ("name: a\nqqqqq: 1\n", 2, ["unknown key 'qqqqq'", "known are name, elastic"]),
+        ("count: 1\n", 1, ["the key 'name' is missing", "add 'name: …'"]),
+        (
+            "name: a\nelastic:\n- joint: j\n  drive: {damping: 1}\n",
+            4,
+            ["'stiffness' in elastic[0].drive is missing"],
+        ),
+        (
+            "name: a\nelastic:\n- joint: j\n  drive:\n    stiffness: -4\n",
+            4,
+            ["elastic[0].drive", "stiffness is -4.0"],
+        ),
+        ("name: 3\n", 1, ["name", "a text is expected, not 3"]),
+        ("name:\n", 1, ["a text is expected, not nothing"]),
+        ("name: a\ncount: 1.5\n", 2, ["count", "a whole number"]),
+        ("name: a\ncount: true\n", 2, ["count", "a whole number"]),
+        ("name: a\nsure: yes\n", 2, ["sure", "true or false"]),
+        ("name: a\nkind: meen\n", 2, ["'held', 'mean'", "did you mean 'mean'?"]),
+        ("name: a\nterms: aut\n", 2, ["'auto' or 'none' or a list is expected"]),
+        ("name: a\nelastic: text\n", 2, ["elastic", "a list is expected"]),
+        ("name: a\nelastic: [3]\n", 2, ["elastic[0]", "a mapping"]),
+        ("name: a\nstations: [3]\n", 2, ["stations", "a mapping"]),
+        ("name: a\nstations:\n  a: {stiffness: 1}\n  b: {stiffness: x}\n", 4, ["stations.b.stiffness"]),
+        ("name: a\ngravity: [0, 0]\n", 2, ["gravity", "3 items"]),
+        ("name: a\ngravity:\n- 0\n- x\n- 0\n", 4, ["gravity[1]", "a number"]),
+        ("name: a\nmatrix:\n- [1, 2]\n- [3]\n", 4, ["matrix[1]", "another length"]),
+        ("name: a\nmatrix:\n- [1, 2]\n- [3, x]\n", 4, ["matrix[1][1]", "a number"]),
+        ("name: a\nmatrix: 3\n", 2, ["matrix", "a list"]),
+        ("name: a\nlines: [1.5]\n", 2, ["lines[0]", "a whole number"]),
+        ("name: a\ncount: 1\nname: b\n", 3, ["'name'", "on line 1"]),
+        ("name: a\n  count: 1\n", 2, ["not valid YAML"]),
+        ("name: [a\n", 2, ["not valid YAML"]),
+        ("name: !!python/name:os.system a\n", 1, ["tag"]),
+        ("name: a\nstations: &s {a: *s}\n", 2, ["alias"]),
+        ("? [a]\n: 3\n", 1, ["a key must be a plain name"]),
+        ("", 1, ["empty"]),
+        ("- 3\n", 1, ["a mapping"]),
+    ],
+)
+def test_sentences(tmp_path: Path, text: str, line: int, words: list[str]) -> None:
+    message = fault(tmp_path, text)
+    assert f"line {line}" in message
+    for word in words:
+        assert word in message
+
+
+def test_first_fault_first(tmp_path: Path) -> None:
+    assert "line 2" in fault(tmp_path, "name: a\ncount: x\nsure: 3\nwrong: 1\n")
+
+
+def test_unreadable_files(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"nowhere\.yaml cannot be read"):
+        read_yaml(tmp_path / "nowhere.yaml", Config)
+    (tmp_path / "latin.yaml").write_bytes("name: é".encode("latin-1"))
+    with pytest.raises(InputError, match=r"latin\.yaml is not UTF-8"):
+        read_yaml(tmp_path / "latin.yaml", Config)
+
+
+def test_lines_of_plain_data(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("a: 1\nb:\n  - c: 3\n  - d: 4\n")
+    file = read_yaml_file(tmp_path / "a.yaml")
+    assert file.data == {"a": 1, "b": [{"c": 3}, {"d": 4}]}
+    assert file.line("b", 1, "d") == 4
+    assert file.line("b", 0, "unknown") == 3
+    assert str(file.error(("b", 1), "wrong.")) == f"{tmp_path / 'a.yaml'} line 4: wrong."
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    config = Config("a: b", (Joint("1", Spring(0.1 + 0.2)),), count=3, terms=["x"], file=Path("a/b"))
+    write_yaml(tmp_path / "a.yaml", config)
+    assert read_yaml(tmp_path / "a.yaml", Config) == config
+    assert [entry.name for entry in tmp_path.iterdir()] == ["a.yaml"]
+
+
+@settings(max_examples=200, deadline=None)
+@given(
+    st.recursive(
+        st.none()
+        | st.booleans()
+        | st.integers()
+        | st.floats(allow_nan=False, allow_infinity=False)
+        | st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=8),
+        lambda inner: (
+            st.lists(inner, max_size=4)
+            | st.dictionaries(
+                st.text(st.characters(codec="utf-8", exclude_categories=("Cc", "Cs")), max_size=6),
+                inner,
+                max_size=4,
+            )
+        ),
+        max_leaves=12,
+    )
+)
+def test_plain_round_trip(tmp_path_factory: pytest.TempPathFactory, data: Any) -> None:
+    path = tmp_path_factory.getbasetemp() / "plain.yaml"
+    write_yaml(path, {"data": data})
+    again = read_yaml_file(path).data["data"]
+    assert again == data
+    assert yaml_text({"data": again}) == yaml_text({"data": data})
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, np.array([1.0, np.nan]), object()])
+def test_what_is_not_written(tmp_path: Path, value: Any) -> None:
+    with pytest.raises(FlexcalError, match="data"):
+        write_yaml(tmp_path / "a.yaml", {"data": value})
+    assert list(tmp_path.iterdir()) == []
