@@ -12,6 +12,8 @@ namespace nb = nanobind;
 
 namespace flexcal {
 
+constexpr double runaway = 1e3;  // rad/s or m/s: no robot moves like this
+
 double Spring::force(double twist, double rate) {
     double torque = 0.0;
     if (half_gap == 0.0 || std::abs(twist) > half_gap) {  // in the gap nothing touches
@@ -48,7 +50,6 @@ std::size_t closed_loop(const SteppedPlant& plant, std::vector<Spring>& springs,
         const std::size_t row = k * count;
         for (std::size_t m = 0; m < count; ++m) {
             const double true_position = plant.position[motors[m]];
-            if (!(std::abs(true_position) < 1e3)) return k;
             const double resolution = controller.encoder_resolution;
             const double encoder =
                 resolution > 0.0 ? resolution * std::nearbyint(true_position / resolution) : true_position;
@@ -72,10 +73,11 @@ std::size_t closed_loop(const SteppedPlant& plant, std::vector<Spring>& springs,
             // MuJoCo's Euler step is a kick and a drift, M (q+ - 2 q + q-)/h² = force, and its velocity lies half a
             // step back. What belongs on the right is the force averaged over (-h, h) with triangular weights: the held
             // torque's at its jump is the mean of both sides, a spring's is that at q + h² q''/12 (Numerov) with q''
-            // extrapolated; rates are extrapolated to now.
+            // extrapolated, a damper's the mean of the velocities before and after, that too extrapolated (Adams).
             for (std::size_t i = 0; i < dofs; ++i) {
                 const double velocity = plant.velocity[i];
-                rate[i] = 1.5 * velocity - 0.5 * before[i];
+                if (!(std::abs(velocity) < runaway)) return k;
+                rate[i] = (23.0 * velocity - 16.0 * before[i] + 5.0 * earlier[i]) / 12.0;
                 const double bend = step / 12.0 * (2.0 * velocity - 3.0 * before[i] + earlier[i]);
                 plant.force[i] = springs[i].force(plant.position[i] + bend, rate[i]);
                 earlier[i] = before[i];

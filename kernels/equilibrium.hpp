@@ -22,6 +22,7 @@ struct EquilibriumOutput {
     double* deflection;  // (samples, n, 3): tilt_x, tilt_y, twist
     double* compliance;  // (samples, d, d) or null: inverse of springs + gravity stiffness
     double* regressor;   // (samples, d, 4 n) or null: ∂(∂V/∂q) by mass and first moment of each link
+    double* coupling;    // (samples, d, 6 n) or null: ∂(∂V/∂q) by geometry
 };
 
 struct ElasticAxis {
@@ -138,6 +139,29 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
                     row[4 * i + 1] = -dot(lever, r.x);
                     row[4 * i + 2] = -dot(lever, r.y);
                     row[4 * i + 3] = -dot(lever, r.z);
+                }
+            }
+        }
+        if (out.coupling) {
+            for (int k = 0; k < d; ++k) {
+                double* row = out.coupling + (s * d + k) * geometry_size * n;
+                const int joint = axes[k].joint;
+                const Vector3 own = cross(axis[k], arm[k]);
+                for (int i = 0; i < n; ++i) {
+                    const bool outside = beyond[joint * n + i] && i != joint;
+                    const bool inside = beyond[i * n + joint];
+                    if (!outside && !inside) continue;
+                    const Frames& f = frames[i];
+                    const Vector3 turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
+                    const Vector3 moved = moment[i] - mass[i] * f.origin;
+                    for (int g = 0; g < 3; ++g)
+                        row[geometry_size * i + g] = inside ? -dot(gravity, cross(turns[g], own))
+                                                            : -dot(gravity, cross(axis[k], cross(turns[g], moved)));
+                    if (!beyond[joint * n + i]) continue;
+                    const double carried = mass[i] - masses.mass[i] - (i == masses.payload_joint ? masses.payload[s] : 0.0);
+                    const Vector3 lengths[3] = {f.link.x, f.link.y, f.link.z};
+                    for (int g = 0; g < 3; ++g)
+                        row[geometry_size * i + 3 + g] = -carried * dot(gravity, cross(axis[k], lengths[g]));
                 }
             }
         }

@@ -96,7 +96,8 @@ nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& 
         if (joint < 0 || joint >= static_cast<int>(n) || component < 0 || component > 2) throw nb::value_error("no such elastic axis");
         elastic.push_back({joint, component});
     }
-    Buffer deflection({samples, n, 3}), compliance({sensitivities ? samples : 0, d, d}), regressor({sensitivities ? samples : 0, d, 4 * n});
+    Buffer deflection({samples, n, 3}), compliance({sensitivities ? samples : 0, d, d}), regressor({sensitivities ? samples : 0, d, 4 * n}),
+        coupling({sensitivities ? samples : 0, d, 6 * n});
     const Masses masses{mass.data(), first_moment.data(), payload.data(), payload_joint, vector3(payload_point.data())};
     double residual = 0;
     {
@@ -104,9 +105,9 @@ nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& 
         residual = static_equilibrium(tree, elastic, stiffness.data(), geometry.data(), masses, vector3(gravity.data()), q.data(),
                                       static_cast<std::ptrdiff_t>(samples),
                                       {deflection.data.get(), sensitivities ? compliance.data.get() : nullptr,
-                                       sensitivities ? regressor.data.get() : nullptr});
+                                       sensitivities ? regressor.data.get() : nullptr, sensitivities ? coupling.data.get() : nullptr});
     }
-    return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), residual);
+    return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
 }
 
 }  // namespace
@@ -120,5 +121,6 @@ void bind_tree(nb::module_& m) {
              "Position (samples, 3), orientation (samples, 3, 3), Jacobians by geometry (samples, 6, 6 n + 6) and motion (samples, 6, 3 n).")
         .def("equilibrium", &equilibrium, nb::arg("axes"), nb::arg("stiffness"), nb::arg("geometry"), nb::arg("mass"), nb::arg("first_moment"),
              nb::arg("payload"), nb::arg("payload_joint"), nb::arg("payload_point"), nb::arg("gravity"), nb::arg("q"), nb::arg("sensitivities"),
-             "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), largest last Newton step (rad).");
+             "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), its coupling with geometry "
+             "(samples, d, 6 n), largest last Newton step (rad).");
 }

@@ -35,4 +35,29 @@ class Tree:
         gravity: np.ndarray,
         q: np.ndarray,
         sensitivities: bool,
-    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]: ...
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]: ...
+
+def closed_loop(
+    step: int,
+    model: int,
+    data: int,
+    position: np.ndarray,
+    velocity: np.ndarray,
+    force: np.ndarray,
+    springs: np.ndarray,
+    frictions: np.ndarray,
+    motors: np.ndarray,
+    twists: np.ndarray,
+    proportional: np.ndarray,
+    derivative: np.ndarray,
+    tick: float,
+    substeps: int,
+    encoder_resolution: float,
+    rate_filter: float,
+    feed_forward: np.ndarray,
+    reference: np.ndarray,
+    reference_rate: np.ndarray,
+    position_log: np.ndarray,
+    torque_log: np.ndarray,
+    arm_log: np.ndarray,
+) -> int: ...

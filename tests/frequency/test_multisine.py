@@ -109,7 +109,9 @@ def test_reference_derivatives_and_half_integer_frequency(make_plan):
     angle, velocity, acceleration = reference(plan, t)
     np.testing.assert_allclose(angle[0], 0.0)
     assert np.abs(angle).max() <= 0.03
-    np.testing.assert_allclose((reference(plan, t + h)[0] - reference(plan, t - h)[0]) / (2 * h), velocity, atol=1e-8)
+    np.testing.assert_allclose(
+        (reference(plan, t + h)[0] - reference(plan, t - h)[0]) / (2 * h), velocity, atol=1e-8
+    )
     np.testing.assert_allclose(
         (reference(plan, t + h)[1] - reference(plan, t - h)[1]) / (2 * h), acceleration, atol=1e-6
     )

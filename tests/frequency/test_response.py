@@ -53,7 +53,9 @@ def test_result_describes_the_experiment(make_plan, linear_cell, rng, tmp_path):
         found.log_covariance()[:, 3, 3].real, (found.std / np.abs(found.response))[:, 1, 1] ** 2
     )
     for matrices in (found.covariance, found.noise_covariance):
-        np.testing.assert_allclose(matrices, np.swapaxes(matrices, 1, 2).conj(), atol=1e-12 * np.abs(matrices).max())
+        np.testing.assert_allclose(
+            matrices, np.swapaxes(matrices, 1, 2).conj(), atol=1e-12 * np.abs(matrices).max()
+        )
         assert (np.linalg.eigvalsh(matrices) > 0.0).all()
 
     found.save(tmp_path / "response.npz")

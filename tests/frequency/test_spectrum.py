@@ -25,7 +25,9 @@ def test_spectrum_finds_phasors_on_whole_and_half_lines(rng):
 
 
 def test_noise_is_read_where_neither_response_nor_reference_is(make_plan):
-    half = make_plan(reference_amplitude=0.02, reference_frequency_hz=2.25)  # 4.5 f0: even harmonics at 9, 27, 45 …
+    half = make_plan(
+        reference_amplitude=0.02, reference_frequency_hz=2.25
+    )  # 4.5 f0: even harmonics at 9, 27, 45 …
     assert noise_in_half_sum(half)
     np.testing.assert_array_equal(np.setdiff1d(half.lines, noise_lines(half)), [9, 27, 45, 63])
 
@@ -54,7 +56,9 @@ def test_held_factor_is_the_fourier_integral_of_the_staircase(make_plan, rng):
         omega = 2 * np.pi * bin_ / (values.size * step)
         sampled = np.fft.fft(values)[bin_]
         factor = torque_hold(plan, np.array([omega]), step)[0]
-        np.testing.assert_allclose(sampled * factor, fourier_of_steps(values, omega, step), rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(
+            sampled * factor, fourier_of_steps(values, omega, step), rtol=1e-4, atol=1e-4
+        )
 
 
 def test_mean_factor_undoes_the_mean_over_the_step(make_plan):
@@ -62,8 +66,12 @@ def test_mean_factor_undoes_the_mean_over_the_step(make_plan):
     omega = 2 * np.pi * 35.0
     t = np.arange(40) * step
     means = (np.exp(1j * omega * (t + step)) - np.exp(1j * omega * t)) / (1j * omega * step)
-    np.testing.assert_allclose(means * torque_hold(plan, np.array([omega]), step), np.exp(1j * omega * t), rtol=1e-12)
-    np.testing.assert_array_equal(torque_hold(make_plan(torque="instantaneous"), np.array([omega]), step), 1.0)
+    np.testing.assert_allclose(
+        means * torque_hold(plan, np.array([omega]), step), np.exp(1j * omega * t), rtol=1e-12
+    )
+    np.testing.assert_array_equal(
+        torque_hold(make_plan(torque="instantaneous"), np.array([omega]), step), 1.0
+    )
 
 
 def test_a_log_slower_than_the_hold_is_refused(make_plan):

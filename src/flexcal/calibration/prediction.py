@@ -26,50 +26,50 @@ class Prediction:
     kinematics: PointKinematics
 
     def jacobian(self, names: Sequence[str]) -> np.ndarray:
-        """∂position/∂parameter (N, 3, len(names)) in natural units; raises `FlexcalError` for a name without effect on points.
+        """∂position/∂parameter (N, 3, len(names)) in natural units, the motion of the deflection included.
 
-        How the deflection itself moves with a geometric error, some 3e-3 of the column, is left out.
+        Raises `FlexcalError` for a name without effect on points.
         """
         result = np.zeros((len(self.position), 3, len(names)))
-        by_geometry = self._turned(self.kinematics.geometry_jacobian[:, :3])
         by_motion = self._turned(self.kinematics.motion_jacobian[:, :3].reshape(len(self.position), 3, -1))
         by_motion = by_motion.reshape(len(self.position), 3, self.model.n, 3)
-        elastic = None
+        by_load = -np.matmul(
+            by_motion[:, :, self.rest.axes[:, 0], self.rest.axes[:, 1]], self.rest.compliance
+        )
+        by_geometry = self._turned(self.kinematics.geometry_jacobian[:, :3])
+        by_geometry[:, :, : 6 * self.model.n] += np.matmul(by_load, self.rest.coupling)
+        owners = [*self.model.joint_names, "tool"]
+        first = next(iter(self.model.points))
         for k, name in enumerate(names):
             owner, _, key = name.rpartition(".")
             if owner.startswith("station.") and key in STATION:
                 result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
             elif owner.startswith("point."):
-                at = [*self.model.joint_names, "tool"].index("tool") * 6 + 3 + "xyz".index(key)
                 own = self.poses.target == owner.removeprefix("point.")
-                result[own, :, k] = by_geometry[own, :, at]
+                result[own, :, k] = by_geometry[own, :, 6 * self.model.n + 3 + "xyz".index(key)]
             elif key in GEOMETRY:
-                at = [*self.model.joint_names, "tool"].index(owner) * 6 + GEOMETRY.index(key)
-                result[:, :, k] = by_geometry[:, :, at]
+                result[:, :, k] = by_geometry[:, :, 6 * owners.index(owner) + GEOMETRY.index(key)]
                 if owner == "tool" and key.startswith("length"):
-                    result[self.poses.target != next(iter(self.model.points)), :, k] = 0.0
-            elif key == "backlash":
+                    result[self.poses.target != first, :, k] = 0.0
+            elif key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
                 i = self.model.joint_index(owner)
-                result[:, :, k] = -self.rest.flank[:, i, None] * by_motion[:, :, i, 2]
-            elif key == "gravity_compliance":
-                i = self.model.joint_index(owner)
-                result[:, :, k] = -self.rest.torque[:, i, None] * by_motion[:, :, i, 2]
-            elif key.startswith("transmission_"):
-                i = self.model.joint_index(owner)
-                order, wave = key.split("_")[1:]
-                phase = int(order) * self.poses.q[:, i]
-                result[:, :, k] = (np.sin(phase) if wave == "sin" else np.cos(phase))[:, None] * by_motion[
-                    :, :, i, 2
-                ]
+                result[:, :, k] = self._twist(i, key)[:, None] * by_geometry[:, :, 6 * i]
             else:
-                if elastic is None:
-                    moved = [by_motion[:, :, i, c] for i, c in self.rest.axes]
-                    elastic = -np.matmul(np.stack(moved, axis=2), self.rest.compliance)
-                result[:, :, k] = np.matmul(elastic, self.load(name)[:, :, None])[:, :, 0]
+                result[:, :, k] = np.matmul(by_load, self.load(name)[:, :, None])[:, :, 0]
         return result
 
+    def _twist(self, joint: int, key: str) -> np.ndarray:
+        """How far a joint turns (N,) with its backlash, gravity compliance or one wave of its transmission error."""
+        if key == "backlash":
+            return -self.rest.flank[:, joint]
+        if key == "gravity_compliance":
+            return -self.rest.torque[:, joint]
+        order, wave = key.split("_")[1:]
+        phase = int(order) * self.poses.q[:, joint]
+        return np.sin(phase) if wave == "sin" else np.cos(phase)
+
     def _turned(self, columns: np.ndarray) -> np.ndarray:
-        return np.matmul(self.base, columns) if (self.base != np.eye(3)).any() else columns
+        return np.matmul(self.base, columns)
 
     def _by_station(self, station: str, key: str) -> np.ndarray:
         own = (self.poses.station == station)[:, None]

@@ -20,7 +20,7 @@ def _not_negative(config: DataclassInstance) -> None:
 
 @dataclass(frozen=True)
 class LoopConfig:
-    """The joint controller: soft PD gains referred to the joint (N m/rad, N m s/rad), its rate, plant steps per control tick.
+    """The joint controller: soft PD gains referred to the joint (N m/rad, N m s/rad), its rate, least plant steps per control tick.
 
     `kp`, `kd`, `rate_hz` are what a plan gets that does not say otherwise; a `MultisinePlan` carries its own. `rate_filter_hz` is the
     corner of the low-pass on the differentiated encoder. The feed-forward is that of the controller's own model.

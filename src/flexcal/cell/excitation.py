@@ -12,7 +12,7 @@ import numpy as np
 
 from flexcal.cell.config import CellConfig
 from flexcal.cell.feed_forward import inverse_dynamics
-from flexcal.cell.plant import Plant, build_plant
+from flexcal.cell.plant import Plant, build_plant, unresolved
 from flexcal.cell.rest import rest
 from flexcal.cell.sensors import encoder_resolution, read_encoder, read_torque
 from flexcal.cell.stepping import LoopCommand, LoopGains, run_loop
@@ -20,6 +20,8 @@ from flexcal.data import MultisinePlan, Recording, RecordingLabel
 from flexcal.errors import FlexcalError
 from flexcal.frequency import multisine
 from flexcal.model import RobotModel
+
+REFINEMENTS = (1, 2, 4, 8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,13 +40,16 @@ def recordings(
     truth: RobotModel, believed: RobotModel, config: CellConfig, plan: MultisinePlan, seed: int, threads: int
 ) -> Iterator[Recording]:
     """The recordings of a plan in the order pose, realisation, experiment, sign; each a function of `seed` and its label alone."""
-    poses = np.atleast_2d(np.asarray(plan.poses, dtype=float))
+    if plan.torque == "instantaneous":
+        raise FlexcalError(
+            "the virtual cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan."
+        )
     signs = (1, -1) if plan.signs else (1,)
     schedule = list(product(range(plan.realisations), range(len(plan.joints)), signs))
     with ThreadPoolExecutor(threads) as pool:
         waiting: deque[Future[Recording]] = deque()
         try:
-            for number, pose in enumerate(poses):
+            for number, pose in enumerate(plan.poses):
                 excitation = prepare(truth, believed, config, plan, pose)
                 for realisation, experiment, sign in schedule:
                     label = RecordingLabel(number, realisation, experiment, sign)
@@ -63,11 +68,8 @@ def prepare(
     """Build the plant at a pose (n,) and the feed-forward of the controller, whose own model is `believed`."""
     import mujoco
 
-    free = sorted({int(i) for i in plan.joints})
-    if len(free) < len(plan.joints):
-        raise FlexcalError("the plan excites a joint twice; name every joint once under `joints`.")
-    step = 1 / (plan.rate_hz * config.controller.substeps)
-    plant = build_plant(truth, config, q=pose, free=free, payload=plan.payload, time_step=step)
+    free = sorted(plan.joints)
+    plant, substeps = _resolved_plant(truth, config, plan, pose)
     assumed = build_plant(believed, config, q=pose, free=free, payload=plan.payload)
     samples = plan.periods * multisine.samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
     reference = multisine.reference(plan, np.arange(samples) / plan.rate_hz)
@@ -78,9 +80,25 @@ def prepare(
     start = rest(plant, mujoco.MjData(plant.mjmodel), pose[free] + motion[0]).position
     start_rate = np.zeros_like(start)
     start_rate[plant.motors] = rate[0]
-    kp, kd = np.asarray(plan.kp, dtype=float)[free], np.asarray(plan.kd, dtype=float)[free]
-    gains = LoopGains(kp, kd, plan.rate_hz, config.controller.substeps, config.controller.rate_filter_hz)
+    kp, kd = plan.kp[free], plan.kd[free]
+    gains = LoopGains(kp, kd, plan.rate_hz, substeps, config.controller.rate_filter_hz)
     return Excitation(pose, plant, gains, start, start_rate, LoopCommand(torque, pose[free] + motion, rate))
+
+
+def _resolved_plant(
+    truth: RobotModel, config: CellConfig, plan: MultisinePlan, pose: np.ndarray
+) -> tuple[Plant, int]:
+    """The plant and its steps per tick: as many as configured, doubled until the true robot's fastest modes are resolved."""
+    free, phrase = sorted(plan.joints), ""
+    for refinement in REFINEMENTS:
+        substeps = config.controller.substeps * refinement
+        step = 1 / (plan.rate_hz * substeps)
+        plant = build_plant(truth, config, q=pose, free=free, payload=plan.payload, time_step=step)
+        missed = unresolved(plant)
+        if missed is None:
+            return plant, substeps
+        phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"
+    raise FlexcalError(f"{phrase}; raise the controller's substeps or rate, or friction's coulomb_velocity.")
 
 
 def run(

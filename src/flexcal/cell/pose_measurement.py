@@ -31,12 +31,7 @@ def true_poses(
     """The first declared point at every pose of a plan; `rng` draws the state of a hysteretic drive (none without it)."""
     import mujoco
 
-    q = np.atleast_2d(np.asarray(plan.q, dtype=float))
-    payload = (
-        None
-        if plan.payload is None
-        else np.broadcast_to(np.asarray(plan.payload, dtype=float), len(q)).copy()
-    )
+    q, payload = plan.q, plan.payload
     slips = np.zeros(q.shape) if rng is None else rng.uniform(-1, 1, q.shape)
     name = truth.point().name
     point, torque = np.empty((len(q), 3)), np.empty(q.shape)

@@ -52,10 +52,10 @@ def run_loop(
     start_rate: np.ndarray,
     encoder_resolution: float = 0.0,
 ) -> LoopLog:
-    """Run the loop from a position and rate (d,) of the plant's coordinates; raises `FlexcalError` where it diverges.
+    """Run the loop from a position (d,) and the rate (d,) half a plant step before; raises `FlexcalError` where it diverges.
 
-    A plant step is MuJoCo's semi-implicit Euler, M (q₊ − 2 q + q₋)/h² + D (3 q − 4 q₋ + q₋₋)/2h + K q = τ̄, with τ̄ the held torque
-    averaged over the step about q: all errors are of order h².
+    A plant step is MuJoCo's semi-implicit Euler, M (q₊ − 2 q + q₋)/h² = τ̄ − forces; how τ̄ and the forces are taken so that the
+    torque is held exactly, springs are right to fourth and dampers to third order is in `flexcal.cell.scheme`.
     """
     import mujoco
 

@@ -46,7 +46,7 @@ class VirtualCell:
         not excited are braked at the pose and read a torque of zero. Raises `FlexcalError` for a joint count that does not fit,
         a step that does not resolve the robot, or a loop that diverges.
         """
-        self._check_width(np.atleast_2d(plan.poses))
+        self._check_width(plan.poses)
         return recordings(self.truth, self.controller_model, self.config, plan, self.seed, self.threads)
 
     def measure(self, plan: PosePlan) -> PoseSet:
@@ -55,17 +55,17 @@ class VirtualCell:
         `q` are encoder readings, `torque` is gravity's plus Coulomb friction of random sign and size within its band plus noise,
         `sigma` the tracker's standard deviation an axis.
         """
-        self._check_width(np.atleast_2d(plan.q))
+        self._check_width(plan.q)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(plan.seed, _TRACKER)))
         return measured_poses(self.truth, self.config, plan, rng)
 
     def noise_free(self, plan: PosePlan) -> np.ndarray:
         """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
-        self._check_width(np.atleast_2d(plan.q))
+        self._check_width(plan.q)
         return in_instrument(self.truth, true_poses(self.truth, self.config, plan).point)
 
     def _check_width(self, q: np.ndarray) -> None:
-        if q.ndim != 2 or q.shape[1] != self.truth.n:
+        if q.shape[1] != self.truth.n:
             raise FlexcalError(
                 f"the plan's poses have {q.shape[-1]} joints but {self.truth.name} has {self.truth.n}."
             )

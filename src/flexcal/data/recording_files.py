@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.data.joint_limits import check_joint_units
 from flexcal.data.recording import Recording, RecordingLabel
-from flexcal.data.signals import Signal, assign, standard_columns
+from flexcal.data.signals import UNITS, Signal, assign, standard_columns
 from flexcal.data.table import Table, open_table, write_table
 from flexcal.data.time_base import TimeBase, fit_time_base, gaps, resample, uniform_blocks
 from flexcal.errors import InputError
@@ -74,12 +74,12 @@ def read_recording_blocks(
     """
     file = open_table(path)
     signals = assign(file, model, _REQUIRED, _OPTIONAL)
-    tables = file.blocks((), rows)
-    try:
-        for base, values in uniform_blocks(_stamped(model, signals, tables)):
-            yield _recording(signals, values, base, label, model.n)
-    except _NoRows:
-        raise file.error("the file has a header but no rows; add some.") from None
+    empty = True
+    for base, values in uniform_blocks(_stamped(model, signals, file.blocks((), rows))):
+        empty = False
+        yield _recording(signals, values, base, label, model.n)
+    if empty:
+        raise file.error("the file has a header but no rows; add some.")
 
 
 def write_recording(path: str | Path, recording: Recording) -> None:
@@ -94,10 +94,28 @@ def write_recording(path: str | Path, recording: Recording) -> None:
             continue
         values = values.reshape(len(recording), -1)
         if not np.isfinite(values).all():
-            raise InputError(f"{path}: {field} of the recording holds a value that is not finite, so it is not written.")
+            raise InputError(
+                f"{path}: {field} of the recording holds a value that is not finite, so it is not written."
+            )
         names = standard_columns(quantity, recording.q.shape[1])
         columns |= {name: values[:, i] for i, name in enumerate(names)}
     write_table(path, columns)
+
+
+def _stamped(
+    model: RobotModel, signals: dict[str, Signal], tables: Iterator[Table]
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Time stamps and all other quantities, block by block, checked as a whole log is."""
+    before: float | None = None
+    for table in tables:
+        t = signals["t"].values(table)[:, 0]
+        _check_increasing(table, signals["t"], t, before)
+        if before is None:
+            if len(t) < 2:
+                raise table.error(0, None, "this is the only sample; a log needs at least two.")
+            _check_rate(table, signals["t"], float(np.median(np.diff(t))))
+        before = float(t[-1])
+        yield t, _stacked(model, table, signals)
 
 
 def _stacked(model: RobotModel, table: Table, signals: dict[str, Signal]) -> np.ndarray:
@@ -145,14 +163,19 @@ def _check_increasing(table: Table, signal: Signal, t: np.ndarray, before: float
         earlier = before if row == 0 else t[row - 1]
         what = "stands still" if steps[row] == 0 else "runs backwards"
         raise table.error(
-            row, signal.columns[0], f"the time {what}: {t[row]:.9g} s follows {earlier:.9g} s; sort or repair the log."
+            row,
+            signal.columns[0],
+            f"the time {what}: {t[row]:.9g} s follows {earlier:.9g} s; sort or repair the log.",
         )
 
 
 def _check_rate(table: Table, signal: Signal, step: float) -> None:
-    if not 1 / 22_000 <= step <= 1.1:
-        unit = "ms" if step > 1.1 and 1 / 22_000 <= step * 1e-3 else "s"
-        guess = f" If it is in {unit}, declare 'unit: {unit}' for t under `signals:`." if unit != "s" else ""
-        raise table.error(
-            0, signal.columns[0], f"one sample every {step:.6g} s is outside 1 Hz to 20 kHz; check the unit of the time.{guess}"
-        )
+    if 1 / 22_000 <= step <= 1.1:
+        return
+    unit = next((unit for unit in ("ms", "us") if 1 / 22_000 <= step * UNITS["t"][unit] <= 1.1), None)
+    guess = (
+        f"if it is in {unit}, declare 'unit: {unit}' for t under `signals:`." if unit else "check its unit."
+    )
+    raise table.error(
+        0, signal.columns[0], f"one sample every {step:.6g} s is outside 1 Hz to 20 kHz; {guess}"
+    )

@@ -229,7 +229,7 @@ def _parse(file: TableFile, content: bytes, texts: Collection[str], line: int) -
     except pl.exceptions.PolarsError:
         return _read_cells(file, content, texts, line)
     arrays = _arrays(frame)
-    if any(frame[c].null_count() or c not in texts and not np.isfinite(v).all() for c, v in arrays.items()):
+    if any(frame[c].null_count() or (c not in texts and not np.isfinite(v).all()) for c, v in arrays.items()):
         return _read_cells(file, content, texts, line)
     return arrays
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -10,6 +12,8 @@ from flexcal.errors import FlexcalError
 
 GAP = 2.5
 """A step longer than this many time steps is a gap; a single lost sample is filled in."""
+ENOUGH = 200
+"""Samples that the time step of blocks is taken from, at least, where there are as many."""
 JITTER = 0.02
 """Time stamps within this part of a time step of the uniform base are taken as uniform."""
 
@@ -21,6 +25,7 @@ class TimeBase:
     jitter: standard deviation of the time stamps about the base, s; jitter_max: the largest deviation.
     lost: single samples that are missing and filled in by interpolation.
     resampled: whether values are interpolated onto the base, or taken as they are since the stamps fit within 2 %.
+    gap: seconds without samples before the start, where the log has a gap there.
     """
 
     start: float
@@ -30,6 +35,7 @@ class TimeBase:
     jitter_max: float
     lost: int
     resampled: bool
+    gap: float = 0.0
 
 
 def gaps(t: np.ndarray, time_step: float | None = None) -> np.ndarray:
@@ -41,9 +47,11 @@ def gaps(t: np.ndarray, time_step: float | None = None) -> np.ndarray:
 
 
 def fit_time_base(t: np.ndarray, time_step: float | None = None) -> TimeBase:
-    """The base under ascending time stamps (N,) without gaps, by least squares; a rate within 1e-6 of a whole number of Hz is that one.
+    """The base under ascending time stamps (N,) without gaps, by least squares.
 
-    With `time_step` given only the start is fitted. Raises `FlexcalError` for fewer than two time stamps.
+    A rate within 1e-6, or five standard errors, of a whole number of Hz is taken as that one, so that logs of one
+    controller have one time step. With `time_step` given only the start is fitted. Raises `FlexcalError` for fewer than
+    two time stamps.
     """
     if t.size < 2:
         raise FlexcalError("a recording needs at least two samples.")
@@ -55,7 +63,9 @@ def fit_time_base(t: np.ndarray, time_step: float | None = None) -> TimeBase:
         centred = number - number.mean()
         time_step = float(centred @ (t - t[0])) / float(centred @ centred)
         rate = 1.0 / time_step
-        if round(rate) and abs(rate - round(rate)) < 1e-6 * rate:
+        residual = t - t[0] - time_step * number
+        error = float(residual.std()) / float(np.sqrt(centred @ centred)) / time_step
+        if round(rate) and abs(rate - round(rate)) < max(1e-6, min(5 * error, 1e-3)) * rate:
             time_step = 1.0 / round(rate)
     start = float(t[0] + np.mean((t - t[0]) - time_step * number))
     if abs(start - t[0]) < 1e-6 * time_step:
@@ -93,3 +103,74 @@ def resample(t: np.ndarray, values: np.ndarray, base: TimeBase) -> np.ndarray:
                 weight *= (at - nodes[:, k]) / (nodes[:, j] - nodes[:, k])
         result += weight.reshape(-1, *([1] * (values.ndim - 1))) * values[first + j]
     return result
+
+
+def uniform_blocks(blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Iterator[tuple[TimeBase, np.ndarray]]:
+    """Blocks of ascending time stamps (N,) with values (N, m), put on one uniform base as they come.
+
+    The time step is that of the first block (of at least 200 samples). What follows without a gap continues the base of the block before; after
+    a gap the base starts anew, and `gap` says how long it was. A block may hold back its last samples for the next.
+    Raises `FlexcalError` where there are fewer than two samples in all.
+    """
+    step, gap, origin, done = 0.0, 0.0, None, 0
+    t, values = np.zeros(0), np.zeros(0)
+    for block_t, block_values, last in _with_last(blocks):
+        t = np.concatenate([t, block_t])
+        values = np.concatenate([values, block_values]) if values.size else block_values
+        if not step and t.size < ENOUGH and not last:
+            continue
+        if not step and t.size < 2:
+            raise FlexcalError("a recording needs at least two samples.")
+        edges = [0, *(gaps(t, step or None) + 1), t.size]
+        for first, end in pairwise(edges):
+            piece, whole = t[first:end], last or end < t.size
+            if not step:
+                step = fit_time_base(piece).time_step if piece.size > 1 else float(np.median(np.diff(t)))
+            start = _start(piece, step) if origin is None else origin + done * step
+            steps = (piece[-1] - start) / step
+            count = round(steps) + 1 if whole else int(steps) - 2
+            if count > 0:
+                base, part = _placed(piece, values[first:end], start, step, count)
+                yield replace(base, gap=gap), part
+                gap = 0.0
+                origin, done = (start, count) if origin is None else (origin, done + count)
+            if whole:
+                origin, done = None, 0
+                gap = float(t[end] - t[end - 1]) if end < t.size else 0.0
+        kept = edges[-2]
+        if origin is not None:
+            kept += int(np.searchsorted(t[kept:], origin + (done - 3) * step))
+        t, values = t[kept:], values[kept:]
+
+
+def _with_last(
+    blocks: Iterable[tuple[np.ndarray, np.ndarray]],
+) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+    iterator = iter(blocks)
+    held = next(iterator, None)
+    while held is not None:
+        following = next(iterator, None)
+        yield (*held, following is None)
+        held = following
+
+
+def _start(t: np.ndarray, step: float) -> float:
+    return fit_time_base(t, step).start if t.size > 1 else float(t[0])
+
+
+def _placed(
+    t: np.ndarray, values: np.ndarray, start: float, step: float, count: int
+) -> tuple[TimeBase, np.ndarray]:
+    """The values at start + k · step, k < count, with how the time stamps lie about that base."""
+    number = np.rint((t - start) / step)
+    deviation = t - (start + step * number)
+    rows = (number >= 0) & (number < count)
+    jitter = deviation[rows] if rows.any() else np.zeros(1)
+    largest = float(np.abs(jitter).max())
+    lost = count - np.unique(number[rows]).size
+    base = TimeBase(
+        start, step, count, float(jitter.std()), largest, lost, bool(lost) or largest > JITTER * step
+    )
+    if base.resampled and t.size > 1:
+        return base, resample(t, values, base)
+    return base, values[rows]

@@ -1,1 +1,61 @@
-"""TODO"""
+"""What to measure: the poses that tell most about a robot's geometric errors, under its limits. Needs no data."""
+
+from flexcal.design.candidates import random_candidates
+from flexcal.design.collision import CollisionChecker
+from flexcal.design.criteria import (
+    Criterion,
+    DOptimal,
+    Observability,
+    SpectralCriterion,
+    TraceOptimal,
+    observability,
+)
+from flexcal.design.exchange import Selection, exchange, greedy
+from flexcal.design.joint_space import joint_ranges
+from flexcal.design.pose_curve import PoseCurve, pose_curve
+from flexcal.design.pose_sensitivity import (
+    BaseSensitivity,
+    Tolerances,
+    TrackerNoise,
+    base_sensitivity,
+    geometry_jacobian,
+    pose_sensitivity,
+)
+from flexcal.design.poses import CriterionName, PoseDesign, choose_poses, design_poses, random_poses
+from flexcal.design.preload import gravity_torque_std, preloaded
+from flexcal.design.skeleton import joint_origins, link_frames
+from flexcal.design.visibility import Acceptance, visible
+
+__all__ = [
+    "Acceptance",
+    "BaseSensitivity",
+    "CollisionChecker",
+    "Criterion",
+    "CriterionName",
+    "DOptimal",
+    "Observability",
+    "PoseCurve",
+    "PoseDesign",
+    "Selection",
+    "SpectralCriterion",
+    "Tolerances",
+    "TraceOptimal",
+    "TrackerNoise",
+    "base_sensitivity",
+    "choose_poses",
+    "design_poses",
+    "exchange",
+    "geometry_jacobian",
+    "gravity_torque_std",
+    "greedy",
+    "joint_origins",
+    "joint_ranges",
+    "link_frames",
+    "observability",
+    "pose_curve",
+    "pose_sensitivity",
+    "preloaded",
+    "random_candidates",
+    "random_poses",
+    "visible",
+]

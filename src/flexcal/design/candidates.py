@@ -11,7 +11,7 @@ from flexcal.design.joint_space import LIMIT_MARGIN, joint_ranges
 from flexcal.design.preload import preloaded
 from flexcal.design.visibility import Acceptance, visible
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.model import point_kinematics
 
 _TRIES = 100
 
@@ -35,7 +35,9 @@ def random_candidates(
     """
     model = checker.model
     lower, upper = joint_ranges(model, margin=limit_margin)
-    checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {"floor": lambda q: _above_floor(checker, q, point)}
+    checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "floor": lambda q: _above_floor(checker, q, point)
+    }
     if preload:
         checks["flank preload"] = lambda q: preloaded(model, q, payload)
     checks["collision"] = lambda q: ~checker.collides(q)

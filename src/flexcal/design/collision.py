@@ -63,14 +63,22 @@ class CollisionChecker:
             if not always.any():
                 break
             always &= self._touching(values)
-        self.permanent = tuple(self._names(pair) for pair, touches in zip(pairs, always, strict=True) if touches)
+        self.permanent = tuple(
+            self._names(pair) for pair, touches in zip(pairs, always, strict=True) if touches
+        )
         self._set_pairs([pair for pair, touches in zip(pairs, always, strict=True) if not touches])
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """Every shape but the floor, the base's and the obstacles' included."""
         return tuple(
-            Shape(o.name, o.geometry, o.parentJoint - 1, np.array(o.placement.rotation), np.array(o.placement.translation))
+            Shape(
+                o.name,
+                o.geometry,
+                o.parentJoint - 1,
+                np.array(o.placement.rotation),
+                np.array(o.placement.translation),
+            )
             for o in self._geometry.geometryObjects
             if o.name != _FLOOR
         )
@@ -148,7 +156,9 @@ def _shapes(pin_model: Any, urdf: Path) -> Any:
     import pinocchio as pin
 
     try:
-        geometry = pin.buildGeomFromUrdf(pin_model, str(urdf), pin.GeometryType.COLLISION, [str(urdf.parent)])
+        geometry = pin.buildGeomFromUrdf(
+            pin_model, str(urdf), pin.GeometryType.COLLISION, package_dirs=[str(urdf.parent)]
+        )
     except (ValueError, RuntimeError) as problem:
         reason = str(problem).strip().splitlines()[0]
         raise InputError(
@@ -175,4 +185,3 @@ def _add_obstacle(geometry: Any, path: Path) -> None:
     for item in _shapes(model, path).geometryObjects:
         name = f"{path.stem}.{item.name}"
         geometry.addGeometryObject(pin.GeometryObject(name, 0, 0, item.placement, item.geometry))
-

@@ -25,7 +25,9 @@ def joint_ranges(model: RobotModel, *, margin: float = LIMIT_MARGIN) -> tuple[np
             )
         if not np.isfinite(upper[i] - lower[i]):
             if joint.kind == "prismatic":
-                raise FlexcalError(f"the prismatic {joint.name} has no limits in {model.urdf.name}; give it some.")
+                raise FlexcalError(
+                    f"the prismatic {joint.name} has no limits in {model.urdf.name}; give it some."
+                )
             lower[i], upper[i] = -np.pi, np.pi
         else:
             free = margin * (upper[i] - lower[i])

@@ -56,4 +56,6 @@ def _turns(joint: Joint, angle: np.ndarray) -> np.ndarray:
     """Rotations (samples, 3, 3) about the joint's axis: Rodrigues."""
     x, y, z = joint.axis
     skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return np.eye(3) + np.sin(angle)[:, None, None] * skew + (1 - np.cos(angle))[:, None, None] * (skew @ skew)
+    return (
+        np.eye(3) + np.sin(angle)[:, None, None] * skew + (1 - np.cos(angle))[:, None, None] * (skew @ skew)
+    )

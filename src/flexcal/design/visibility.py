@@ -26,7 +26,9 @@ class Acceptance:
     def __post_init__(self) -> None:
         axis = np.asarray(self.axis, dtype=float)
         if axis.shape != (3,) or not np.linalg.norm(axis) > 0 or not 0 < self.half_angle <= np.pi:
-            raise FlexcalError("an acceptance needs an axis of three numbers, not all zero, and a half angle between 0 and π.")
+            raise FlexcalError(
+                "an acceptance needs an axis of three numbers, not all zero, and a half angle between 0 and π."
+            )
         object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
 
 
@@ -37,7 +39,9 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
     """
     declared = model.config.stations
     if station is not None and station not in model.stations:
-        raise FlexcalError(f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}.")
+        raise FlexcalError(
+            f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}."
+        )
     entry = declared.get(model.stations[0] if station is None else station)
     return None if entry is None else np.array(entry.xyz)
 
@@ -66,7 +70,9 @@ def visible(
     seen = np.ones(len(q), dtype=bool)
     if acceptance is not None:
         towards = origin - target.position
-        cosine = np.einsum("sij,j,si->s", target.orientation, acceptance.axis, towards) / np.linalg.norm(towards, axis=1)
+        cosine = np.einsum("sij,j,si->s", target.orientation, acceptance.axis, towards) / np.linalg.norm(
+            towards, axis=1
+        )
         seen &= cosine >= np.cos(acceptance.half_angle)
     if model.config.stations[model.stations[0] if station is None else station].line_of_sight:
         left = np.flatnonzero(seen)
@@ -75,7 +81,12 @@ def visible(
 
 
 def blocked(
-    checker: CollisionChecker, q: np.ndarray, origin: np.ndarray, target: np.ndarray, radius: float, clearance: float
+    checker: CollisionChecker,
+    q: np.ndarray,
+    origin: np.ndarray,
+    target: np.ndarray,
+    radius: float,
+    clearance: float,
 ) -> np.ndarray:
     """Whether a beam from `origin` (3,) to `clearance` before `target` (samples, 3) meets a shape of the robot or an obstacle.
 

@@ -18,6 +18,10 @@ SPRING_LOG_STD = 1.5
 FRICTION_LOG_STD = 1.5
 """Prior of the motor's viscous coefficient in one pose, 1σ of the logarithm about what the lowest lines show."""
 
+SOFTENING = 0.005
+SOFTENING_LOG_STD = 1.5
+"""Prior of the softening of a drive with backlash in one pose: the share of time its gap is open, median and 1σ of the logarithm."""
+
 
 def spring_names(model: RobotModel) -> tuple[str, ...]:
     """Names of the stiffness, then of the damping of every spring, joint by joint: drive, bearing_x, bearing_y."""
@@ -40,6 +44,11 @@ def pose_labels(responses: Sequence[FrequencyResponse]) -> tuple[str, ...]:
 def viscous_name(joint: str, pose: str) -> str:
     """Name of a motor's viscous coefficient in one pose."""
     return f"{joint}.viscous.{pose}"
+
+
+def softening_name(joint: str, pose: str) -> str:
+    """Name of the softening of a drive by its backlash in one pose."""
+    return f"{joint}.drive.softening.{pose}"
 
 
 def stage_one_parameters(
@@ -69,9 +78,23 @@ def stage_one_parameters(
     for response, label in zip(responses, pose_labels(responses), strict=True):
         loss = apparent_viscous(response)
         items += [
-            Parameter(viscous_name(joint.name, label), "N m s/rad", value, prior_std=FRICTION_LOG_STD, scale="log")
+            Parameter(
+                viscous_name(joint.name, label), "N m s/rad", value, prior_std=FRICTION_LOG_STD, scale="log"
+            )
             for joint, value in zip(model.elastic, loss, strict=True)
         ]
+    for joint in model.elastic:
+        if joint.index in model.backlash_joints:
+            items += [
+                Parameter(
+                    softening_name(joint.name, label),
+                    "1",
+                    SOFTENING,
+                    prior_std=SOFTENING_LOG_STD,
+                    scale="log",
+                )
+                for label in pose_labels(responses)
+            ]
     return Parameters(items)
 
 
@@ -88,7 +111,9 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
     """Raises `FlexcalError` where there is nothing to fit or a response is of other joints than the elastic ones."""
     elastic = tuple(joint.name for joint in model.elastic)
     if not elastic:
-        raise FlexcalError(f"{model.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses.")
+        raise FlexcalError(
+            f"{model.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses."
+        )
     if not responses:
         raise FlexcalError("There is no frequency response to identify from; give at least one pose.")
     for response in responses:
@@ -103,7 +128,9 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
                 f"but the robot has {model.n}."
             )
         if not (np.isfinite(response.response).all() and np.isfinite(response.covariance).all()):
-            raise FlexcalError(f"The frequency response of pose {response.pose} holds a NaN or an infinite number.")
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} holds a NaN or an infinite number."
+            )
 
 
 def _inertial(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list[Parameter]:

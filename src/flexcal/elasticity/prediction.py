@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.elasticity.parameters import pose_labels, viscous_name
+from flexcal.elasticity.parameters import pose_labels, softening_name, viscous_name
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -27,14 +27,16 @@ class Prediction:
 class PoseModel:
     """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
 
-    `robot_names` maps names of the robot's own values to parameter numbers, `delays` (E,) are the numbers of the axes' delays,
-    -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared one.
+    `robot_names` maps names of the robot's own values to parameter numbers, `softening` the names of drive stiffnesses to the
+    numbers of their softening in this pose; `delays` (E,) are the numbers of the axes' delays, -1 where there is none; `payload`
+    is the nominal payload mass in kg, None for the declared one.
     """
 
     frequencies_hz: np.ndarray
     q: np.ndarray
     payload: float | None
     robot_names: dict[str, int]
+    softening: dict[str, int]
     delays: np.ndarray
 
 
@@ -51,7 +53,9 @@ class ResponseModel:
     poses: tuple[PoseModel, ...]
 
     @classmethod
-    def of(cls, robot: RobotModel, responses: Sequence[FrequencyResponse], parameters: Parameters) -> ResponseModel:
+    def of(
+        cls, robot: RobotModel, responses: Sequence[FrequencyResponse], parameters: Parameters
+    ) -> ResponseModel:
         """For the poses and lines of measured responses."""
         labels = pose_labels(responses)
         own = {
@@ -61,16 +65,23 @@ class ResponseModel:
         }
         poses = []
         for response, label in zip(responses, labels, strict=True):
+            soft = {
+                f"{joint.name}.drive.stiffness": parameters.index(softening_name(joint.name, label))
+                for joint in robot.elastic
+                if softening_name(joint.name, label) in parameters
+            }
             names: dict[str, int] = {}
             for number, name in enumerate(parameters.names):
                 target, only = own.get(name, (name, label))
-                if only == label and not name.endswith(".delay"):
+                if only == label and target in robot.values and not name.endswith(".delay"):
                     names[target] = number
             if response.payload == 0:
                 names.pop("payload.mass", None)
             delays = [f"{joint.name}.delay" for joint in robot.elastic]
             at = np.array([parameters.index(d) if d in parameters else -1 for d in delays])
-            poses.append(PoseModel(response.frequencies_hz, response.q_mean, response.payload, names, at))
+            poses.append(
+                PoseModel(response.frequencies_hz, response.q_mean, response.payload, names, soft, at)
+            )
         return cls(robot, parameters, tuple(poses))
 
     def predict(self, x: np.ndarray) -> list[Prediction]:
@@ -83,14 +94,18 @@ class ResponseModel:
         values, slopes = self.parameters.natural(x), self.parameters.natural_slope(x)
         return [self._pose(pose, values, slopes, derivatives=False).response for pose in self.poses]
 
-    def _pose(self, pose: PoseModel, values: np.ndarray, slopes: np.ndarray, *, derivatives: bool) -> Prediction:
-        robot = self.robot.with_values({name: float(values[number]) for name, number in pose.robot_names.items()})
-        share = 1.0
+    def _pose(
+        self, pose: PoseModel, values: np.ndarray, slopes: np.ndarray, *, derivatives: bool
+    ) -> Prediction:
+        known = {name: float(values[number]) for name, number in pose.robot_names.items()}
+        for name, number in pose.softening.items():
+            known[name] = known.get(name, self.robot.value(name)) * float(np.exp(-values[number]))
+        robot = self.robot.with_values(known)
         payload = pose.payload
-        if payload is not None and payload > 0 and "payload.mass" in pose.robot_names:
-            share = payload / float(self.robot.payload_mass[0])
-            payload = share * float(robot.payload_mass[0])
-        names = tuple(pose.robot_names) if derivatives else ()
+        if payload is not None and payload > 0 and "payload.mass" in known:
+            payload *= known["payload.mass"] / float(self.robot.payload_mass[0])
+            known["payload.mass"] = payload
+        names = tuple(dict.fromkeys((*pose.robot_names, *pose.softening))) if derivatives else ()
         system = linearise(robot, pose.q, payload, derivatives=names)
         s = 2j * np.pi * pose.frequencies_hz
         response, change = batch_transfer(system, names, s)
@@ -99,17 +114,23 @@ class ResponseModel:
         response = response * phase
         if not derivatives:
             return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
-        columns = np.array([pose.robot_names[name] for name in names], dtype=int)
-        scale = slopes[columns] * np.where([name == "payload.mass" for name in names], share, 1.0)
         change *= phase[..., None]
-        change *= scale
-        delayed = np.flatnonzero(pose.delays >= 0)
-        by_delay = np.zeros((*response.shape, len(delayed)), dtype=complex)
-        for k, axis in enumerate(delayed):
-            by_delay[:, :, axis, k] = -s[:, None] * response[:, :, axis] * slopes[pose.delays[axis]]
-        return Prediction(
-            response, np.concatenate([change, by_delay], axis=-1), np.append(columns, pose.delays[delayed])
-        )
+        numbers, blocks = [], []
+        for k, name in enumerate(names):
+            slope = known[name]  # ∂/∂ log of it
+            if name in pose.robot_names:
+                numbers.append(pose.robot_names[name])
+                log = self.parameters[numbers[-1]].scale == "log"
+                blocks.append(change[..., k] * (slope if log else 1.0))
+            if name in pose.softening:
+                numbers.append(pose.softening[name])
+                blocks.append(change[..., k] * (-slope * slopes[numbers[-1]]))
+        for axis in np.flatnonzero(pose.delays >= 0):
+            numbers.append(pose.delays[axis])
+            late = np.zeros_like(response)
+            late[:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[numbers[-1]]
+            blocks.append(late)
+        return Prediction(response, np.stack(blocks, axis=-1), np.array(numbers))
 
 
 def batch_transfer(

@@ -69,7 +69,9 @@ class StageOneResidual:
     poses: tuple[PoseResidual, ...]
 
     @classmethod
-    def of(cls, model: ResponseModel, responses: Sequence[FrequencyResponse], weighting: Weighting) -> StageOneResidual:
+    def of(
+        cls, model: ResponseModel, responses: Sequence[FrequencyResponse], weighting: Weighting
+    ) -> StageOneResidual:
         """For measured responses, in the order of the model's poses."""
         return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
 

@@ -1,7 +1,9 @@
 """Averages over realisations: from the spectra of R realisations to one frequency response matrix per line.
 
-Wernholt and Moberg 2008 compare them in closed loop, where the torque too is noisy: the logarithmic and the joint
-input-output average are the best, H1 the worst (its bias is the ratio of torque noise to torque power).
+Wernholt and Moberg 2008 compare them in closed loop, where the torque too is noisy: the logarithmic average is the best,
+H1 the worst (its bias is the ratio of torque noise to torque power). That holds here while the scatter of a single
+realisation stays below |G|. Where it does not, as at an antiresonance buried in encoder noise, the logarithmic and the
+harmonic average are the ones to avoid, and arithmetic, joint input-output and errors-in-variables agree.
 """
 
 from typing import Literal, get_args

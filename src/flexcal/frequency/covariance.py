@@ -81,7 +81,8 @@ def total_covariance(
 
     input_scatter = np.linalg.solve(response, balanced)
     input_noise = np.linalg.solve(response, np.swapaxes(np.linalg.solve(response, noise).conj(), -1, -2))
-    disturbance = (np.abs(input_scatter) ** 2).mean((0, -1)) - _diagonal(input_noise)
+    significant = 1.0 + 2.0 / np.sqrt((members - 1) * count)  # what the noise may well explain shapes nothing
+    disturbance = (np.abs(input_scatter) ** 2).mean((0, -1)) - significant * _diagonal(input_noise)
     disturbance = np.maximum(pool(disturbance, at, at, count), 0.0)
 
     floor = (_SMALLEST_RELATIVE_STD * np.linalg.norm(response, axis=(1, 2))) ** 2

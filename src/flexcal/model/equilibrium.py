@@ -18,7 +18,8 @@ class Equilibrium:
     `deflection` (samples, n, 3) rad: tilt about x, about y, and twist of the arm beyond the motor, backlash included; `torque`
     (samples, n) N m of the motor on the arm that holds gravity; `flank` (samples, n) its sign where the joint has backlash, else 0;
     `axes` (d, 2) joint and component of each elastic coordinate; `compliance` (samples, d, d) rad/(N m), the inverse of spring plus
-    gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each coordinate by mass and first moment of each link.
+    gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each coordinate by mass and first moment of each link;
+    `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every joint. The last three are empty without sensitivities.
     """
 
     deflection: np.ndarray
@@ -27,6 +28,7 @@ class Equilibrium:
     axes: np.ndarray
     compliance: np.ndarray
     regressor: np.ndarray
+    coupling: np.ndarray
 
 
 def elastic_axes(model: RobotModel) -> list[tuple[int, int]]:
@@ -54,10 +56,11 @@ def _solve(
     payload: np.ndarray,
     *,
     sensitivities: bool,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Elastic deflection (samples, n, 3), compliance, regressor and coupling of `Equilibrium`."""
     held = model.payload
     try:
-        deflection, compliance, regressor, step = model.tree.equilibrium(
+        deflection, compliance, regressor, coupling, step = model.tree.equilibrium(
             axes,
             np.ascontiguousarray(stiffness, dtype=float),
             np.ascontiguousarray(model.geometry),
@@ -78,7 +81,7 @@ def _solve(
         raise FlexcalError(
             f"{model.name}: no rest position was found (last step {step:.1e} rad); check the stiffnesses."
         )
-    return deflection, compliance, regressor
+    return deflection, compliance, regressor, coupling
 
 
 def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
@@ -90,7 +93,7 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
     axes = [(i, 2) for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
     payload = payload_batch(model, payload, len(q))
     rigid = 1e15
-    deflection, _, _ = _solve(model, axes, np.full(len(axes), rigid), q, payload, sensitivities=False)
+    deflection = _solve(model, axes, np.full(len(axes), rigid), q, payload, sensitivities=False)[0]
     return -rigid * deflection[:, :, 2]
 
 
@@ -116,26 +119,15 @@ def static_equilibrium(
     axes = elastic_axes(model) if elastic else []
     slack = -np.sign(load) * model.backlash if flank is None else -flank * model.backlash
     slack = slack - load * model.gravity_compliance + transmission_error(model, q)
-    if axes:
-        stiffness = np.array([model.stiffness[a] for a in axes])
-        deflection, compliance, regressor = _solve(
-            model, axes, stiffness, q + slack, masses, sensitivities=sensitivities
-        )
-        for i, component in axes:
-            if component == 2:
-                load[:, i] = -model.stiffness[i, 2] * deflection[:, i, 2]
-    else:
-        deflection, compliance, regressor = (
-            np.zeros((*q.shape, 3)),
-            np.zeros((len(q), 0, 0)),
-            np.zeros((len(q), 0, 4 * model.n)),
-        )
+    stiffness = np.array([model.stiffness[a] for a in axes])
+    deflection, *derivatives = _solve(model, axes, stiffness, q + slack, masses, sensitivities=sensitivities)
+    for i, component in axes:
+        if component == 2:
+            load[:, i] = -model.stiffness[i, 2] * deflection[:, i, 2]
     deflection[:, :, 2] += slack
     sign = np.sign(load) if flank is None else flank
     has_backlash = np.isin(np.arange(model.n), model.backlash_joints)
-    return Equilibrium(
-        deflection, load, sign * has_backlash, np.array(axes).reshape(-1, 2), compliance, regressor
-    )
+    return Equilibrium(deflection, load, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives)
 
 
 def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:

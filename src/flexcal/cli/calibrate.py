@@ -1,0 +1,84 @@
+"""`flexcal calibrate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, PoseFiles, Robot
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """Fit the geometry of a robot to measured positions: joint offsets, misalignments, lengths, tool, backlash.
+
+    Starts from robot.yaml and what 'identify stiffness' found, and writes estimates.yaml beside robot.yaml. Two fits are reported: the rigid
+    one, and the one with elasticity and the terms that cross-validation supports; the second is stored.
+    """
+
+    robot: Robot
+    poses: PoseFiles
+    terms: Annotated[tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml says)")] = ()
+    """auto, or names out of: kinematic, backlash, gravity_compliance, transmission."""
+    loss: Literal["squares", "huber", "cauchy"] = "squares"
+    """cauchy finds outliers and lists them."""
+    secant_scale: Annotated[float, arg(metavar="STD")] = 0.0
+    """Relative 1σ by which a drive may be stiffer or softer under gravity than in its frequency response; 0.1 is usual."""
+    elasticity: Literal["reestimated", "marginalised"] = "reestimated"
+    """How the uncertainty of stiffness and inertia enters; both give the same geometry to first order."""
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for estimates.yaml and results.json, in place of estimates.yaml beside robot.yaml."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Calibrate, and print what was found."""
+        from flexcal.cli.options import require_files
+        from flexcal.cli.tables import dropped_table, error_table, weak_table
+        from flexcal.workflow.calibrate_robot import calibrate_robot
+
+        require_files(self.poses, "POSES")
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = calibrate_robot(
+                self.robot,
+                self.poses,
+                terms=self.terms or None,
+                loss=self.loss,
+                secant_scale=self.secant_scale,
+                elasticity=self.elasticity,
+                out=self.out,
+                progress=progress,
+            )
+        document = found.document()
+        if document["identifiability"]["dropped"]:
+            console.show(dropped_table(document["identifiability"]))
+        console.show(weak_table(document["identifiability"]["weak_directions"]))
+        errors = document["calibration"]
+        terms = " + ".join(found.selected.terms)
+        labels = {"nominal": "before (registered only)", "rigid": "rigid", "selected": f"selected: {terms}"}
+        console.show(error_table("distance to the measured points", {labels[key]: errors[key] for key in labels}))
+        self._remark(console, document)
+        where = "" if self.out is None else f" --estimates {self.out}"
+        console.say(f"wrote {found.estimates}")
+        console.finish(document, f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw")
+
+    def _remark(self, console: Console, document: dict) -> None:
+        fit, outliers = document["fit"], document["outliers"]
+        if not fit["sigma_given"]:
+            console.say(f"no sigma in the files: the scatter of {fit['sigma_mm']:.3f} mm a coordinate stands for it")
+        elif fit["reduced_chi2"] is not None and fit["reduced_chi2"] > 2:
+            console.say(
+                f"chi-square is {fit['reduced_chi2']:.1f} times what sigma explains: the model lacks something or sigma is too small, "
+                "and the intervals are too narrow"
+            )
+        if fit["status"] != "converged":
+            console.say(f"the fit has not converged ({fit['status']}); do not trust it")
+        if fit["ambiguous_poses"]:
+            console.say(f"{fit['ambiguous_poses']} poses do not surely rest on one flank of a backlash")
+        if outliers:
+            listed = ", ".join(f"pose {o['pose']} ({o['error_mm']:.2f} mm)" for o in outliers)
+            console.say(f"{len(outliers)} outliers: {listed}")

@@ -1,0 +1,76 @@
+"""`flexcal VERB …`: finds the verb, runs it, and turns known errors into one line and an exit status."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+
+from flexcal.cli.verbs import Verb, find_verb, overview, unknown_verb
+from flexcal.errors import FlexcalError
+
+FAILED = 2
+INTERRUPTED = 130
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command line (default: that of the process) and return its exit status.
+
+    0: done; 2: an input or argument that cannot be used, one sentence on standard error; 130: interrupted.
+    """
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    try:
+        status = _run(given)
+        sys.stdout.flush()
+        return status
+    except FlexcalError as problem:
+        print(f"flexcal: {' '.join(str(problem).split())}", file=sys.stderr)
+        return FAILED
+    except KeyboardInterrupt:
+        print("flexcal: interrupted; nothing is left half-written.", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # whoever read standard output has gone; nothing more can be said there, not even at exit
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+
+
+def _run(arguments: list[str]) -> int:
+    if not arguments or arguments[0] in ("-h", "--help", "help"):
+        print(overview())
+        return 0
+    if arguments[0] in ("-V", "--version"):
+        from flexcal import __version__
+
+        print(f"flexcal {__version__}")
+        return 0
+    verb = find_verb(arguments)
+    if verb is None:
+        if len(arguments) > 1 and arguments[1] in ("-h", "--help") and f"\n  {arguments[0]} " in overview():
+            print(overview(arguments[0]))
+            return 0
+        raise FlexcalError(unknown_verb(arguments))
+    return _carry_out(verb, arguments[len(verb.words) :])
+
+
+def _carry_out(verb: Verb, arguments: list[str]) -> int:
+    import tyro
+
+    command = getattr(import_module(f"flexcal.cli.{verb.module}"), verb.command)
+    try:
+        parsed = tyro.cli(
+            command,
+            prog=f"flexcal {verb.name}",
+            args=arguments,
+            config=(tyro.conf.FlagCreatePairsOff,),
+            description=f"{(command.__doc__ or '').strip()}\n\nExample: {verb.example}",
+        )
+    except SystemExit as stop:  # --help, or arguments that do not parse: tyro has said so
+        return stop.code if isinstance(stop.code, int) else FAILED
+    parsed.run()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

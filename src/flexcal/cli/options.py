@@ -1,0 +1,24 @@
+"""Arguments that several verbs share."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.errors import InputError
+
+Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
+PoseFiles = Annotated[
+    Positional[tuple[Path, ...]],
+    arg(metavar="POSES...", help="files of measured poses (CSV or Parquet), one or several", help_behavior_hint=""),
+]
+Folder = Annotated[Path, arg(metavar="DIR")]
+Json = Annotated[bool, arg(help="print one JSON document on standard output, and nothing else there", help_behavior_hint="")]
+
+
+def require_files(files: tuple[Path, ...], name: str) -> None:
+    """Raise `InputError` where no file was given."""
+    if not files:
+        raise InputError(f"no {name} given; name at least one file after robot.yaml.")

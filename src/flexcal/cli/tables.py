@@ -1,0 +1,66 @@
+"""Tables of results for people."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from rich.table import Table
+
+
+def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
+    """One row a set of errors: poses, mean, 90th percentile and maximum, mm; `rows` are blocks of results.json by label."""
+    table = Table(title=title, title_justify="left")
+    table.add_column("")
+    for heading in ("poses", "mean mm", "p90 mm", "max mm"):
+        table.add_column(heading, justify="right")
+    for label, block in rows.items():
+        numbers = [_millimetres(block[key]) for key in ("mean_mm", "p90_mm", "max_mm")]
+        table.add_row(label, str(block["poses"]), *numbers)
+    return table
+
+
+def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
+    """The parameters that could not be told apart, and the `most` largest of what absorbed each."""
+    title = f"identifiability: {found['rank']} of {found['parameters']} parameters"
+    if found["gap_decades"] is not None and found["dropped"]:
+        title += f" ({found['gap_decades']:.0f} decades between the last kept and the first dropped)"
+    table = Table(title=title, title_justify="left")
+    table.add_column("cannot be told apart")
+    table.add_column("absorbed by")
+    for entry in found["dropped"]:
+        kept = entry["absorbed_by"]
+        parts = [f"{k['coefficient']:+.3g} {k['name']}" for k in kept[:most]]
+        more = f" and {len(kept) - most} more" if len(kept) > most else ""
+        table.add_row(entry["name"], ", ".join(parts) + more if kept else "nothing: the measurements do not depend on it")
+    return table
+
+
+def weak_table(directions: Sequence[Mapping[str, Any]]) -> Table:
+    """The combinations of parameters that are seen least."""
+    table = Table(title="weakest combinations that are still seen", title_justify="left")
+    table.add_column("relative size", justify="right")
+    table.add_column("combination, in units of 0.3 mm and 0.5 mrad")
+    for entry in directions:
+        table.add_row(f"{entry['relative_singular_value']:.1e}", entry["direction"])
+    return table
+
+
+def quantity_table(title: str, quantities: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]) -> Table:
+    """One row a parameter: estimate, standard deviation, 95 % interval."""
+    table = Table(title=title, title_justify="left")
+    table.add_column("parameter")
+    for heading in ("estimate", "std", "95 % from", "to"):
+        table.add_column(heading, justify="right")
+    table.add_column("unit")
+    for name, values in quantities.items():
+        if values["identifiable"]:
+            numbers = [f"{values[key]:.5g}" for key in ("std", "low", "high")]
+        else:
+            numbers = ["not", "identifiable", ""]
+        table.add_row(name, f"{values['estimate']:.5g}", *numbers, units.get(name, ""))
+    return table
+
+
+def _millimetres(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3f}"

@@ -1,0 +1,185 @@
+"""The verbs in the order of the procedure, and the help page that lists them."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Verb:
+    """A verb: its words, the module and class that carry it out, what it does in a line, and a command line to copy."""
+
+    words: tuple[str, ...]
+    module: str
+    command: str
+    summary: str
+    example: str
+
+    @property
+    def name(self) -> str:
+        return " ".join(self.words)
+
+
+@dataclass(frozen=True)
+class Step:
+    """A step of the procedure and its verbs."""
+
+    title: str
+    verbs: tuple[Verb, ...]
+
+
+STEPS = (
+    Step(
+        "See the whole procedure on a virtual robot",
+        (
+            Verb(
+                ("demo",),
+                "demo",
+                "Demo",
+                "everything below on a virtual robot with a hidden truth, with a report",
+                "flexcal demo --seed 1 --out demo",
+            ),
+        ),
+    ),
+    Step(
+        "1. Stiffness and damping, from frequency responses (not for a robot calibrated as rigid)",
+        (
+            Verb(
+                ("design", "frequency"),
+                "design_frequency",
+                "DesignFrequency",
+                "plan the frequency experiments",
+                "flexcal design frequency robot.yaml --out frequency.yaml",
+            ),
+            Verb(
+                ("measure",),
+                "measure",
+                "Measure",
+                "carry out a plan, in the virtual cell or from a folder of recorded files",
+                "flexcal measure frequency.yaml --cell virtual --out frequency",
+            ),
+            Verb(
+                ("identify", "response"),
+                "identify_response",
+                "IdentifyResponse",
+                "recordings to frequency responses with their covariance",
+                "flexcal identify response robot.yaml frequency --out responses",
+            ),
+            Verb(
+                ("identify", "stiffness"),
+                "identify_stiffness",
+                "IdentifyStiffness",
+                "frequency responses to stiffness and damping",
+                "flexcal identify stiffness robot.yaml responses",
+            ),
+        ),
+    ),
+    Step(
+        "2. Geometry, from measured tool positions",
+        (
+            Verb(
+                ("design", "poses"),
+                "design_poses",
+                "DesignPoses",
+                "choose the poses to measure",
+                "flexcal design poses robot.yaml --count 40 --out poses.yaml",
+            ),
+            Verb(
+                ("calibrate",),
+                "calibrate",
+                "Calibrate",
+                "measured positions to geometry; says what could not be told apart",
+                "flexcal calibrate robot.yaml poses.csv",
+            ),
+        ),
+    ),
+    Step(
+        "3. Check it, and use it",
+        (
+            Verb(
+                ("verify",),
+                "verify",
+                "Verify",
+                "accuracy on poses that the calibration never saw",
+                "flexcal verify robot.yaml others.csv",
+            ),
+            Verb(
+                ("export", "urdf"),
+                "export_urdf",
+                "ExportUrdf",
+                "the calibrated robot as URDF, and what URDF cannot hold, in millimetres",
+                "flexcal export urdf robot.yaml --out calibrated.urdf",
+            ),
+        ),
+    ),
+)
+
+VERBS = tuple(verb for step in STEPS for verb in step.verbs)
+
+
+def overview(group: str | None = None) -> str:
+    """The help page: the procedure, step by step, with an example for every verb; only the verbs of `group` where given."""
+    lines = [
+        f"usage: flexcal {group or 'VERB'} {'WHAT ' if group else ''}[OPTIONS] ...",
+        "",
+        "flexcal makes a robot accurate: from its URDF and measurements made on it to its stiffness and true geometry.",
+    ]
+    for step in STEPS:
+        verbs = [verb for verb in step.verbs if group in (None, verb.words[0])]
+        if not verbs:
+            continue
+        lines += ["", step.title]
+        for verb in verbs:
+            lines += [f"  {verb.name:<20}{verb.summary}", f"  {'':<20}  $ {verb.example}"]
+    lines += [
+        "",
+        "Every verb has --help, and --json: one JSON document on standard output, messages on standard error.",
+        "Exit status: 0 done, 2 an input cannot be used (one sentence says why), 130 interrupted.",
+    ]
+    return "\n".join(lines)
+
+
+def find_verb(arguments: Sequence[str]) -> Verb | None:
+    """The verb that the arguments begin with."""
+    matches = [verb for verb in VERBS if tuple(arguments[: len(verb.words)]) == verb.words]
+    return matches[0] if matches else None
+
+
+def unknown_verb(arguments: Sequence[str]) -> str:
+    """One sentence on a verb that does not exist, with the nearest that do."""
+    word = arguments[0]
+    groups = {verb.words[0] for verb in VERBS if len(verb.words) > 1}
+    if word in groups:
+        known = [verb.words[1] for verb in VERBS if verb.words[0] == word]
+        if len(arguments) < 2 or arguments[1].startswith("-"):
+            return f"'{word}' needs to know what: {_either(f'flexcal {word} {what}' for what in known)}."
+        near = difflib.get_close_matches(arguments[1], known, n=1, cutoff=0.4) or known
+        return f"there is no '{word} {arguments[1]}'; did you mean {_either(f'flexcal {word} {what}' for what in near)}?"
+    names = {verb.name: verb.name for verb in VERBS} | {verb.words[-1]: verb.name for verb in VERBS}
+    names |= {group: group for group in groups} | _ALSO_CALLED
+    tried = " ".join(arguments[:2])
+    near = difflib.get_close_matches(tried, names, n=1, cutoff=0.7) or difflib.get_close_matches(
+        word, names, n=1, cutoff=0.6
+    )
+    hint = f"did you mean 'flexcal {names[near[0]]}'?" if near else "'flexcal --help' lists the verbs."
+    return f"there is no verb '{word}'; {hint}"
+
+
+_ALSO_CALLED = {
+    "fit": "calibrate",
+    "calibration": "calibrate",
+    "validate": "verify",
+    "check": "verify",
+    "test": "verify",
+    "record": "measure",
+    "simulate": "measure",
+    "plan": "design frequency",
+    "frf": "identify response",
+    "damping": "identify stiffness",
+}
+
+
+def _either(names: Iterable[str]) -> str:
+    return " or ".join(f"'{name}'" for name in names)

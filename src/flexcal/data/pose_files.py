@@ -1,0 +1,173 @@
+"""Measured poses on disk: CSV or Parquet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.data.joint_limits import check_joint_units
+from flexcal.data.pose_checks import check_metres, check_motion, check_same_pose
+from flexcal.data.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
+from flexcal.data.signals import Signal, assign, standard_columns
+from flexcal.data.table import Table, TableFile, open_table, write_table
+from flexcal.errors import InputError
+from flexcal.structuring import suggestion
+
+if TYPE_CHECKING:
+    from flexcal.model import RobotModel
+
+_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "tau", "payload", "temperature")
+_TEXTS = ("target", "station")
+
+
+def read_poses(
+    paths: str | Path | Sequence[str | Path], model: RobotModel, *, require_motion: bool = True
+) -> PoseSet:
+    """Read measured poses from one file or several, joined in order (see `concatenate`).
+
+    Without a `target` column the point is the first under `points:`; without `station` the instrument stands at the
+    robot's first station; without `sigma` it is 0.1 mm and `sigma_given` is False.
+
+    Raises `InputError` with file, line and column for a missing, unknown or partial column, a value that is missing or
+    no number, angles that cannot be in rad, points that cannot be in m, an unknown target, a negative sigma or
+    payload, a quaternion that is not of unit norm, and joint positions that differ within one pose. With
+    `require_motion` also where all poses are equal or a joint never moves, from which nothing can be calibrated.
+    """
+    listed = [paths] if isinstance(paths, str | Path) else list(paths)
+    poses = concatenate([_read(Path(path), model) for path in listed])
+    if require_motion:
+        check_motion(poses, model, " and ".join(str(path) for path in listed))
+    return poses
+
+
+def write_poses(path: str | Path, poses: PoseSet) -> None:
+    """Write poses as CSV or Parquet by the file's suffix, atomically, under the standard columns in SI units."""
+    columns: dict[str, np.ndarray] = {"pose": poses.pose}
+    vectors = [("q", poses.q)]
+    vectors.append(("xyz", poses.position) if poses.length is None else ("length", poses.length[:, None]))
+    if poses.quaternion_wxyz is not None:
+        vectors.append(("quaternion", poses.quaternion_wxyz))
+    if poses.sigma_given:
+        vectors.append(("sigma_xyz", poses.sigma) if poses.length is None else ("sigma", poses.sigma[:, :1]))
+    if poses.torque is not None:
+        vectors.append(("tau", poses.torque))
+    for quantity, values in vectors:
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values).all(axis=1)))
+            raise InputError(
+                f"{path}: {quantity} of row {row + 1} is not finite, so the poses are not written."
+            )
+        names = standard_columns(quantity, poses.q.shape[1])
+        columns |= {name: values[:, i] for i, name in enumerate(names)}
+    for name in ("payload", "target", "station", "temperature"):
+        values = getattr(poses, name)
+        if values is not None:
+            columns[name] = values
+    write_table(path, columns)
+
+
+def _read(path: Path, model: RobotModel) -> PoseSet:
+    file = open_table(path)
+    texts = tuple(name for name in _TEXTS if name in file.columns)
+    place = _place(file, model)
+    signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)
+    if "sigma" in signals and "sigma_xyz" in signals:
+        raise file.error("sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
+    table = file.read(texts)
+    found = {name: signal.values(table) for name, signal in signals.items()}
+    check_joint_units(model, table, signals["q"], found["q"])
+    rows = len(table)
+    position = found["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
+    sigma = found.get("sigma_xyz", found.get("sigma"))
+    for name in ("sigma", "sigma_xyz", "payload", "length"):
+        if name in found:
+            _check_positive(table, signals[name], found[name], zero=name == "payload")
+    target = _targets(table, model) if "target" in texts else np.full(rows, _first_point(file, model))
+    station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
+    if "payload" in found and model.payload is None:
+        raise file.error(
+            "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass."
+        )
+    poses = PoseSet(
+        q=found["q"],
+        position=position,
+        sigma=np.broadcast_to(DEFAULT_SIGMA if sigma is None else sigma, (rows, 3)).copy(),
+        torque=found.get("tau"),
+        payload=found["payload"][:, 0] if "payload" in found else None,
+        target=target,
+        station=station,
+        temperature=found["temperature"][:, 0] if "temperature" in found else None,
+        pose=_whole_numbers(table, signals["pose"], found["pose"][:, 0]),
+        quaternion_wxyz=_unit(table, signals["quaternion"], found["quaternion"])
+        if "quaternion" in found
+        else None,
+        length=found["length"][:, 0] if "length" in found else None,
+        sigma_given=sigma is not None,
+    )
+    check_same_pose(poses, table)
+    check_metres(poses, model, table, signals[place])
+    return poses
+
+
+def _place(file: TableFile, model: RobotModel) -> str:
+    """Whether the file measures points or the length of a wire."""
+    mapped = model.config.signals
+    length = mapped["length"].columns if "length" in mapped else ()
+    wire = "length" in file.columns or (length and set(length) <= set(file.columns))
+    if wire and {"x", "y", "z"} & set(file.columns):
+        raise file.error("there are both 'length' and x, y, z; keep the columns of one instrument.")
+    return "length" if wire else "xyz"
+
+
+def _first_point(file: TableFile, model: RobotModel) -> str:
+    if not model.points:
+        raise file.error("robot.yaml declares no point; add the measured one under `points:`.")
+    return next(iter(model.points))
+
+
+def _first_station(model: RobotModel) -> str:
+    return next(iter(getattr(model, "stations", ())), "tracker")
+
+
+def _targets(table: Table, model: RobotModel) -> np.ndarray:
+    target = table.columns["target"]
+    for row, name in enumerate(target.tolist()):
+        if name not in model.points:
+            known = list(model.points)
+            hint = suggestion(name, known) or f"; known are {', '.join(known) or 'none'}."
+            raise table.error(row, "target", f"there is no point '{name}' under `points:`{hint}")
+    return target
+
+
+def _check_positive(table: Table, signal: Signal, values: np.ndarray, *, zero: bool) -> None:
+    wrong = values < 0 if zero else values <= 0
+    if wrong.any():
+        row, column = (int(i) for i in np.argwhere(wrong)[0])
+        word = "not negative" if zero else "positive"
+        raise table.error(
+            row,
+            signal.column_of(column),
+            f"{signal.quantity} is {values[row, column]:g}, but must be {word}; correct it.",
+        )
+
+
+def _whole_numbers(table: Table, signal: Signal, values: np.ndarray) -> np.ndarray:
+    if (values != np.rint(values)).any():
+        row = int(np.argmax(values != np.rint(values)))
+        raise table.error(row, signal.columns[0], f"{values[row]:g} is no whole number; number the poses.")
+    return values.astype(np.int64)
+
+
+def _unit(table: Table, signal: Signal, quaternion: np.ndarray) -> np.ndarray:
+    norm = np.linalg.norm(quaternion, axis=1)
+    if (np.abs(norm - 1) > 1e-3).any():
+        row = int(np.argmax(np.abs(norm - 1) > 1e-3))
+        raise table.error(
+            row,
+            signal.columns[0],
+            f"the quaternion has the norm {norm[row]:.4g}, not 1; check the columns qw, qx, qy, qz.",
+        )
+    return quaternion / norm[:, None]

@@ -1,0 +1,144 @@
+"""What a measured pose tells about the geometric errors: whitened Jacobian rows, then the same of base parameters only."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.design.visibility import station_position
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Identifiability, Parameter, Parameters, Sensitivity, analyse
+from flexcal.model import RobotModel, gravity_torque, point_kinematics
+from flexcal.model.names import GEOMETRY, unit_of
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True)
+class TrackerNoise:
+    """Standard deviation an axis of a laser tracker: `constant` (m) + `proportional` (m per m of distance)."""
+
+    constant: float = 15e-6
+    proportional: float = 6e-6
+
+    def std(self, distance: np.ndarray) -> np.ndarray:
+        """Standard deviation (...), m, at `distance` (...), m."""
+        return self.constant + self.proportional * distance
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How large geometric errors are, 1σ: lengths (m), angles and half gaps (rad), and the place of the instrument (m)."""
+
+    length: float = 0.3 * MILLIMETRE
+    angle: float = 0.5e-3
+    station: float = 10 * MILLIMETRE
+
+
+def geometry_jacobian(
+    model: RobotModel,
+    q: np.ndarray,
+    *,
+    payload: float | None = None,
+    point: str | None = None,
+    station: str | None = None,
+) -> tuple[tuple[str, ...], np.ndarray]:
+    """Names (p,) and derivatives (samples, 3, p), in m/rad and m/m, of the measured target position by every geometric error.
+
+    The station's three offsets, six errors per joint, six of the tool, and the half gap of each joint with backlash: minus the sign of
+    its gravity torque times its twist column. The arm is undeflected; the axes are the base's (the rank does not depend on the
+    station's orientation). Raises `FlexcalError` for an unknown point or station.
+    """
+    station = model.stations[0] if station is None else station
+    motion = point_kinematics(model, q, point=point)
+    target = model.point(point)
+    names = [f"station.{station}.{axis}" for axis in "xyz"]
+    names += [f"{joint.name}.{key}" for joint in model.joints for key in GEOMETRY]
+    names += [f"tool.{key}" for key in GEOMETRY]
+    if target.name != next(iter(model.points)):
+        names[-3:] = [f"point.{target.name}.{axis}" for axis in "xyz"]
+    loose = list(model.backlash_joints)
+    names += [f"{model.joints[i].name}.backlash" for i in loose]
+    flank = np.sign(gravity_torque(model, q, payload)[:, loose])
+    slack = -flank[:, None, :] * motion.motion_jacobian[:, :3, loose, 2]
+    place = np.broadcast_to(np.eye(3), (len(flank), 3, 3))
+    return tuple(names), np.concatenate([place, motion.geometry_jacobian[:, :3], slack], axis=2)
+
+
+def pose_sensitivity(
+    model: RobotModel,
+    q: np.ndarray,
+    *,
+    payload: float | None = None,
+    point: str | None = None,
+    station: str | None = None,
+    noise: TrackerNoise | None = None,
+    tolerances: Tolerances | None = None,
+) -> Sensitivity:
+    """Rows of every pose of `q` (samples, n) in the geometric errors (SI), whitened by the tracker's noise; the tolerances are the prior.
+
+    Where robot.yaml does not say where the instrument stands, its distance is taken as twice the robot's reach.
+    """
+    noise, tolerances = noise or TrackerNoise(), tolerances or Tolerances()
+    names, jacobian = geometry_jacobian(model, q, payload=payload, point=point, station=station)
+    origin = station_position(model, station)
+    position = point_kinematics(model, q, point=point, jacobians=False).position
+    apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
+    parameters = Parameters(
+        Parameter(name, unit_of(name), 0.0, prior_std=_tolerance(name, tolerances)) for name in names
+    )
+    whitened = jacobian / noise.std(apart)[:, None, None]
+    return Sensitivity(whitened, parameters, parameters.prior_information())
+
+
+def _tolerance(name: str, tolerances: Tolerances) -> float:
+    if name.startswith("station."):
+        return tolerances.station
+    return tolerances.angle if unit_of(name) == "rad" else tolerances.length
+
+
+@dataclass(frozen=True, eq=False)
+class BaseSensitivity:
+    """A sensitivity in the parameter combinations that the candidates can tell apart, each in units of the kept parameter's tolerance.
+
+    `sensitivity` has jacobian (candidates, 3, rank) and the prior of the combinations; `identifiability` says what was kept and what
+    absorbed the rest; `scale` (rank,) are the tolerances (rad, m). Only in such units do σ_min and O1-O5 mean anything.
+    """
+
+    sensitivity: Sensitivity
+    identifiability: Identifiability
+    scale: np.ndarray
+
+    def columns(self, jacobian: np.ndarray) -> np.ndarray:
+        """Columns (..., rank) of a `jacobian` (..., p) by all parameters that belong to these combinations, scaled alike."""
+        return jacobian[..., list(self.identifiability.kept)] * self.scale
+
+
+def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
+    """Reduce a sensitivity to the combinations that its candidates determine: pivoted QR (Gautier 1991) on prior-scaled columns.
+
+    The regrouped prior covariance is G S² Gᵀ, with G the regrouping and S the tolerances. Raises `FlexcalError` where a parameter has no
+    finite prior to be its scale.
+    """
+    tolerance = full.parameters.prior_std()
+    if not np.all(np.isfinite(tolerance)):
+        name = full.parameters.names[int(np.argmin(np.isfinite(tolerance)))]
+        raise FlexcalError(
+            f"{name} has no tolerance; give every parameter a finite prior_std, it sets the scale."
+        )
+    # σ_min has a meaning in declared units only: the station is scaled like any other length
+    scale = np.where([p.unit == "rad" for p in full.parameters], tolerance, _length_scale(full.parameters))
+    rows = full.jacobian.reshape(-1, len(full.parameters))
+    found = analyse(rows, full.parameters.names, scale=scale)
+    kept = list(found.kept)
+    spread = found.regrouping * tolerance / scale[kept][:, None]
+    factor = np.linalg.qr(spread.T, mode="r")
+    root = np.linalg.solve(factor, np.eye(len(kept)))
+    parameters = Parameters(Parameter(name, "1", 0.0) for name in found.kept_names)
+    sensitivity = Sensitivity(full.jacobian[:, :, kept] * scale[kept], parameters, root @ root.T)
+    return BaseSensitivity(sensitivity, found, scale[kept])
+
+
+def _length_scale(parameters: Parameters) -> float:
+    lengths = [p.prior_std for p in parameters if p.unit != "rad" and not p.name.startswith("station.")]
+    return min(lengths, default=Tolerances().length)

@@ -1,0 +1,345 @@
+"""`estimates.yaml` with `estimates.npz` beside it: what identifications found, one block each.
+
+The YAML has for every block the named values with unit, standard deviation and 95 % interval, what could not be told
+apart, the fit and the provenance; the npz has `<block>.names` (p,) and `<block>.covariance` (p, p), in estimation
+coordinates (of a value whose scale is `log`: its natural logarithm). A file of values only (a truth) has the same form.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import math
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from flexcal.atomic import write_bytes
+from flexcal.errors import FlexcalError, InputError
+from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
+from flexcal.yaml_reader import YamlFile, read_yaml_file
+from flexcal.yaml_writer import to_plain, write_yaml
+
+Block = Literal["dynamics", "stiffness", "calibration"]
+BLOCKS: tuple[Block, ...] = get_args(Block)
+"""The blocks of the file, in the order in which a robot takes them in."""
+
+
+@dataclass(frozen=True)
+class StoredValue:
+    """One value as it stands in the file; std, low and high are absent where it is not identifiable."""
+
+    estimate: float
+    unit: str = ""
+    std: float | None = None
+    low: float | None = None
+    high: float | None = None
+    identifiable: bool | None = None
+    scale: Literal["linear", "log"] = "linear"
+    lower: float | None = None
+    upper: float | None = None
+    prior_std: float | None = None
+    prior_mean: float | None = None
+
+
+@dataclass(frozen=True)
+class StoredDropped:
+    """A parameter that was held, with the kept ones that absorb it and their coefficients."""
+
+    name: str
+    absorbed_by: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StoredFit:
+    """How the fit ended."""
+
+    rank: int
+    cost: float
+    chi2: float
+    degrees_of_freedom: int
+    status: str
+    message: str
+    iterations: int
+    outliers: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class StoredBlock:
+    """What one identification left in the file."""
+
+    values: dict[str, StoredValue]
+    dropped: tuple[StoredDropped, ...] = ()
+    fit: StoredFit | None = None
+    covariance_sha256: str | None = None
+    provenance: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StoredEstimates:
+    """The whole file."""
+
+    dynamics: StoredBlock | None = None
+    stiffness: StoredBlock | None = None
+    calibration: StoredBlock | None = None
+
+    def block(self, name: Block) -> StoredBlock | None:
+        """One block, where it is there."""
+        return {"dynamics": self.dynamics, "stiffness": self.stiffness, "calibration": self.calibration}[name]
+
+
+def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Block, Estimate]:
+    """The estimates of a file by block, in the order of `BLOCKS`, leaving out `without` (the block to be made anew).
+
+    Raises `InputError` with file and line where the YAML does not fit, and where the npz is missing, has other names
+    or shapes, or belongs to another YAML.
+    """
+    file = read_yaml_file(path)
+    stored = file.structure(StoredEstimates)
+    found: dict[Block, Estimate] = {}
+    for name in BLOCKS:
+        block = stored.block(name)
+        if block is not None and name != without:
+            found[name] = _estimate(file, name, block, _covariance(file, name, block))
+    return found
+
+
+def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
+    """Put an estimate into its block of the file, made where it is not there; the other blocks stay as they are.
+
+    Each of the two files appears whole or not at all; the YAML is last and carries the SHA-256 of its covariance.
+    Raises `InputError` where another block of the file cannot be read, and `FlexcalError` where the estimate holds a
+    number that is not finite.
+    """
+    path = Path(path)
+    if block not in BLOCKS:
+        raise FlexcalError(
+            f"there is no block '{block}' in an estimates file; there are {', '.join(BLOCKS)}."
+        )
+    if path.suffix not in (".yaml", ".yml"):
+        raise InputError(
+            f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name."
+        )
+    stored, arrays = StoredEstimates(), {}
+    if path.exists():
+        file = read_yaml_file(path)
+        stored = file.structure(StoredEstimates)
+        for name in BLOCKS:
+            other = stored.block(name)
+            if other is not None and name != block and other.covariance_sha256 is not None:
+                arrays[name] = (tuple(other.values), _covariance(file, name, other))
+    covariance = np.asarray(estimate.covariance, dtype=np.float64)
+    size = len(estimate.parameters)
+    if covariance.shape != (size, size) or not np.isfinite(covariance).all():
+        raise FlexcalError(
+            f"the covariance of the {block} must be finite and ({size}, {size}), not {covariance.shape}."
+        )
+    arrays[block] = (estimate.parameters.names, covariance)
+    stored = replace(stored, **{block: _stored(estimate, covariance)})
+    to_plain(stored)  # refuses what cannot be written, before anything is
+    content = io.BytesIO()
+    named: dict[str, np.ndarray] = {}
+    for name in BLOCKS:
+        if name in arrays:
+            named[f"{name}.names"] = np.array(arrays[name][0], dtype=str)
+            named[f"{name}.covariance"] = arrays[name][1]
+    np.savez(content, allow_pickle=False, **named)
+    write_bytes(path.with_suffix(".npz"), content.getvalue())
+    write_yaml(path, stored)
+
+
+def read_values(path: str | Path) -> dict[str, float]:
+    """Only the values of an estimates or truth file, by name; later blocks of `BLOCKS` win. Needs no npz."""
+    stored = read_yaml_file(path).structure(StoredEstimates)
+    blocks = [stored.block(name) for name in BLOCKS]
+    return {
+        name: value.estimate for block in blocks if block is not None for name, value in block.values.items()
+    }
+
+
+def write_values(
+    path: str | Path, values: Mapping[Block, Mapping[str, float]], units: Mapping[str, str] | None = None
+) -> None:
+    """Write a file of values only, such as a truth, atomically."""
+    units = units or {}
+    blocks = {
+        block: StoredBlock(
+            {name: StoredValue(float(value), units.get(name, "")) for name, value in named.items()}
+        )
+        for block, named in values.items()
+    }
+    unknown = [block for block in blocks if block not in BLOCKS]
+    if unknown:
+        raise FlexcalError(
+            f"there is no block '{unknown[0]}' in a file of values; there are {', '.join(BLOCKS)}."
+        )
+    write_yaml(path, StoredEstimates(**blocks))
+
+
+def provenance(
+    inputs: Iterable[str | Path] = (),
+    options: Mapping[str, object] | None = None,
+    estimates: str | Path | None = None,
+    blocks: Iterable[Block] = (),
+) -> dict[str, str]:
+    """Where an estimate comes from: program version, SHA-256 of input files and folders, options, and the SHA-256 of the
+    `blocks` of the file `estimates` that were used."""
+    from importlib.metadata import version
+
+    found = {"program": f"flexcal {version('flexcal')}"}
+    found |= {f"input.{Path(path).as_posix()}": sha256_of(path) for path in inputs}
+    found |= {f"option.{name}": str(value) for name, value in (options or {}).items()}
+    if estimates is not None:
+        found |= {f"block.{block}": block_sha256(estimates, block) for block in blocks}
+    return found
+
+
+def sha256_of(path: str | Path) -> str:
+    """SHA-256 of a file; of a folder: of the names and SHA-256 of all files in it, in the order of their names."""
+    path = Path(path)
+    digest = hashlib.sha256()
+    try:
+        if path.is_dir():
+            for file in sorted(file for file in path.rglob("*") if file.is_file()):
+                digest.update(f"{file.relative_to(path).as_posix()}\0{sha256_of(file)}\n".encode())
+        else:
+            with path.open("rb") as stream:
+                while content := stream.read(2**20):
+                    digest.update(content)
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+    return digest.hexdigest()
+
+
+def block_sha256(path: str | Path, block: Block) -> str:
+    """SHA-256 of a block's values and covariance, whatever its provenance; raises `InputError` where it is not there."""
+    file = read_yaml_file(path)
+    stored = file.structure(StoredEstimates).block(block)
+    if stored is None:
+        raise file.error((), f"there is no block '{block}'; run the identification that makes it.")
+    content = to_plain({"values": stored.values, "dropped": stored.dropped})
+    content["covariance"] = stored.covariance_sha256
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:
+    """The covariance (p, p) of a block, checked against the YAML."""
+    path = file.path.with_suffix(".npz")
+    again = "run the identification again"
+    if block.covariance_sha256 is None or block.fit is None:
+        raise file.error((name,), f"the block '{name}' has values only, so it is no estimate; {again}.")
+    try:
+        with np.load(path, allow_pickle=False) as arrays:
+            names, covariance = arrays[f"{name}.names"], arrays[f"{name}.covariance"]
+    except KeyError:
+        raise InputError(
+            f"{path}: the names and covariance of the block '{name}' are missing; {again}."
+        ) from None
+    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as problem:
+        what = f"{type(problem).__name__}" if not isinstance(problem, FileNotFoundError) else "no such file"
+        raise InputError(
+            f"{path} cannot be read ({what}); it belongs to {file.path.name}: {again}."
+        ) from problem
+    size = len(block.values)
+    if covariance.shape != (size, size):
+        raise InputError(
+            f"{path}: {name}.covariance has the shape {covariance.shape}, not ({size}, {size}); {again}."
+        )
+    if names.tolist() != list(block.values):
+        raise InputError(f"{path}: {name}.names are not the values of {file.path.name}; {again}.")
+    if covariance.dtype != np.float64 or _sha256(covariance) != block.covariance_sha256:
+        raise InputError(f"{path}: {name}.covariance does not belong to {file.path.name}; {again}.")
+    return covariance
+
+
+def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.ndarray) -> Estimate:
+    fit = block.fit
+    assert fit is not None
+    try:
+        parameters = Parameters(_parameter(key, value) for key, value in block.values.items())
+    except FlexcalError as problem:
+        raise file.error((name, "values"), str(problem)) from problem
+    for i, entry in enumerate(block.dropped):
+        for unknown in {entry.name, *entry.absorbed_by} - set(parameters.names):
+            raise file.error(
+                (name, "dropped", i), f"'{unknown}' is not among the values of this block; correct the name."
+            )
+    return Estimate(
+        parameters=parameters,
+        covariance=covariance,
+        rank=fit.rank,
+        dropped=tuple(Dropped(entry.name, tuple(entry.absorbed_by.items())) for entry in block.dropped),
+        identifiable=tuple(value.identifiable is not False for value in block.values.values()),
+        cost=fit.cost,
+        chi2=fit.chi2,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        status=fit.status,
+        message=fit.message,
+        iterations=fit.iterations,
+        outliers=fit.outliers,
+        provenance=dict(block.provenance),
+    )
+
+
+def _parameter(name: str, value: StoredValue) -> Parameter:
+    return Parameter(
+        name=name,
+        unit=value.unit,
+        value=value.estimate,
+        lower=-math.inf if value.lower is None else value.lower,
+        upper=math.inf if value.upper is None else value.upper,
+        prior_std=math.inf if value.prior_std is None else value.prior_std,
+        prior_mean=value.prior_mean,
+        scale=value.scale,
+    )
+
+
+def _stored(estimate: Estimate, covariance: np.ndarray) -> StoredBlock:
+    return StoredBlock(
+        values={item.name: _stored_value(estimate, item) for item in estimate.parameters},
+        dropped=tuple(StoredDropped(entry.name, dict(entry.absorbed_by)) for entry in estimate.dropped),
+        fit=StoredFit(
+            rank=int(estimate.rank),
+            cost=float(estimate.cost),
+            chi2=float(estimate.chi2),
+            degrees_of_freedom=int(estimate.degrees_of_freedom),
+            status=estimate.status,
+            message=estimate.message,
+            iterations=int(estimate.iterations),
+            outliers=tuple(int(number) for number in estimate.outliers),
+        ),
+        covariance_sha256=_sha256(covariance),
+        provenance={str(key): str(value) for key, value in estimate.provenance.items()},
+    )
+
+
+def _stored_value(estimate: Estimate, item: Parameter) -> StoredValue:
+    quantity = estimate.quantity(item.name)
+    low, high, std = (quantity[key] for key in ("low", "high", "std"))
+    return StoredValue(
+        estimate=float(item.value),
+        unit=item.unit,
+        std=None if std is None else float(std),
+        low=None if low is None else float(low),
+        high=None if high is None else float(high),
+        identifiable=bool(quantity["identifiable"]),
+        scale=item.scale,
+        lower=_finite(item.lower),
+        upper=_finite(item.upper),
+        prior_std=_finite(item.prior_std),
+        prior_mean=None if item.prior_mean is None else float(item.prior_mean),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _sha256(array: np.ndarray) -> str:
+    return hashlib.sha256(np.ascontiguousarray(array, dtype="<f8").tobytes()).hexdigest()

@@ -1,0 +1,256 @@
+"""Measured positions to geometry: the rigid fit, the terms that the data support, the fit with them, and estimates.yaml."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.calibration import (
+    Calibration,
+    ErrorStatistics,
+    TermSelection,
+    calibrate,
+    predict,
+    register,
+    select_terms,
+)
+from flexcal.data import PoseSet, provenance, read_estimates, read_poses, write_estimates
+from flexcal.errors import FlexcalError, InputError
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.model import RobotModel
+from flexcal.model.stored import with_blocks
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.results import identifiability_block, quantities, write_results
+
+Progress = Callable[[str, float], None]
+
+AUTO = "auto"
+LossName = Literal["squares", "huber", "cauchy"]
+
+_NORMAL_MEDIAN = 1.4826
+"""Standard deviation over median size of a Gaussian."""
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A measurement that the robust loss gave hardly any weight: number of its pose, point, distance from the fit (m)."""
+
+    pose: int
+    target: str
+    error: float
+
+
+@dataclass(frozen=True, eq=False)
+class RobotCalibration:
+    """What `calibrate_robot` found.
+
+    `nominal` are the errors before, after a rigid registration; `rigid` is the fit without elasticity and further terms,
+    `selected` the one that is stored in the file `estimates`; `selection` is None where the terms were given.
+    """
+
+    nominal: ErrorStatistics
+    rigid: Calibration
+    selection: TermSelection | None
+    selected: Calibration
+    estimate: Estimate
+    estimates: Path
+
+    @property
+    def outliers(self) -> tuple[Outlier, ...]:
+        """The outliers of the selected fit, the farthest first."""
+        fit = self.selected
+        distance = np.linalg.norm(fit.residuals, axis=1)
+        rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
+        return tuple(
+            Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows
+        )
+
+    def document(self) -> dict[str, Any]:
+        """The block of results.json."""
+        selected, table = self.selected, self.selection.table if self.selection else ()
+        return {
+            "identifiability": identifiability_block(selected.identifiability),
+            "terms": list(selected.terms),
+            "term_selection": [
+                {"terms": list(terms), "order_mm": order / MILLIMETRE, "workspace_mm": workspace / MILLIMETRE}
+                for terms, order, workspace in table
+            ],
+            "calibration": {
+                "nominal": self.nominal.in_millimetres(),
+                "rigid": self.rigid.errors.in_millimetres(),
+                "selected": selected.errors.in_millimetres(),
+            },
+            "fit": {
+                "status": selected.estimate.status,
+                "reduced_chi2": selected.estimate.reduced_chi2,
+                "sigma_given": selected.poses.sigma_given,
+                "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
+                "ambiguous_poses": int(selected.ambiguous.sum()),
+            },
+            "outliers": [
+                {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE} for o in self.outliers
+            ],
+            "parameters": quantities(self.estimate),
+            "estimates": self.estimates,
+        }
+
+
+def calibrate_robot(
+    robot: Path,
+    files: Sequence[Path],
+    *,
+    terms: Sequence[str] | None = None,
+    loss: LossName = "squares",
+    secant_scale: float = 0.0,
+    elasticity: Literal["reestimated", "marginalised"] = "reestimated",
+    out: Path | None = None,
+    progress: Progress | None = None,
+) -> RobotCalibration:
+    """Calibrate the robot of a robot.yaml on files of measured poses, and store the estimate as its block `calibration`.
+
+    The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
+    (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. Where the files give no sigma, the
+    scatter about the fit stands for it. With `out`, estimates and results.json go to that folder and nothing beside robot.yaml
+    changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
+    """
+    tell = progress or (lambda stage, share: None)
+    tell("reading", 0.0)
+    bare = RobotModel.from_yaml(robot, estimates=False)
+    source = bare.path.parent / bare.config.estimates
+    blocks = read_estimates(source, without="calibration") if source.exists() else {}
+    model = with_blocks(bare, blocks, source)
+    poses = read_poses(list(files), model)
+    _require_points(poses, files)
+    wanted = _terms(model, terms)
+    tell("reading", 1.0)
+
+    def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> Calibration:
+        tell(stage, 0.0)
+        found = _fit(robot_, poses, blocks.get("stiffness"), chosen, elastic, loss, secant_scale, elasticity)
+        tell(stage, 1.0)
+        return found
+
+    base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
+    rigid = fit(model, base, "rigid fit", elastic=False)
+    selection = None
+    if wanted is None:
+        tell("terms", 0.0)
+        good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
+        selection = select_terms(model, poses.subset(good), stiffness=blocks.get("stiffness"))
+        tell("terms", 1.0)
+        model, wanted = selection.model, selection.terms
+    elastic = bool(model.elastic)
+    same = not elastic and tuple(wanted) == base
+    selected = rigid if same else fit(model, wanted, "selected fit", elastic=elastic)
+    options = {"terms": " ".join(wanted), "loss": loss, "secant_scale": secant_scale, "elasticity": elasticity}
+    origin = provenance(
+        [robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks)
+    )
+    estimate = replace(with_stations(selected), provenance=origin)
+    target = source if out is None else out / "estimates.yaml"
+    result = RobotCalibration(nominal_errors(model, poses), rigid, selection, selected, estimate, target)
+    _store(target, blocks if target != source else {}, estimate)
+    if out is not None:
+        write_results(out, result.document())
+    return result
+
+
+def nominal_errors(model: RobotModel, poses: PoseSet) -> ErrorStatistics:
+    """How far the uncalibrated, rigid robot is from the points after the best rigid registration."""
+    bare = replace(model, station=np.zeros_like(model.station))
+    placed = register(bare, poses, predict(bare, poses, elastic=False).position)
+    return ErrorStatistics.of(poses.position - predict(placed, poses, elastic=False).position)
+
+
+def with_stations(calibration: Calibration) -> Estimate:
+    """The estimate with the rotation of the first station, which is held where registration put it, so that it can be stored."""
+    estimate, model = calibration.estimate, calibration.model
+    names = [f"station.{station}.{key}" for station in calibration.poses.stations for key in ("rx", "ry", "rz")]
+    held = Parameters(
+        Parameter(name, "rad", model.value(name)) for name in names if name not in estimate.parameters
+    )
+    size = len(estimate.parameters)
+    covariance = np.zeros((size + len(held), size + len(held)))
+    covariance[:size, :size] = estimate.covariance
+    return replace(
+        estimate,
+        parameters=estimate.parameters + held,
+        covariance=covariance,
+        identifiable=estimate.identifiable + (False,) * len(held),
+    )
+
+
+def _fit(
+    model: RobotModel,
+    poses: PoseSet,
+    stiffness: Estimate | None,
+    terms: Sequence[str],
+    elastic: bool,
+    loss: LossName,
+    secant_scale: float,
+    elasticity: Literal["reestimated", "marginalised"],
+) -> Calibration:
+    def once(measured: PoseSet) -> Calibration:
+        return calibrate(
+            model,
+            measured,
+            stiffness=stiffness,
+            terms=terms,
+            elastic=elastic,
+            elasticity=elasticity,
+            secant_scale=secant_scale,
+            loss=loss,
+        )
+
+    found = once(poses)
+    return found if poses.sigma_given else once(_with_scatter(found, loss))
+
+
+def _with_scatter(found: Calibration, loss: LossName) -> PoseSet:
+    """The poses with sigma taken from the scatter about a fit; with a robust loss from its median."""
+    rows = found.residuals.size
+    freedom = max(rows - found.identifiability.rank, 1)
+    if loss == "squares":
+        scatter = float(np.sqrt(np.sum(found.residuals**2) / freedom))
+    else:
+        scatter = _NORMAL_MEDIAN * float(np.median(np.abs(found.residuals))) * np.sqrt(rows / freedom)
+    return replace(found.poses, sigma=np.full_like(found.poses.sigma, max(scatter, 1e-9)))
+
+
+def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
+    """The terms to fit, None for those that cross-validation supports."""
+    declared = model.config.geometry.terms
+    asked = tuple(given) if given else ((declared,) if isinstance(declared, str) else declared)
+    if asked == (AUTO,):
+        return None
+    harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
+    known = ("kinematic", "backlash", "gravity_compliance", "transmission", *harmonics)
+    for term in asked:
+        if term not in known:
+            raise FlexcalError(
+                f"there is no geometry term '{term}'; there are {', '.join(known)}, or {AUTO} alone."
+            )
+    if "backlash" in asked and not model.backlash_joints:
+        raise FlexcalError(
+            f"the term backlash is asked for but {model.path} names no joint with it; add `geometry: {{backlash: [joint]}}`."
+        )
+    full = [t for term in asked for t in (harmonics if term == "transmission" else (term,))]
+    return tuple(dict.fromkeys(["kinematic", *full]))
+
+
+def _require_points(poses: PoseSet, files: Sequence[Path]) -> None:
+    if poses.length is not None:
+        raise InputError(
+            f"{files[0]} measures lengths of a wire, which cannot be calibrated on yet; give points x, y, z."
+        )
+
+
+def _store(path: Path, others: Mapping[Block, Estimate], estimate: Estimate) -> None:
+    for block, other in others.items():
+        write_estimates(path, block, other)
+    write_estimates(path, "calibration", estimate)

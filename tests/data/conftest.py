@@ -1,0 +1,104 @@
+"""A small robot for the readers: only what they ask of a model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from flexcal.errors import InputError
+from flexcal.model.config import SignalConfig
+from flexcal.yaml_reader import read_yaml_file
+
+
+@dataclass(frozen=True)
+class JointStandIn:
+    name: str
+    lower: float = -3.0
+    upper: float = 3.0
+    kind: str = "revolute"
+
+
+@dataclass(frozen=True)
+class ConfigStandIn:
+    signals: dict[str, SignalConfig] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RobotStandIn:
+    joints: tuple[JointStandIn, ...]
+    config: ConfigStandIn
+    path: Path
+    points: dict[str, object]
+    payload: object | None = "declared"
+    reach: float = 1.2
+    stations: tuple[str, ...] = ("tracker",)
+
+    @property
+    def n(self) -> int:
+        return len(self.joints)
+
+    @property
+    def joint_names(self) -> tuple[str, ...]:
+        return tuple(joint.name for joint in self.joints)
+
+
+@dataclass(frozen=True)
+class SignalsFile:
+    robot: str
+    signals: dict[str, SignalConfig]
+
+
+@pytest.fixture
+def make_robot(tmp_path: Path) -> Callable[..., Any]:
+    """Makes a two-joint robot whose robot.yaml, with these lines under `signals:`, lies in `tmp_path`."""
+
+    def make(signals: str = "", **changes: Any) -> Any:
+        path = tmp_path / "robot.yaml"
+        path.write_text("robot: arm.urdf\nsignals:" + ("\n" + signals if signals else " {}") + "\n")
+        values = {
+            "joints": (JointStandIn("base"), JointStandIn("elbow")),
+            "config": ConfigStandIn(read_yaml_file(path).structure(SignalsFile).signals),
+            "path": path,
+            "points": {"smr": object(), "ball": object()},
+        }
+        return RobotStandIn(**(values | changes))
+
+    return make
+
+
+@pytest.fixture(scope="session")
+def make_joint() -> Callable[..., Any]:
+    """Makes a joint: name, lower, upper, kind."""
+    return JointStandIn
+
+
+@pytest.fixture(scope="session")
+def any_robot() -> Any:
+    """The robot without `signals:` and without a file."""
+    joints = (JointStandIn("base"), JointStandIn("elbow"))
+    return RobotStandIn(joints, ConfigStandIn(), Path("robot.yaml"), {"smr": object(), "ball": object()})
+
+
+@pytest.fixture
+def robot(make_robot: Callable[..., Any]) -> Any:
+    """The robot without `signals:`."""
+    return make_robot()
+
+
+@pytest.fixture
+def fault(tmp_path: Path) -> Callable[..., str]:
+    """Runs a function that has to raise an `InputError`, and gives its sentence."""
+
+    def run(function: Callable[..., Any], *arguments: Any, **named: Any) -> str:
+        with pytest.raises(InputError) as caught:
+            function(*arguments, **named)
+        message = str(caught.value)
+        assert "\n" not in message
+        assert message.endswith((".", "?"))
+        return message
+
+    return run

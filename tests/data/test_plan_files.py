@@ -1,0 +1,173 @@
+"""Plans: YAML round trip, and one sentence with the line for what does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of, write_plan
+from flexcal.errors import FlexcalError
+from flexcal.yaml_writer import to_plain
+
+
+def make_plan(**changes: Any) -> MultisinePlan:
+    values: dict[str, Any] = {
+        "name": "small",
+        "poses": np.array([[0.1, -0.4, 0.2], [0.0, 1 / 3, 0.0]]),
+        "joints": (0, 2),
+        "payload": 6.0,
+        "base_frequency_hz": 0.25,
+        "lines": np.array([13, 15, 19]),
+        "detection_lines": np.array([17]),
+        "amplitude": np.array([[1.0, 2.0, 3.0], [0.1, 0.2, 0.3]]),
+        "periods": 4,
+        "settle_periods": 2,
+        "realisations": 3,
+        "signs": True,
+        "reference_amplitude": 0.026,
+        "reference_frequency_hz": 2.125,
+        "kp": np.array([3e3, 800.0, 60.0]),
+        "kd": np.array([400.0, 20.0, 4.0]),
+        "rate_hz": 4000.0,
+        "torque": "mean",
+        "seed": 2**40,
+    }
+    return MultisinePlan(**(values | changes))
+
+
+def test_multisine_round_trip(tmp_path: Path) -> None:
+    plan = make_plan()
+    write_plan(tmp_path / "plan.yaml", plan)
+    again = read_plan_of(tmp_path / "plan.yaml", MultisinePlan)
+    assert to_plain(again) == to_plain(plan)
+    assert again.joints == (0, 2)
+    assert again.lines.dtype == np.int64
+    assert again.torque == "mean"
+    text = (tmp_path / "plan.yaml").read_text()
+    assert "joints: [1, 3]" in text
+    assert "tau: mean" in text
+
+
+def test_what_may_be_left_out(tmp_path: Path) -> None:
+    plan = make_plan(payload=None, detection_lines=np.zeros(0, int))
+    write_plan(tmp_path / "plan.yaml", plan)
+    text = (tmp_path / "plan.yaml").read_text().replace("detection_lines: []\n", "")
+    (tmp_path / "plan.yaml").write_text(text)
+    again = read_plan_of(tmp_path / "plan.yaml", MultisinePlan)
+    assert again.payload is None
+    assert again.detection_lines.tolist() == []
+
+
+def test_derived_numbers() -> None:
+    plan = make_plan()
+    assert plan.experiments == 2
+    assert plan.recordings_per_pose == 3 * 2 * 2
+    assert make_plan(signs=False).recordings_per_pose == 3 * 2
+    assert plan.frequencies_hz.tolist() == [3.25, 3.75, 4.75]
+    assert plan.duration == 16.0
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    st.lists(st.lists(st.floats(-7, 7), min_size=3, max_size=3), min_size=1, max_size=5),
+    st.integers(0, 2**60),
+)
+def test_pose_plan_round_trip(
+    tmp_path_factory: pytest.TempPathFactory, q: list[list[float]], seed: int
+) -> None:
+    path = tmp_path_factory.getbasetemp() / "poses.yaml"
+    plan = PosePlan(np.array(q), np.linspace(0, 6, len(q)), seed)
+    write_plan(path, plan)
+    again = read_plan_of(path, PosePlan)
+    assert np.array_equal(again.q, plan.q)
+    assert to_plain(again) == to_plain(plan)
+    assert len(again) == len(q)
+
+
+def test_one_payload_counts_for_all_poses() -> None:
+    plan = PosePlan(np.zeros((3, 2)), np.array(2.5))
+    assert plan.payload is not None
+    assert plan.payload.tolist() == [2.5, 2.5, 2.5]
+    assert PosePlan(np.zeros((3, 2))).payload is None
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("kind: multisine", "kind: sine", ["line 1", "multisine, poses"]),
+        ("kind: multisine\n", "", ["line 1", "add for example 'kind: multisine'"]),
+        ("periods: 4", "perids: 4", ["line ", "unknown key 'perids'", "did you mean 'periods'?"]),
+        ("tau: mean", "torque: mean", ["unknown key 'torque'"]),
+        ("tau: mean\n", "", ["the key 'tau' is missing"]),
+        ("tau: mean", "tau: heldd", ["tau", "'held', 'instantaneous', 'mean'", "did you mean 'held'?"]),
+        ("joints: [1, 3]", "joints: [0, 2]", ["joints[0]", "counted from 1"]),
+        ("joints: [1, 3]", "joints: [1, 4]", ["axis 4", "3 joints"]),
+        ("joints: [1, 3]", "joints: 1", ["joints", "a list of joint numbers"]),
+        ("rate_hz: 4000.0", "rate_hz: fast", ["rate_hz", "a number is expected"]),
+        ("seed: ", "seed: -", ["seed", "negative"]),
+    ],
+)
+def test_sentences(tmp_path: Path, fault: Callable[..., str], old: str, new: str, words: list[str]) -> None:
+    path = tmp_path / "plan.yaml"
+    write_plan(path, make_plan())
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new))
+    message = fault(read_plan, path)
+    assert message.startswith(f"{path} line ")
+    for word in words:
+        assert word in message, message
+
+
+def test_another_kind_of_plan(tmp_path: Path, fault: Callable[..., str]) -> None:
+    write_plan(tmp_path / "plan.yaml", make_plan())
+    message = fault(read_plan_of, tmp_path / "plan.yaml", PosePlan)
+    assert "kind 'multisine'" in message
+    assert "kind 'poses'" in message
+    (tmp_path / "list.yaml").write_text("- 1\n")
+    assert "line 1" in fault(read_plan, tmp_path / "list.yaml")
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"poses": np.zeros(3)}, "list of poses"),
+        ({"joints": ()}, "at least one"),
+        ({"joints": (0, 0)}, "only once"),
+        ({"kp": np.ones(2)}, "kp has 2 gains"),
+        ({"lines": np.zeros(0, int)}, "lines"),
+        ({"amplitude": np.ones((2, 4))}, "amplitude"),
+        ({"lines": np.array([13, 15, 17])}, "detection line"),
+        ({"lines": np.array([0, 15, 19])}, "from 1"),
+        ({"lines": np.array([15, 13, 19])}, "ascending"),
+        ({"base_frequency_hz": 0.0}, "positive"),
+        ({"rate_hz": 9.0}, "half the rate"),
+        ({"settle_periods": 4}, "keep at least one"),
+        ({"realisations": 0}, "realisations"),
+        ({"reference_amplitude": -1.0}, "reference"),
+        ({"payload": -1.0}, "payload"),
+    ],
+)
+def test_values_are_checked(changes: dict[str, Any], words: str) -> None:
+    with pytest.raises(FlexcalError, match=words):
+        make_plan(**changes)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ((np.zeros(3),), "list of poses"),
+        ((np.zeros((3, 2)), np.zeros(2)), "2 masses for 3 poses"),
+        ((np.zeros((3, 2)), np.array(-1.0)), "negative"),
+        ((np.zeros((3, 2)), None, -1), "seed"),
+    ],
+)
+def test_pose_plan_is_checked(arguments: tuple[Any, ...], words: str) -> None:
+    with pytest.raises(FlexcalError, match=words):
+        PosePlan(*arguments)

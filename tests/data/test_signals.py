@@ -1,0 +1,105 @@
+"""`signals:` of robot.yaml, against the formula written out, and one sentence with its line for what does not fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexcal.data.signals import assign, read_matrix
+from flexcal.data.table import open_table
+from flexcal.units import DEGREE
+
+
+def values(path: Path, robot: Any, quantity: str) -> np.ndarray:
+    file = open_table(path)
+    return assign(file, robot, (quantity,), ())[quantity].values(file.read())
+
+
+def test_formula(tmp_path: Path, make_robot: Callable[..., Any]) -> None:
+    (tmp_path / "m.csv").write_text("# joint from motor\n1, 0.5, 0\n0, -2, 1e-1\n")
+    robot = make_robot(
+        "  q: {columns: [a, b, c], unit: deg, gain: [2, 3, 4], matrix: m.csv, offset: [10, -90]}"
+    )
+    (tmp_path / "log.csv").write_text("a,b,c\n1,2,3\n-4,5,6\n")
+    raw = np.array([[1.0, 2, 3], [-4, 5, 6]])
+    matrix = np.array([[1, 0.5, 0], [0, -2, 0.1]])
+    expected = raw * DEGREE * np.array([2.0, 3, 4]) @ matrix.T + np.array([10, -90]) * DEGREE
+    assert np.allclose(values(tmp_path / "log.csv", robot, "q"), expected, rtol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "factor"),
+    [
+        ("q", "turn", 2 * np.pi),
+        ("dq", "rpm", np.pi / 30),
+        ("dq", "deg/s", DEGREE),
+        ("tau", "N m", 1.0),
+        ("t", "ms", 1e-3),
+        ("payload", "g", 1e-3),
+        ("xyz", "mm", 1e-3),
+        ("sigma", "um", 1e-6),
+    ],
+)
+def test_units(
+    tmp_path: Path, make_robot: Callable[..., Any], quantity: str, unit: str, factor: float
+) -> None:
+    count = {"q": 2, "dq": 2, "tau": 2, "xyz": 3}.get(quantity, 1)
+    names = [f"c{i}" for i in range(count)]
+    robot = make_robot(f"  {quantity}: {{columns: [{', '.join(names)}], unit: {unit}}}")
+    (tmp_path / "log.csv").write_text(",".join(names) + "\n" + ",".join(["7"] * count) + "\n")
+    assert values(tmp_path / "log.csv", robot, quantity) == pytest.approx(7 * factor)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ("  w: {columns: [a, b]}", ["this quantity is not known", "known are t, q"]),
+        ("  tauu: {columns: [a, b]}", ["did you mean 'tau'?"]),
+        ("  q: {columns: [a, b], unit: degrees}", ["'degrees' does not fit", "rad, deg"]),
+        ("  q: {columns: [a, b], unit: A}", ["'A' does not fit"]),
+        ("  tau: {columns: [a, b], unit: A}", ["gain", "N m/A"]),
+        ("  q: {columns: [a, a]}", ["twice"]),
+        ("  q: {columns: [a]}", ["1 columns", "2 are needed (q1, q2)"]),
+        ("  q: {columns: [a, b], gain: [1]}", ["1 gains for 2 columns"]),
+        ("  q: {columns: [a, b], offset: [1]}", ["1 offsets for 2 values"]),
+        ("  q: {columns: [a, b, c], matrix: two.csv}", ["two.csv is 2 × 2", "2 × 3"]),
+    ],
+)
+def test_sentences(
+    tmp_path: Path, make_robot: Callable[..., Any], fault: Callable[..., str], line: str, words: list[str]
+) -> None:
+    (tmp_path / "two.csv").write_text("1,0\n0,1\n")
+    (tmp_path / "log.csv").write_text("a,b\n1,2\n")
+    message = fault(values, tmp_path / "log.csv", make_robot(line), "q")
+    assert message.startswith(f"{tmp_path / 'robot.yaml'} line 3: signals.")
+    for word in words:
+        assert word in message, message
+
+
+def test_columns_of_signals_that_are_missing(
+    tmp_path: Path, make_robot: Callable[..., Any], fault: Callable[..., str]
+) -> None:
+    robot = make_robot("  q: {columns: [a, b]}")
+    (tmp_path / "log.csv").write_text("a\n1\n")
+    assert "'b', which `signals:` names for q, is missing" in fault(values, tmp_path / "log.csv", robot, "q")
+    (tmp_path / "log.csv").write_text("c\n1\n")
+    assert "'q1' (or a, b of `signals:`) is missing" in fault(values, tmp_path / "log.csv", robot, "q")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("1,0\n0\n", "line 2"),
+        ("1,0\n0,x\n", "line 2, column 2: 'x' is not a number"),
+        ("1,nan\n", "finite"),
+        ("\n", "empty"),
+    ],
+)
+def test_matrix(tmp_path: Path, fault: Callable[..., str], text: str, words: str) -> None:
+    (tmp_path / "m.csv").write_text(text)
+    assert words in fault(read_matrix, tmp_path / "m.csv")
+    assert "none.csv cannot be read" in fault(read_matrix, tmp_path / "none.csv")

@@ -1,0 +1,221 @@
+"""Estimates on disk: what is read is what was written, other blocks stay, and files that do not fit are refused."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexcal.errors import FlexcalError, InputError
+from flexcal.estimates_file import (
+    block_sha256,
+    provenance,
+    read_estimates,
+    read_values,
+    sha256_of,
+    write_estimates,
+    write_values,
+)
+from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
+
+
+def make_estimate(size: int = 4, seed: int = 0, **changes: Any) -> Estimate:
+    rng = np.random.default_rng(seed)
+    half = rng.normal(0, 0.1, (size, size))
+    items = [
+        Parameter("joint_1.drive.stiffness", "N m/rad", 143.7e3 / 3, lower=1.0, scale="log", prior_std=0.3)
+    ]
+    items += [
+        Parameter(f"joint_{i}.offset", "rad", float(rng.normal()), prior_std=5e-4, prior_mean=0.0)
+        for i in range(1, size)
+    ]
+    values: dict[str, Any] = {
+        "parameters": Parameters(items),
+        "covariance": half @ half.T,
+        "rank": size - 1,
+        "dropped": (Dropped(items[-1].name, ((items[1].name, 1 / 3), (items[0].name, -2e-9))),),
+        "identifiable": (*[True] * (size - 1), False),
+        "cost": 12.5,
+        "chi2": 11.25,
+        "degrees_of_freedom": 77,
+        "status": "converged",
+        "message": "the step is small: 1e-12",
+        "iterations": 7,
+        "outliers": (3, 8),
+        "provenance": {"program": "flexcal 0", "input.a b.csv": "ab12", "option.seed": "1"},
+    }
+    return Estimate(**(values | changes))
+
+
+def same(one: Estimate, other: Estimate) -> None:
+    assert np.array_equal(one.covariance, other.covariance)
+    for name in ("parameters", "rank", "dropped", "identifiable", "cost", "chi2", "degrees_of_freedom"):
+        assert getattr(one, name) == getattr(other, name), name
+    for name in ("status", "message", "iterations", "outliers", "provenance"):
+        assert getattr(one, name) == getattr(other, name), name
+    assert one.interval("joint_1.drive.stiffness") == other.interval("joint_1.drive.stiffness")
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    path = tmp_path / "estimates.yaml"
+    estimate = make_estimate()
+    write_estimates(path, "stiffness", estimate)
+    same(read_estimates(path)["stiffness"], estimate)
+    assert sorted(os.listdir(tmp_path)) == ["estimates.npz", "estimates.yaml"]
+    assert read_values(path) == estimate.values
+    text = path.read_text()
+    assert "joint_1.drive.stiffness: {estimate: 47900.0, unit: N m/rad, std: " in text
+
+
+def test_a_block_replaces_only_itself(tmp_path: Path) -> None:
+    path = tmp_path / "estimates.yaml"
+    one, two, three = make_estimate(4, 1), make_estimate(3, 2), make_estimate(5, 3)
+    write_estimates(path, "calibration", one)
+    write_estimates(path, "stiffness", two)
+    write_estimates(path, "calibration", three)
+    read = read_estimates(path)
+    assert list(read) == ["stiffness", "calibration"]
+    same(read["stiffness"], two)
+    same(read["calibration"], three)
+    assert list(read_estimates(path, without="calibration")) == ["stiffness"]
+
+
+def test_the_same_estimates_are_the_same_bytes(tmp_path: Path) -> None:
+    for name in ("a.yaml", "b.yaml"):
+        write_estimates(tmp_path / name, "stiffness", make_estimate())
+        write_estimates(tmp_path / name, "calibration", make_estimate(3))
+    before = [(tmp_path / name).read_bytes() for name in ("a.yaml", "a.npz")]
+    assert before == [(tmp_path / name).read_bytes() for name in ("b.yaml", "b.npz")]
+    write_estimates(tmp_path / "a.yaml", "stiffness", make_estimate())
+    assert before == [(tmp_path / name).read_bytes() for name in ("a.yaml", "a.npz")]
+
+
+def test_npz_that_does_not_fit(tmp_path: Path) -> None:
+    path = tmp_path / "estimates.yaml"
+    write_estimates(path, "stiffness", make_estimate())
+    with np.load(tmp_path / "estimates.npz") as stored:
+        names, covariance = stored["stiffness.names"], stored["stiffness.covariance"]
+
+    def refused(match: str, **arrays: np.ndarray) -> None:
+        np.savez(tmp_path / "estimates.npz", **arrays)
+        with pytest.raises(InputError, match=match):
+            read_estimates(path)
+
+    label, matrix = "stiffness.names", "stiffness.covariance"
+    refused(
+        r"estimates\.npz: the names and covariance of the block 'stiffness' are missing", **{label: names}
+    )
+    refused(r"shape \(3, 3\), not \(4, 4\)", **{label: names, matrix: covariance[:3, :3]})
+    refused("names are not the values", **{label: names[::-1], matrix: covariance})
+    refused(r"does not belong to estimates\.yaml", **{label: names, matrix: 2 * covariance})
+    (tmp_path / "estimates.npz").write_bytes(b"nothing")
+    with pytest.raises(InputError, match=r"estimates\.npz cannot be read"):
+        read_estimates(path)
+    (tmp_path / "estimates.npz").unlink()
+    with pytest.raises(InputError, match="no such file"):
+        read_estimates(path)
+    write_estimates(path, "stiffness", make_estimate(3))
+    assert read_estimates(path)["stiffness"].rank == 2
+
+
+def test_a_damaged_other_block_is_not_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "estimates.yaml"
+    write_estimates(path, "stiffness", make_estimate())
+    (tmp_path / "estimates.npz").unlink()
+    before = path.read_bytes()
+    with pytest.raises(InputError, match="run the identification again"):
+        write_estimates(path, "calibration", make_estimate())
+    assert path.read_bytes() == before
+    assert os.listdir(tmp_path) == ["estimates.yaml"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("stiffness:\n", "stifness:\n", ["line 1", "unknown key 'stifness'", "'stiffness'?"]),
+        ("rank: 3", "rnk: 3", ["unknown key 'rnk' in stiffness.fit", "'rank'?"]),
+        ("rank: 3", "rank: three", ["stiffness.fit.rank", "a whole number"]),
+        ("scale: log", "scale: cubic", ["scale", "'linear', 'log'"]),
+        ("estimate: 47900.0", "estimate: .nan", ["joint_1.drive.stiffness.estimate", "finite"]),
+        ("estimate: 47900.0", "estimate: -1", ["outside its bounds"]),
+        ("name: joint_3.offset", "name: joint_9.offset", ["'joint_9.offset' is not among the values"]),
+    ],
+)
+def test_yaml_that_does_not_fit(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
+    path = tmp_path / "estimates.yaml"
+    write_estimates(path, "stiffness", make_estimate())
+    text = path.read_text()
+    assert old in text
+    path.write_text(text.replace(old, new, 1))
+    with pytest.raises(InputError) as caught:
+        read_estimates(path)
+    message = str(caught.value)
+    assert message.startswith(f"{path} line ")
+    for word in words:
+        assert word in message, message
+
+
+@pytest.mark.parametrize(
+    ("estimate", "match"),
+    [
+        (make_estimate(cost=float("nan")), "cost"),
+        (make_estimate(covariance=np.full((4, 4), np.inf)), "finite"),
+        (make_estimate(covariance=np.zeros((3, 3))), "covariance"),
+    ],
+)
+def test_what_is_not_written(tmp_path: Path, estimate: Estimate, match: str) -> None:
+    with pytest.raises(FlexcalError, match=match):
+        write_estimates(tmp_path / "estimates.yaml", "stiffness", estimate)
+    assert os.listdir(tmp_path) == []
+
+
+def test_names_of_files_and_blocks(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=r"\.yaml"):
+        write_estimates(tmp_path / "estimates.txt", "stiffness", make_estimate())
+    with pytest.raises(FlexcalError, match="no block 'geometry'"):
+        write_estimates(tmp_path / "estimates.yaml", "geometry", make_estimate())  # type: ignore[arg-type]
+    with pytest.raises(FlexcalError, match="no block 'truth'"):
+        write_values(tmp_path / "truth.yaml", {"truth": {}})  # type: ignore[dict-item]
+
+
+def test_values_only(tmp_path: Path) -> None:
+    path = tmp_path / "truth.yaml"
+    values = {"link_1.mass": 12.3, "joint_1.offset": 1 / 3}
+    write_values(path, {"dynamics": values, "calibration": {"joint_2.backlash": 3e-5}}, {"link_1.mass": "kg"})
+    assert read_values(path) == {**values, "joint_2.backlash": 3e-5}
+    with pytest.raises(InputError, match="the block 'dynamics' has values only"):
+        read_estimates(path)
+
+
+def test_provenance(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_bytes(b"abc")
+    (tmp_path / "logs").mkdir()
+    (tmp_path / "logs" / "1.csv").write_bytes(b"1")
+    write_estimates(tmp_path / "estimates.yaml", "stiffness", make_estimate())
+    found = provenance([tmp_path / "a.csv"], {"seed": 3}, tmp_path / "estimates.yaml", ["stiffness"])
+    assert found[f"input.{tmp_path.as_posix()}/a.csv"].startswith(
+        "ba7816bf8f01cfea"
+    )  # FIPS 180-2, example B.1
+    assert found["option.seed"] == "3"
+    assert found["program"].startswith("flexcal ")
+    assert found["block.stiffness"] == block_sha256(tmp_path / "estimates.yaml", "stiffness")
+    folder = sha256_of(tmp_path / "logs")
+    (tmp_path / "logs" / "2.csv").write_bytes(b"2")
+    assert sha256_of(tmp_path / "logs") != folder
+    with pytest.raises(InputError, match="cannot be read"):
+        sha256_of(tmp_path / "none")
+    with pytest.raises(InputError, match="no block 'dynamics'"):
+        block_sha256(tmp_path / "estimates.yaml", "dynamics")
+
+
+def test_block_sha256_follows_the_values_only(tmp_path: Path) -> None:
+    path = tmp_path / "estimates.yaml"
+    write_estimates(path, "stiffness", make_estimate())
+    first = block_sha256(path, "stiffness")
+    write_estimates(path, "stiffness", make_estimate(provenance={}))
+    assert block_sha256(path, "stiffness") == first
+    write_estimates(path, "stiffness", make_estimate(seed=1))
+    assert block_sha256(path, "stiffness") != first
