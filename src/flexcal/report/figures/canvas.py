@@ -1,0 +1,83 @@
+"""The look that all figures share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+from plotly.subplots import make_subplots
+
+from flexcal.report.palette import AXIS, GRID, INK, QUIET
+
+FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif"
+
+
+def canvas(height: int, *, legend: bool = True) -> go.Figure:
+    """An empty figure in the report's look; `height` in pixels."""
+    return _styled(go.Figure(), height, legend)
+
+
+def panels(
+    rows: int, columns: int, height: int, titles: Sequence[str] = (), *, legend: bool = True, row_gap: float | None = None
+) -> go.Figure:
+    """A grid of small panels with one title each, in the report's look."""
+    figure = make_subplots(
+        rows,
+        columns,
+        subplot_titles=tuple(titles) or None,
+        horizontal_spacing=0.045 if columns > 1 else 0.0,
+        vertical_spacing=(0.26 / rows if row_gap is None else row_gap) if rows > 1 else 0.0,
+    )
+    _styled(figure, height, legend)
+    figure.update_annotations(font={"size": 12, "color": QUIET}, yshift=-2)
+    return figure
+
+
+def single(values: np.ndarray | Sequence[float]) -> np.ndarray:
+    """Float32, which the page stores in base64."""
+    return np.asarray(values, dtype=np.float32)
+
+
+def positive(values: np.ndarray) -> np.ndarray:
+    """Float32 with everything that a log axis cannot show as a gap."""
+    values = np.asarray(values, dtype=float)
+    return single(np.where(values > 0, values, np.nan))
+
+
+def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
+    axis = {
+        "gridcolor": GRID,
+        "linecolor": AXIS,
+        "zerolinecolor": AXIS,
+        "tickcolor": AXIS,
+        "showline": True,
+        "ticks": "outside",
+        "ticklen": 4,
+        "title": {"font": {"size": 12, "color": QUIET}, "standoff": 6},
+        "automargin": True,
+    }
+    figure.update_layout(
+        template="none",
+        height=height,
+        font={"family": FONT, "size": 12, "color": INK},
+        paper_bgcolor="rgba(0,0,0,0)",
+        plot_bgcolor="rgba(0,0,0,0)",
+        margin={"l": 56, "r": 12, "t": 56 if legend else 26, "b": 46},
+        showlegend=legend,
+        legend={
+            "orientation": "h",
+            "x": 0,
+            "xanchor": "left",
+            "y": 1,
+            "yref": "container",
+            "yanchor": "top",
+            "font": {"size": 12},
+            "bgcolor": "rgba(0,0,0,0)",
+        },
+        hoverlabel={"font": {"family": FONT, "size": 12}},
+        hovermode="closest",
+    )
+    figure.update_xaxes(**axis)
+    figure.update_yaxes(**axis)
+    return figure

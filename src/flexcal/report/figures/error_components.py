@@ -1,0 +1,55 @@
+"""Fig. 12: what is left at every calibration pose, by coordinate."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.data import PoseSet
+from flexcal.report.figures.canvas import panels, single
+from flexcal.report.palette import BAND, ELASTIC
+from flexcal.units import MILLIMETRE
+
+
+def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
+    """Components x, y, z of the residuals (N, 3) m in millimetres, one panel each, with the instrument's ± 2σ behind them."""
+    figure = panels(3, 1, 470, ["x", "y", "z"], row_gap=0.08)
+    largest = 1.08 * float(np.abs(residuals).max(initial=1e-9)) / MILLIMETRE
+    for k in range(3):
+        noise = 2 * poses.sigma[:, k] / MILLIMETRE
+        figure.add_trace(
+            go.Scatter(
+                x=single(np.concatenate([poses.pose, poses.pose[::-1]])),
+                y=single(np.concatenate([noise, -noise[::-1]])),
+                fill="toself",
+                fillcolor=BAND,
+                opacity=0.5,
+                line={"width": 0},
+                mode="lines",
+                name="± 2σ of the instrument",
+                legendgroup="noise",
+                showlegend=k == 0,
+                hoverinfo="skip",
+            ),
+            row=k + 1,
+            col=1,
+        )
+        figure.add_trace(
+            go.Bar(
+                x=single(poses.pose),
+                y=single(residuals[:, k] / MILLIMETRE),
+                marker={"color": ELASTIC, "line": {"width": 0}},
+                width=0.55,
+                name="measured minus predicted",
+                legendgroup="residual",
+                showlegend=k == 0,
+                hovertemplate="pose %{x}: %{y:+.3f} mm",
+            ),
+            row=k + 1,
+            col=1,
+        )
+        figure.update_xaxes(showticklabels=k == 2, row=k + 1, col=1)
+    figure.update_yaxes(range=[-largest, largest], nticks=5)
+    figure.update_yaxes(title_text="error / mm", row=2, col=1)
+    figure.update_xaxes(title_text="calibration pose", row=3, col=1)
+    return figure

@@ -1,0 +1,64 @@
+"""Figs. 7-9: measured frequency responses against the fitted model, pose by pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.frequency import FrequencyResponse
+from flexcal.report.figures.canvas import panels, positive, single
+from flexcal.report.figures.response_levels import FREQUENCY_TICKS, frequency_axes
+from flexcal.report.palette import ELASTIC, INK
+
+
+def response_fit(
+    responses: Sequence[FrequencyResponse], fitted: Sequence[np.ndarray], labels: Sequence[str]
+) -> go.Figure:
+    """Magnitude of every element and phase of the diagonal ones: dots measured, lines the model, one pose shown at a time.
+
+    Traces carry `meta = {"pose": label}`, by which the page chooses.
+    """
+    n = len(responses[0].joints)
+    titles = [f"|G<sub>{i + 1}{j + 1}</sub>|" for i in range(n) for j in range(n)]
+    titles += [f"phase of G<sub>{i + 1}{i + 1}</sub>" for i in range(n)]
+    figure = panels(n + 1, n, 175 * (n + 1) + 80, titles)
+    for number, (response, model, label) in enumerate(zip(responses, fitted, labels, strict=True)):
+        pairs = ((response.response, "measured"), (model, "model"))
+        for i in range(n):
+            for j in range(n):
+                for values, kind in pairs:
+                    trace = _trace(response.frequencies_hz, positive(abs(values[:, i, j])), kind, label)
+                    trace.update(showlegend=i == j == 0, visible=number == 0)
+                    figure.add_trace(trace, row=i + 1, col=j + 1)
+            for values, kind in pairs:
+                degrees = np.degrees(np.angle(values[:, i, i]))
+                trace = _trace(response.frequencies_hz, single(degrees), kind, label)
+                trace.update(showlegend=False, visible=number == 0)
+                trace.update(hovertemplate="%{x:.2f} Hz<br>%{y:.0f}°")
+                figure.add_trace(trace, row=n + 1, col=i + 1)
+    frequency_axes(figure, n + 1, n)
+    figure.update_yaxes(
+        type="linear", matches=f"y{n * n + 1}", range=[-200, 200], tickvals=[-180, -90, 0, 90, 180], row=n + 1
+    )
+    figure.update_yaxes(title_text="degrees", row=n + 1, col=1)
+    figure.update_xaxes(tickvals=FREQUENCY_TICKS)
+    return figure
+
+
+def _trace(frequencies: np.ndarray, values: np.ndarray, kind: str, label: str) -> go.Scatter:
+    look = (
+        {"mode": "markers", "marker": {"color": INK, "size": 3.5, "opacity": 0.55}}
+        if kind == "measured"
+        else {"mode": "lines", "line": {"color": ELASTIC, "width": 1.8}}
+    )
+    return go.Scatter(
+        x=single(frequencies),
+        y=values,
+        name="measured" if kind == "measured" else "fitted model",
+        legendgroup=kind,
+        meta={"pose": label},
+        hovertemplate="%{x:.2f} Hz<br>%{y:.3g} rad/s² per N m",
+        **look,
+    )

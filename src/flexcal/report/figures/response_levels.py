@@ -1,0 +1,53 @@
+"""Fig. 5: the measured frequency response of one pose with its noise and distortion levels."""
+
+from __future__ import annotations
+
+import plotly.graph_objects as go
+
+from flexcal.frequency import FrequencyResponse
+from flexcal.report.figures.canvas import panels, positive, single
+from flexcal.report.palette import ELASTIC, NOMINAL, RIGID
+
+FREQUENCY_TICKS = (1, 3, 10, 30, 100, 300)
+
+
+def response_levels(response: FrequencyResponse) -> go.Figure:
+    """Magnitude of every element against frequency, and 1σ of its mean from noise and from nonlinear distortion (eq. 19)."""
+    n = len(response.joints)
+    titles = [f"G<sub>{i + 1}{j + 1}</sub>" for i in range(n) for j in range(n)]
+    figure = panels(n, n, 190 * n + 80, titles)
+    curves = (
+        ("measured response |G|", abs(response.response), ELASTIC, "solid"),
+        ("nonlinear distortion, 1σ", response.distortion_std, RIGID, "solid"),
+        ("noise, 1σ", response.noise_std, NOMINAL, "solid"),
+    )
+    for i in range(n):
+        for j in range(n):
+            for name, values, colour, dash in curves:
+                figure.add_trace(
+                    go.Scatter(
+                        x=single(response.frequencies_hz),
+                        y=positive(values[:, i, j]),
+                        name=name,
+                        legendgroup=name,
+                        showlegend=i == j == 0,
+                        mode="lines",
+                        line={"color": colour, "width": 1.6, "dash": dash},
+                        hovertemplate="%{x:.2f} Hz<br>%{y:.3g} rad/s² per N m",
+                    ),
+                    row=i + 1,
+                    col=j + 1,
+                )
+    frequency_axes(figure, n, n)
+    return figure
+
+
+def frequency_axes(figure: go.Figure, rows: int, columns: int) -> None:
+    """Logarithmic axes for magnitudes against frequency; labels on the outer panels only, one range for all."""
+    figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
+    figure.update_yaxes(type="log", dtick=1, exponentformat="power", showticklabels=False, matches="y")
+    for column in range(columns):
+        figure.update_xaxes(showticklabels=True, title_text="Hz", row=rows, col=column + 1)
+    for row in range(rows):
+        figure.update_yaxes(showticklabels=True, row=row + 1, col=1)
+    figure.update_yaxes(title_text="rad/s² per N m", row=(rows + 1) // 2, col=1)

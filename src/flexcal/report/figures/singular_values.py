@@ -1,0 +1,48 @@
+"""The gap that separates what the poses determine from what they do not."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.estimation import Identifiability
+from flexcal.report.figures.canvas import canvas, single
+from flexcal.report.palette import AXIS, ELASTIC, NOMINAL, QUIET
+
+_SMALLEST = 1e-17
+
+
+def singular_values(found: Identifiability) -> go.Figure:
+    """Singular values and |diagonal of R| of the scaled Jacobian, relative to the largest, on a log scale; the rank marked."""
+    figure = canvas(400)
+    number = np.arange(1, len(found.names) + 1)
+    for name, values, symbol in (
+        ("diagonal of R (pivoted QR)", found.diagonal, "circle"),
+        ("singular values", found.singular_values, "line-ew-open"),
+    ):
+        kept = number <= found.rank
+        figure.add_trace(
+            go.Scatter(
+                x=single(number),
+                y=single(np.maximum(values, _SMALLEST)),
+                mode="markers",
+                marker={
+                    "color": [ELASTIC if k else NOMINAL for k in kept],
+                    "size": 7 if symbol == "circle" else 11,
+                    "symbol": symbol,
+                    "line": {"width": 0 if symbol == "circle" else 2, "color": [ELASTIC if k else NOMINAL for k in kept]},
+                },
+                name=name,
+                hovertemplate="%{x}: %{y:.1e}",
+            )
+        )
+    if found.rank < len(found.names):
+        figure.add_vline(x=found.rank + 0.5, line={"color": AXIS, "width": 1.5, "dash": "dash"})
+        gap = f"a gap of {found.gap:.0f} decades" if np.isfinite(found.gap) else "nothing below"
+        figure.add_annotation(
+            x=found.rank + 0.5, y=0.98, yref="paper", text=f"rank {found.rank}, {gap}", showarrow=False,
+            xanchor="right", xshift=-6, yanchor="top", font={"color": QUIET, "size": 12}, yshift=-150,
+        )  # fmt: skip
+    figure.update_yaxes(type="log", dtick=3, exponentformat="power", title_text="relative to the largest")
+    figure.update_xaxes(title_text="number")
+    return figure

@@ -1,0 +1,36 @@
+"""The colours of figures and page: each has one value on a light and one on a dark ground."""
+
+from __future__ import annotations
+
+LIGHT = {
+    "ink": "#1b1f24",
+    "quiet": "#5b6470",
+    "grid": "#e3e6ea",
+    "axis": "#aab2bb",
+    "elastic": "#1f6fd0",
+    "rigid": "#d9541e",
+    "nominal": "#7d8690",
+    "good": "#16805a",
+    "band": "#9dc3f2",
+}
+DARK = {
+    "ink": "#e8ebef",
+    "quiet": "#a3adb8",
+    "grid": "#2b323a",
+    "axis": "#5b6672",
+    "elastic": "#5a9df0",
+    "rigid": "#f0804f",
+    "nominal": "#949ea9",
+    "good": "#3fb98a",
+    "band": "#2c4f7d",
+}
+
+INK, QUIET, GRID, AXIS = LIGHT["ink"], LIGHT["quiet"], LIGHT["grid"], LIGHT["axis"]
+ELASTIC, RIGID, NOMINAL, GOOD, BAND = (
+    LIGHT[k] for k in ("elastic", "rigid", "nominal", "good", "band")
+)
+
+
+def dark_of() -> dict[str, str]:
+    """Light colour → dark colour, for the page's script."""
+    return {LIGHT[name]: DARK[name] for name in LIGHT}

@@ -1,0 +1,68 @@
+"""Everything that a two-stage calibration found, bundled for its report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Protocol
+
+import numpy as np
+
+from flexcal.calibration import Calibration, ErrorStatistics, Verification
+from flexcal.data import MultisinePlan, PoseSet
+from flexcal.estimation import Estimate
+from flexcal.frequency import FrequencyResponse
+from flexcal.model import RobotModel
+from flexcal.report.publication import Publication
+
+
+class StiffnessResult(Protocol):
+    """What the report reads of a result of stage 1: the estimate, and the fitted response (L, n, n) of every measured pose."""
+
+    @property
+    def estimate(self) -> Estimate:
+        """Stiffness, damping and nuisances."""
+        ...
+
+    @property
+    def fitted(self) -> Sequence[np.ndarray]:
+        """The model's response at the lines of each measured response, in their order."""
+        ...
+
+
+@dataclass(frozen=True, eq=False)
+class TwoStageStudy:
+    """One robot, both stages, and how they were checked.
+
+    `nominal` is the robot of the data sheet; `calibration.model` the calibrated one. `rigid` holds fits of the same robot without
+    elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on `verification_poses` are against the
+    noise-free truth where `truth` is known, otherwise against the instrument; `measured_verification` is against the instrument, on
+    `measured_poses`. `floor` is the error that would remain with every parameter known. `truth` maps parameter names to SI values.
+    `results` is the document of results.json, `seconds` durations by stage.
+    """
+
+    nominal: RobotModel
+    plan: MultisinePlan
+    responses: tuple[FrequencyResponse, ...]
+    stiffness: StiffnessResult
+    calibration: Calibration
+    rigid: tuple[Calibration, ...]
+    nominal_at_calibration: Verification
+    verification_poses: PoseSet
+    nominal_verification: Verification
+    elastic_verification: Verification
+    rigid_verification: tuple[Verification, ...]
+    measured_poses: PoseSet | None = None
+    measured_verification: Verification | None = None
+    floor: ErrorStatistics | None = None
+    truth: Mapping[str, float] | None = None
+    paper: Publication | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    results: Mapping[str, Any] = field(default_factory=dict)
+    seed: int | None = None
+    command: str = ""
+
+    @property
+    def reference(self) -> str:
+        """What verification errors are measured against, in words."""
+        return "the noise-free truth" if self.truth is not None else "the instrument"
