@@ -99,7 +99,7 @@ def test_npz_that_does_not_fit(tmp_path: Path) -> None:
     with np.load(tmp_path / "estimates.npz") as stored:
         names, covariance = stored["stiffness.names"], stored["stiffness.covariance"]
 
-    def refused(match: str, **arrays: np.ndarray) -> None:
+    def refused(match: str, **arrays: Any) -> None:
         np.savez(tmp_path / "estimates.npz", **arrays)
         with pytest.raises(InputError, match=match):
             read_estimates(path)

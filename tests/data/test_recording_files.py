@@ -37,7 +37,7 @@ def recording(samples: int = 50, step: float = 1 / 3000, start: float = 0.25, **
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_round_trip(tmp_path: Path, robot: Any, ending: str) -> None:
     rng = np.random.default_rng(2)
-    more = {
+    more: dict[str, Any] = {
         name: rng.normal(0, 1, (50, 2))
         for name in ("arm", "velocity", "acceleration", "arm_velocity", "external_torque")
     }

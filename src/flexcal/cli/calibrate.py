@@ -16,13 +16,15 @@ from flexcal.cli.options import Json, PoseFiles, Robot
 class Calibrate:
     """Fit the geometry of a robot to measured positions: joint offsets, misalignments, lengths, tool, backlash.
 
-    Starts from robot.yaml and what 'identify stiffness' found, and writes estimates.yaml beside robot.yaml. Two fits are reported: the rigid
-    one, and the one with elasticity and the terms that cross-validation supports; the second is stored.
+    Starts from robot.yaml and what 'identify stiffness' found, and writes estimates.yaml beside robot.yaml. Two fits are reported:
+    the rigid one, and the one with elasticity and the terms that cross-validation supports; the second is stored.
     """
 
     robot: Robot
     poses: PoseFiles
-    terms: Annotated[tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml says)")] = ()
+    terms: Annotated[
+        tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml says)")
+    ] = ()
     """auto, or names out of: kinematic, backlash, gravity_compliance, transmission."""
     loss: Literal["squares", "huber", "cauchy"] = "squares"
     """cauchy finds outliers and lists them."""
@@ -54,22 +56,36 @@ class Calibrate:
                 progress=progress,
             )
         document = found.document()
-        if document["identifiability"]["dropped"]:
-            console.show(dropped_table(document["identifiability"]))
-        console.show(weak_table(document["identifiability"]["weak_directions"]))
+        seen = document["identifiability"]
+        if seen["dropped"]:
+            console.show(dropped_table(seen))
+        console.show(weak_table(seen["weak_directions"]))
+        if found.selected.terms != found.rigid.terms:
+            dropped = [d["name"] for d in seen["selected"]["dropped"]]
+            further = [name for name in dropped if name not in found.rigid.identifiability.names]
+            lost = f"; not told apart: {', '.join(further)}" if further else ""
+            console.say(
+                f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
+            )
         errors = document["calibration"]
         terms = " + ".join(found.selected.terms)
         labels = {"nominal": "before (registered only)", "rigid": "rigid", "selected": f"selected: {terms}"}
-        console.show(error_table("distance to the measured points", {labels[key]: errors[key] for key in labels}))
+        console.show(
+            error_table("distance to the measured points", {labels[key]: errors[key] for key in labels})
+        )
         self._remark(console, document)
         where = "" if self.out is None else f" --estimates {self.out}"
         console.say(f"wrote {found.estimates}")
-        console.finish(document, f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw")
+        console.finish(
+            document, f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw"
+        )
 
     def _remark(self, console: Console, document: dict) -> None:
         fit, outliers = document["fit"], document["outliers"]
         if not fit["sigma_given"]:
-            console.say(f"no sigma in the files: the scatter of {fit['sigma_mm']:.3f} mm a coordinate stands for it")
+            console.say(
+                f"no sigma in the files: the scatter of {fit['sigma_mm']:.3f} mm a coordinate stands for it"
+            )
         elif fit["reduced_chi2"] is not None and fit["reduced_chi2"] > 2:
             console.say(
                 f"chi-square is {fit['reduced_chi2']:.1f} times what sigma explains: the model lacks something or sigma is too small, "

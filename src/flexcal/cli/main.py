@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Sequence
 from importlib import import_module
 
@@ -64,12 +66,19 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
             prog=f"flexcal {verb.name}",
             args=arguments,
             config=(tyro.conf.FlagCreatePairsOff,),
-            description=f"{(command.__doc__ or '').strip()}\n\nExample: {verb.example}",
+            description=_description(command.__doc__ or "", verb.example),
         )
     except SystemExit as stop:  # --help, or arguments that do not parse: tyro has said so
         return stop.code if isinstance(stop.code, int) else FAILED
     parsed.run()
     return 0
+
+
+def _description(docstring: str, example: str) -> str:
+    """The paragraphs of a docstring, filled to the terminal, and an example."""
+    width = min(shutil.get_terminal_size().columns, 100)
+    paragraphs = [textwrap.fill(" ".join(part.split()), width) for part in docstring.split("\n\n")]
+    return "\n\n".join([*paragraphs, f"Example: {example}"])
 
 
 if __name__ == "__main__":

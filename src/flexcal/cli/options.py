@@ -12,10 +12,17 @@ from flexcal.errors import InputError
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
 PoseFiles = Annotated[
     Positional[tuple[Path, ...]],
-    arg(metavar="POSES...", help="files of measured poses (CSV or Parquet), one or several", help_behavior_hint=""),
+    arg(
+        metavar="POSES...",
+        help="files of measured poses (CSV or Parquet), one or several",
+        help_behavior_hint="",
+    ),
 ]
 Folder = Annotated[Path, arg(metavar="DIR")]
-Json = Annotated[bool, arg(help="print one JSON document on standard output, and nothing else there", help_behavior_hint="")]
+Json = Annotated[
+    bool,
+    arg(help="print one JSON document on standard output, and nothing else there", help_behavior_hint=""),
+]
 
 
 def require_files(files: tuple[Path, ...], name: str) -> None:

@@ -32,7 +32,10 @@ def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
         kept = entry["absorbed_by"]
         parts = [f"{k['coefficient']:+.3g} {k['name']}" for k in kept[:most]]
         more = f" and {len(kept) - most} more" if len(kept) > most else ""
-        table.add_row(entry["name"], ", ".join(parts) + more if kept else "nothing: the measurements do not depend on it")
+        table.add_row(
+            entry["name"],
+            ", ".join(parts) + more if kept else "nothing: the measurements do not depend on it",
+        )
     return table
 
 
@@ -46,7 +49,9 @@ def weak_table(directions: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
-def quantity_table(title: str, quantities: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]) -> Table:
+def quantity_table(
+    title: str, quantities: Mapping[str, Mapping[str, Any]], units: Mapping[str, str]
+) -> Table:
     """One row a parameter: estimate, standard deviation, 95 % interval."""
     table = Table(title=title, title_justify="left")
     table.add_column("parameter")
@@ -54,11 +59,50 @@ def quantity_table(title: str, quantities: Mapping[str, Mapping[str, Any]], unit
         table.add_column(heading, justify="right")
     table.add_column("unit")
     for name, values in quantities.items():
+        numbers = ["not", "identifiable", ""]
         if values["identifiable"]:
             numbers = [f"{values[key]:.5g}" for key in ("std", "low", "high")]
-        else:
-            numbers = ["not", "identifiable", ""]
         table.add_row(name, f"{values['estimate']:.5g}", *numbers, units.get(name, ""))
+    return table
+
+
+def comparison_table(kind: str, joints: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> Table:
+    """One row a spring: estimate, 95 % interval and truth of its stiffness or damping; `joints` as in results.json."""
+    table = Table(title=f"{kind} ({'N m/rad' if kind == 'stiffness' else 'N m s/rad'})", title_justify="left")
+    table.add_column("spring")
+    for heading in ("estimate", "95 % from", "to", "truth", "error"):
+        table.add_column(heading, justify="right")
+    for joint, springs in joints.items():
+        for spring, values in springs.items():
+            numbers = ["not", "identifiable"]
+            if values["identifiable"]:
+                numbers = [f"{values[key]:.4g}" for key in ("low", "high")]
+            truth = values["truth"]
+            compared = ["–", "–"]
+            if truth is not None:
+                compared = [f"{truth:.4g}", f"{100 * (values['estimate'] / truth - 1):+.1f} %"]
+            table.add_row(f"{joint}.{spring}", f"{values['estimate']:.4g}", *numbers, *compared)
+    return table
+
+
+def response_table(responses: Sequence[Mapping[str, Any]]) -> Table:
+    """One row a frequency response: band, and median relative standard deviation of its diagonal."""
+    table = Table(title="frequency responses", title_justify="left")
+    for heading in ("pose", "lines", "Hz", "relative std", "of it noise", "freedom"):
+        table.add_column(heading, justify="right")
+    table.add_column("file")
+    for r in responses:
+        band = f"{r['lowest_hz']:g} – {r['highest_hz']:g}"
+        std, noise = f"{100 * r['relative_std']:.2f} %", f"{100 * r['relative_noise_std']:.2f} %"
+        table.add_row(
+            str(r["pose"]),
+            str(r["lines"]),
+            band,
+            std,
+            noise,
+            f"{r['degrees_of_freedom']:.0f}",
+            str(r["file"]),
+        )
     return table
 
 

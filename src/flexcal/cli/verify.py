@@ -18,7 +18,9 @@ class Verify:
 
     robot: Robot
     poses: PoseFiles
-    estimates: Annotated[Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")] = None
+    estimates: Annotated[
+        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+    ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder to leave results.json in."""

@@ -108,9 +108,9 @@ def resample(t: np.ndarray, values: np.ndarray, base: TimeBase) -> np.ndarray:
 def uniform_blocks(blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Iterator[tuple[TimeBase, np.ndarray]]:
     """Blocks of ascending time stamps (N,) with values (N, m), put on one uniform base as they come.
 
-    The time step is that of the first block (of at least 200 samples). What follows without a gap continues the base of the block before; after
-    a gap the base starts anew, and `gap` says how long it was. A block may hold back its last samples for the next.
-    Raises `FlexcalError` where there are fewer than two samples in all.
+    The time step is that of the longest stretch of the first block (of at least 200 samples). What follows without a
+    gap continues the base of the block before; after a gap the base starts anew, and `gap` says how long it was. A
+    block may hold back its last samples for the next. Raises `FlexcalError` for fewer than two samples in all.
     """
     step, gap, origin, done = 0.0, 0.0, None, 0
     t, values = np.zeros(0), np.zeros(0)
@@ -122,10 +122,11 @@ def uniform_blocks(blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Iterator[
         if not step and t.size < 2:
             raise FlexcalError("a recording needs at least two samples.")
         edges = [0, *(gaps(t, step or None) + 1), t.size]
+        if not step:
+            first, end = max(pairwise(edges), key=lambda edge: edge[1] - edge[0])
+            step = fit_time_base(t[first:end]).time_step if end - first > 1 else float(np.median(np.diff(t)))
         for first, end in pairwise(edges):
             piece, whole = t[first:end], last or end < t.size
-            if not step:
-                step = fit_time_base(piece).time_step if piece.size > 1 else float(np.median(np.diff(t)))
             start = _start(piece, step) if origin is None else origin + done * step
             steps = (piece[-1] - start) / step
             count = round(steps) + 1 if whole else int(steps) - 2

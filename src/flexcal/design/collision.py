@@ -31,12 +31,13 @@ class Shape:
 class CollisionChecker:
     """Collision of the nominal robot with itself, with `floor` and with the obstacles that robot.yaml declares.
 
-    `margin` (m): bodies nearer than this count as touching. `floor` is the height (m, along z of the base frame) below which nothing but
-    the base and the first link may reach: the surface on which the robot stands; None for no such surface. Shapes of one link (fixed
-    joints belong to the link that carries them) and of neighbouring links are never compared. Nor are pairs that touch in each of 200
-    configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names them. A mesh counts as its
-    convex hull. A payload, the reflector's mount and cables have no shape and are not seen. Without collision shapes in the URDF nothing
-    collides. Raises `InputError` where shapes or obstacles cannot be read.
+    `margin` (m): bodies nearer than this count as touching. `floor` is the height (m, along z of the base frame) below which nothing
+    but the base and the first link may reach: the surface on which the robot stands; None for no such surface. Shapes of one link
+    (fixed joints belong to the link that carries them) and of neighbouring links are never compared. Nor are pairs that overlap in each
+    of 200 configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names them. Pairs that never
+    come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull. A payload, the
+    reflector's mount and cables have no shape and are not seen. Without collision shapes in the URDF nothing collides. Raises
+    `InputError` where shapes or obstacles cannot be read.
     """
 
     def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
@@ -57,16 +58,11 @@ class CollisionChecker:
             self._geometry.addGeometryObject(pin.GeometryObject(_FLOOR, 0, 0, pin.SE3.Identity(), plane))
         self._data = self._model.createData()
         pairs = self._comparable()
-        self._set_pairs(pairs)
-        always = np.ones(len(pairs), dtype=bool)
-        for values in self._configurations(even_configurations(model, _SAMPLES)):
-            if not always.any():
-                break
-            always &= self._touching(values)
-        self.permanent = tuple(
-            self._names(pair) for pair, touches in zip(pairs, always, strict=True) if touches
-        )
-        self._set_pairs([pair for pair, touches in zip(pairs, always, strict=True) if not touches])
+        overlap = self._always_touching(pairs, [0.0] * len(pairs))
+        self.permanent = tuple(self._names(pair) for pair in overlap)
+        pairs = [pair for pair in pairs if pair not in overlap]
+        near = self._always_touching(pairs, [margin] * len(pairs))
+        self._checked = self._set_pairs(pairs, [0.0 if pair in near else margin for pair in pairs])
 
     @property
     def shapes(self) -> tuple[Shape, ...]:
@@ -119,15 +115,25 @@ class CollisionChecker:
                     result.append((i, j))
         return result
 
-    def _set_pairs(self, pairs: list[tuple[int, int]]) -> None:
+    def _set_pairs(self, pairs: list[tuple[int, int]], margins: list[float]) -> Any:
         import pinocchio as pin
 
         self._geometry.removeAllCollisionPairs()
         for first, second in pairs:
             self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-        self._checked = self._geometry.createData()
-        for request in self._checked.collisionRequests:
-            request.security_margin = self.margin
+        checked = self._geometry.createData()
+        for request, margin in zip(checked.collisionRequests, margins, strict=True):
+            request.security_margin = margin
+        return checked
+
+    def _always_touching(self, pairs: list[tuple[int, int]], margins: list[float]) -> list[tuple[int, int]]:
+        self._checked = self._set_pairs(pairs, margins)
+        always = np.ones(len(pairs), dtype=bool)
+        for values in self._configurations(even_configurations(self.model, _SAMPLES)):
+            if not always.any():
+                break
+            always &= self._touching(values)
+        return [pair for pair, touches in zip(pairs, always, strict=True) if touches]
 
     def _touching(self, values: np.ndarray) -> np.ndarray:
         import pinocchio as pin

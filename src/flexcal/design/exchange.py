@@ -93,7 +93,12 @@ class RankUpdates:
         flat = jacobian.reshape(-1, self.size)
         pool = flat.T @ flat / self.candidates
         prior = sensitivity.prior_information if criterion.uses_prior else np.zeros((self.size, self.size))
-        factor = np.linalg.cholesky(_symmetric(prior + pool))
+        try:
+            factor = np.linalg.cholesky(_symmetric(prior + pool))
+        except np.linalg.LinAlgError as problem:
+            raise FlexcalError(
+                "all candidates together leave a combination of parameters undetermined; reduce them to base parameters or give a prior."
+            ) from problem
         root = np.linalg.solve(factor, np.eye(self.size))
         self._flat = np.ascontiguousarray(flat @ root.T)
         self._offset = float(2 * np.log(np.diag(factor)).sum())
@@ -232,8 +237,9 @@ def _check(
     if start is not None:
         least = count if isinstance(criterion, SpectralCriterion) else 0
         if not least <= len(start) <= count or len(set(start)) < len(start):
+            wanted = "exactly" if least else "at most"
             raise FlexcalError(
-                f"start holds {len(start)} candidates for a set of {count}; give {'exactly' if least else 'at most'} {count} different ones."
+                f"start holds {len(start)} candidates for a set of {count}; give {wanted} {count} different ones."
             )
     known = np.linalg.matrix_rank(sensitivity.prior_information) if criterion.uses_prior else 0
     if determine and count * rows + known < size:

@@ -7,7 +7,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from flexcal.data.pose_plan import PosePlan
+from flexcal.data import PosePlan
 from flexcal.design.candidates import random_candidates
 from flexcal.design.collision import CollisionChecker
 from flexcal.design.criteria import (
@@ -161,6 +161,11 @@ def design_poses(
         model, q, payload=payload, point=point, station=station, noise=noise, tolerances=tolerances
     )
     base = base_sensitivity(full)
+    if 3 * count < base.identifiability.rank:
+        raise FlexcalError(
+            f"{count} poses cannot determine {base.identifiability.rank} geometric parameters of {model.name}; "
+            f"choose at least {-(-base.identifiability.rank // 3)}, better twice as many."
+        )
     if working is None:
         working = random_candidates(checker, WORKING_POSES, rng, point=point)
     weight = tool_weight(base, model, working, payload=payload, point=point, station=station)

@@ -85,7 +85,8 @@ def spectral_exchange(
 ) -> Selection:
     """As `exchange`, for E and O2-O5: excursions, then exchanges member by member, until both fail. O1 is D in other words.
 
-    Without `start` (which here must hold `count` indices) it begins twice, at the greedy and at the exchanged A-optimal set, since a set too small has σ_min = 0 and σ_min has many local optima; the better result counts.
+    Without `start` (which here must hold `count` indices) it begins twice, at the greedy and at the exchanged A-optimal set, since a set
+    too small has σ_min = 0 and σ_min has many local optima; the better result counts.
     """
     if criterion.name == "O1":
         found = exchange(sensitivity, count, DOptimal(uses_prior=False), start=start, passes=passes)

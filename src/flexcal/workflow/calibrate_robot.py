@@ -71,10 +71,11 @@ class RobotCalibration:
         )
 
     def document(self) -> dict[str, Any]:
-        """The block of results.json."""
+        """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
         selected, table = self.selected, self.selection.table if self.selection else ()
         return {
-            "identifiability": identifiability_block(selected.identifiability),
+            "identifiability": identifiability_block(self.rigid.identifiability)
+            | {"selected": identifiability_block(selected.identifiability)},
             "terms": list(selected.terms),
             "term_selection": [
                 {"terms": list(terms), "order_mm": order / MILLIMETRE, "workspace_mm": workspace / MILLIMETRE}
@@ -147,10 +148,13 @@ def calibrate_robot(
     elastic = bool(model.elastic)
     same = not elastic and tuple(wanted) == base
     selected = rigid if same else fit(model, wanted, "selected fit", elastic=elastic)
-    options = {"terms": " ".join(wanted), "loss": loss, "secant_scale": secant_scale, "elasticity": elasticity}
-    origin = provenance(
-        [robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks)
-    )
+    options = {
+        "terms": " ".join(wanted),
+        "loss": loss,
+        "secant_scale": secant_scale,
+        "elasticity": elasticity,
+    }
+    origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(with_stations(selected), provenance=origin)
     target = source if out is None else out / "estimates.yaml"
     result = RobotCalibration(nominal_errors(model, poses), rigid, selection, selected, estimate, target)
@@ -170,7 +174,9 @@ def nominal_errors(model: RobotModel, poses: PoseSet) -> ErrorStatistics:
 def with_stations(calibration: Calibration) -> Estimate:
     """The estimate with the rotation of the first station, which is held where registration put it, so that it can be stored."""
     estimate, model = calibration.estimate, calibration.model
-    names = [f"station.{station}.{key}" for station in calibration.poses.stations for key in ("rx", "ry", "rz")]
+    names = [
+        f"station.{station}.{key}" for station in calibration.poses.stations for key in ("rx", "ry", "rz")
+    ]
     held = Parameters(
         Parameter(name, "rad", model.value(name)) for name in names if name not in estimate.parameters
     )

@@ -11,11 +11,16 @@ from typing import Any
 import numpy as np
 
 from flexcal.atomic import write_text
+from flexcal.errors import InputError
 from flexcal.estimation import Dropped, Estimate, Identifiability, name_direction
 
 RESULTS = "results.json"
 
 _WEAK_DIRECTIONS = 3
+_SHOWN = 0.2
+"""Members of a combination below this share of its largest are not named."""
+_ROUNDING = 1e-9
+"""A coefficient below this, in SI units, is what rounding leaves of zero."""
 
 
 def json_text(document: Mapping[str, Any]) -> str:
@@ -28,6 +33,17 @@ def write_results(folder: Path, document: Mapping[str, Any]) -> None:
     write_text(folder / RESULTS, json_text(document) + "\n")
 
 
+def read_results(folder: Path) -> dict[str, Any]:
+    """The document that a verb left in `folder`; raises `InputError` where there is none."""
+    path = folder / RESULTS
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as problem:
+        raise InputError(
+            f"{path} cannot be read ({problem}); run the verb that leaves it again."
+        ) from problem
+
+
 def quantities(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, dict[str, Any]]:
     """Every parameter of an estimate as {estimate, std, low, high, truth, identifiable}, by name."""
     known = truth or {}
@@ -37,7 +53,10 @@ def quantities(estimate: Estimate, truth: Mapping[str, float] | None = None) -> 
 def dropped_parameters(dropped: Iterable[Dropped]) -> list[dict[str, Any]]:
     """The dropped parameters and what absorbed each: kept + coefficient · dropped is what the kept one estimates."""
     return [
-        {"name": d.name, "absorbed_by": [{"name": name, "coefficient": c} for name, c in d.absorbed_by]}
+        {
+            "name": d.name,
+            "absorbed_by": [{"name": n, "coefficient": c} for n, c in d.absorbed_by if abs(c) > _ROUNDING],
+        }
         for d in dropped
     ]
 
@@ -53,7 +72,7 @@ def identifiability_block(found: Identifiability) -> dict[str, Any]:
         "weak_directions": [
             {
                 "relative_singular_value": float(found.singular_values[i]),
-                "direction": name_direction(found.directions[i], found.names),
+                "direction": name_direction(found.directions[i], found.names, threshold=_SHOWN),
             }
             for i in weakest
         ],

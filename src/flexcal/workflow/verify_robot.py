@@ -31,7 +31,7 @@ class RobotVerification:
     nominal: ErrorStatistics | None
 
     def document(self) -> dict[str, Any]:
-        """The block of results.json; `predicted_std_mm` is the mean 1σ of the distance that the calibration promises."""
+        """The content of results.json; `predicted_std_mm` is the mean 1σ of the distance that the calibration promises."""
         result = self.result
         measured = result.all.in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
@@ -62,7 +62,9 @@ def verify_robot(
         )
     poses = read_poses(list(files), model, require_motion=False)
     if poses.length is not None:
-        raise InputError(f"{files[0]} measures lengths of a wire, which cannot be verified yet; give points x, y, z.")
+        raise InputError(
+            f"{files[0]} measures lengths of a wire, which cannot be verified yet; give points x, y, z."
+        )
     for station in poses.stations:
         if f"station.{station}.x" not in model.posterior.parameters:
             raise FlexcalError(

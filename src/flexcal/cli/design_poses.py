@@ -1,0 +1,81 @@
+"""`flexcal design poses`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot
+
+
+@dataclass(frozen=True)
+class DesignPoses:
+    """Choose the poses that tell most about the robot's geometric errors, within joint limits, free of collision, seen by the instrument.
+
+    For a verification, --random draws poses all over the workspace instead.
+    """
+
+    robot: Robot
+    count: Annotated[int, arg(metavar="N")] = 40
+    """Number of poses."""
+    out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
+    """File for the plan."""
+    random: bool = False
+    """Random poses, for a verification; criterion and candidates do not count then."""
+    criterion: Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"] = "c"
+    """c: least predicted tool error; A, D, E: of the parameters' covariance; O1-O5: observability indices."""
+    candidates: Annotated[int, arg(metavar="N")] = 4000
+    """Random poses to choose from."""
+    payload: Annotated[
+        float | None, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+    ] = None
+    """Payload held in the poses, kg."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Of the random poses."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Choose, and print how good the choice is."""
+        from flexcal.workflow.design_poses import plan_calibration_poses, plan_verification_poses
+
+        console = Console(self.json)
+        if self.random:
+            drawn = plan_verification_poses(
+                self.robot, self.out, self.count, payload=self.payload, seed=self.seed
+            )
+            console.say(f"wrote {self.out}: {self.count} random poses")
+            console.finish(drawn.document(), f"measure them, then flexcal verify {self.robot} MEASURED.csv")
+            return
+        with console.progress() as progress:
+            found = plan_calibration_poses(
+                self.robot,
+                self.out,
+                self.count,
+                criterion=self.criterion,
+                candidates=self.candidates,
+                payload=self.payload,
+                seed=self.seed,
+                progress=progress,
+            )
+        document = found.document()
+        seen = document["identifiability"]
+        console.say(
+            f"{seen['rank']} of {seen['parameters']} parameters can be told apart by position measurements"
+        )
+        console.say(
+            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over the workspace); "
+            f"from {document['enough_poses']} poses on it falls by averaging only"
+        )
+        for joint, sides in document["flanks"].items():
+            console.say(
+                f"{joint}: {sides['positive']} poses on one flank of its backlash, {sides['negative']} on the other"
+            )
+        console.say(f"wrote {self.out}: {self.count} poses")
+        console.finish(
+            document,
+            f"flexcal measure {self.out} --cell virtual --out measured, or measure them on the robot",
+        )

@@ -1,0 +1,42 @@
+"""`flexcal export urdf`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot
+
+
+@dataclass(frozen=True)
+class ExportUrdf:
+    """Write the calibrated robot as URDF: joint origins and tool moved to where they were found to be.
+
+    A URDF cannot hold deflection, backlash and transmission error; what leaving them out costs is said in millimetres.
+    """
+
+    robot: Robot
+    out: Annotated[Path, arg(metavar="FILE")]
+    """The URDF to write."""
+    estimates: Annotated[
+        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+    ] = None
+    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Export, and say what is lost."""
+        from flexcal.workflow.export_robot import export_urdf
+
+        console = Console(self.json)
+        found = export_urdf(self.robot, self.out, estimates=self.estimates)
+        console.say(f"wrote {found.export}")
+        if not found.calibrated:
+            console.say(
+                f"there are no estimates: this is the nominal robot; run 'flexcal calibrate {self.robot} POSES…' first"
+            )
+        console.finish(found.document())

@@ -1,0 +1,70 @@
+"""`flexcal identify stiffness`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot, require_files
+
+
+@dataclass(frozen=True)
+class IdentifyStiffness:
+    """Fit stiffness and damping of drives and bearings to frequency responses.
+
+    Writes estimates.yaml beside robot.yaml, for 'calibrate' to use. Link inertias, rotor inertias, friction and delays are estimated too,
+    starting from what CAD knows of them.
+    """
+
+    robot: Robot
+    responses: Annotated[
+        Positional[tuple[Path, ...]],
+        arg(
+            metavar="RESPONSES...",
+            help="files of 'identify response', or their folder",
+            help_behavior_hint="",
+        ),
+    ]
+    inertias_known: bool = False
+    """Take link inertias as exact."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Of the search for a start."""
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for estimates.yaml and results.json, in place of estimates.yaml beside robot.yaml."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the springs."""
+        from flexcal.cli.tables import quantity_table
+        from flexcal.workflow.identify_stiffness import identify_robot_stiffness
+
+        require_files(self.responses, "RESPONSES")
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_stiffness(
+                self.robot,
+                self.responses,
+                inertias_known=self.inertias_known,
+                seed=self.seed,
+                out=self.out,
+                progress=progress,
+            )
+        document = found.document()
+        quantities = document["parameters"]
+        units = {item.name: item.unit for item in found.estimate.parameters}
+        for title, ending in (("stiffness", ".stiffness"), ("damping", ".damping")):
+            shown = {name: values for name, values in quantities.items() if name.endswith(ending)}
+            console.show(quantity_table(title, shown, units))
+        fit = document["fit"]
+        if fit["status"] != "converged":
+            console.say(f"the fit has not converged ({fit['message']}); do not trust it")
+        if fit["reduced_chi2"] is not None:
+            console.say(
+                f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"
+            )
+        console.say(f"wrote {found.estimates}")
+        console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

@@ -1,0 +1,65 @@
+"""`flexcal measure`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Carry out a plan of 'design frequency' or 'design poses': in the virtual cell, or by taking over files that were recorded before."""
+
+    plan: Annotated[Positional[Path], arg(metavar="PLAN", help="the plan (YAML)")]
+    cell: Annotated[str, arg(metavar="virtual|DIR")]
+    """virtual, or a folder with plan.yaml and the joint logs or poses.csv measured by it."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for the measurements."""
+    robot: Annotated[
+        Path | None,
+        arg(metavar="ROBOT", help_behavior_hint="(default: beside PLAN, else in the current folder)"),
+    ] = None
+    """robot.yaml."""
+    config: Annotated[
+        Path | None, arg(metavar="FILE", help_behavior_hint="(default: cell.yaml beside robot.yaml)")
+    ] = None
+    """Settings of the virtual cell."""
+    truth: Annotated[
+        Path | None, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")
+    ] = None
+    """Hidden truth of the virtual cell."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Of the virtual cell's hidden truth and noise."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Measure, and say what lies where."""
+        from flexcal.workflow.experiment_files import robot_file
+        from flexcal.workflow.measure import measure
+
+        console = Console(self.json)
+        robot = robot_file(self.plan, self.robot)
+        with console.progress() as progress:
+            found = measure(
+                robot,
+                self.plan,
+                self.cell,
+                self.out,
+                config=self.config,
+                seed=self.seed,
+                truth=self.truth,
+                progress=progress,
+            )
+        if found.recordings:
+            console.say(f"wrote {found.recordings} recordings of {found.poses} poses to {self.out}")
+            following = f"flexcal identify response {robot} {self.out} --out responses"
+        else:
+            console.say(f"wrote {found.poses} measured points to {self.out / 'poses.csv'}")
+            following = f"flexcal calibrate {robot} {self.out / 'poses.csv'}"
+        console.finish(found.document(), following)

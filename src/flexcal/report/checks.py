@@ -1,0 +1,125 @@
+"""The questions that decide whether a calibration can be trusted, each answered from the results."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.calibration import Calibration, Verification
+from flexcal.estimation import Estimate, Identifiability
+from flexcal.report.figures.predicted_quantiles import prediction_std
+from flexcal.report.notation import millimetres
+from flexcal.report.page import Check
+
+BOUND_95 = 1.6142
+"""Distance in standard deviations (of the distance) that 95 % of errors stay below when they are alike in three directions."""
+
+FEW_POSES = 20
+CLEAR_GAP = 3.0
+
+
+def check_fresh_poses(calibration: Calibration, verification: Verification) -> Check:
+    """Whether accuracy was judged on enough poses that the fit never saw, and holds there."""
+    question = "Was it checked on poses that the fit never saw?"
+    fitted, fresh = calibration.errors, verification.all
+    answer = (
+        f"Yes, on {fresh.poses}: 9 of 10 are within {millimetres(fresh.p90)} mm there, and within {millimetres(fitted.p90)} mm on the "
+        f"{fitted.poses} poses of the fit."
+    )
+    if fresh.poses < FEW_POSES:
+        return Check(question, f"{answer} That is few; verify on {FEW_POSES} or more.", "care")
+    if fresh.p90 > 3 * fitted.p90:
+        return Check(
+            question, f"{answer} Fresh poses are much worse: the fit has learnt its own poses or misses a term.", "care"
+        )
+    return Check(question, answer, "good")
+
+
+def check_claimed_uncertainty(verification: Verification, noise: np.ndarray | None = None) -> Check:
+    """Whether errors at verification poses stay within the bounds that the parameters' covariance predicts."""
+    question = "Are the errors as large as predicted?"
+    clear = ~verification.ambiguous
+    std = prediction_std(verification, noise)[clear]
+    if not clear.any() or not (std > 0).all():
+        return Check(question, "No uncertainty was predicted at these poses, so it cannot be compared.", "care")
+    size = np.linalg.norm(verification.errors[clear], axis=1)
+    inside = float((size < BOUND_95 * std).mean())
+    scale = float(np.sqrt((size**2).mean() / (std**2).mean()))
+    answer = (
+        f"{100 * inside:.0f} % of the poses with a certain flank lie within the bound predicted for 95 % of them; "
+        f"errors are {scale:.2f} times the predicted size."
+    )
+    if inside < 0.75:
+        return Check(question, f"{answer} The predicted uncertainties are too small: the model lacks something.", "bad")
+    if inside < 0.88:
+        return Check(question, f"{answer} Predicted uncertainties are somewhat too small.", "care")
+    return Check(question, answer, "good")
+
+
+def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = True) -> Check:
+    """Whether what the fit leaves is what the measurement noise explains."""
+    if estimate.status != "converged":
+        return Check(question, f"The fit did not end well: {estimate.message}.", "bad")
+    if not sigma_given:
+        return Check(
+            question,
+            "The files state no measurement noise, so the scatter about the fit stands for it and this cannot be judged.",
+            "care",
+        )
+    value = estimate.reduced_chi2
+    answer = f"χ² per degree of freedom is {value:.2f}; one means that noise explains everything that is left."
+    if not np.isfinite(value) or value > 4:
+        return Check(question, f"{answer} The model misses something that is much larger than the noise.", "bad")
+    if value > 1.6:
+        return Check(question, f"{answer} Something small is missing from the model.", "care")
+    if value < 0.4:
+        return Check(question, f"{answer} The stated noise is too large.", "care")
+    return Check(question, answer, "good")
+
+
+def check_rank(found: Identifiability) -> Check:
+    """Whether the parameters that the poses determine stand clear of those that they do not."""
+    question = "Is it clear which parameters the poses determine?"
+    dropped = len(found.names) - found.rank
+    answer = f"{found.rank} of {len(found.names)} geometric parameters are determined; "
+    if not dropped:
+        return Check(question, f"{answer}none had to be dropped.", "good")
+    clear = found.gap >= CLEAR_GAP
+    answer += f"the {dropped} others are absorbed by them, with a gap of {found.gap:.0f} decades between the two groups."
+    return Check(question, answer if clear else f"{answer} That gap is small.", "good" if clear else "care")
+
+
+def check_springs(estimate: Estimate, stiffness: Sequence[str], damping: Sequence[str]) -> Check:
+    """Whether the data determine every stiffness."""
+    question = "Are all stiffnesses determined by the data?"
+
+    def seen(names: Sequence[str]) -> int:
+        return sum(estimate.interval(name) is not None for name in names)
+
+    answer = f"{seen(stiffness)} of {len(stiffness)} stiffnesses and {seen(damping)} of {len(damping)} dampings are."
+    if seen(stiffness) == len(stiffness):
+        return Check(question, f"{answer} Damping does not affect accuracy at rest.", "good")
+    return Check(question, f"{answer} What is missing rests on robot.yaml; change poses or payload.", "care")
+
+
+def check_flanks(verification: Verification) -> Check:
+    """Whether it is certain at every pose on which side of its backlash a joint rests."""
+    question = "Is it certain on which side of the backlash each joint rests?"
+    unclear, all_ = int(verification.ambiguous.sum()), len(verification.ambiguous)
+    if not unclear:
+        return Check(question, f"Yes, at all {all_} verification poses.", "good")
+    largest = float(np.linalg.norm(verification.errors[verification.ambiguous], axis=1).max())
+    answer = (
+        f"Not at {unclear} of {all_}: gravity hardly loads the joint there, and the worst of them is "
+        f"{millimetres(largest)} mm off; elsewhere the worst is {millimetres(verification.unambiguous.max)} mm."
+    )
+    return Check(question, answer, "good" if unclear <= 0.1 * all_ else "care")
+
+
+def check_truth(covered: int, total: int) -> Check:
+    """Whether the 95 % intervals contain the truth, where it is known."""
+    question = "Do the 95 % intervals contain the truth?"
+    answer = f"{covered} of {total} do ({100 * covered / total:.0f} %). Only a simulated robot can tell."
+    share = covered / total
+    return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")

@@ -1,0 +1,143 @@
+"""What a report page is made of, before it becomes HTML."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Literal
+
+if TYPE_CHECKING:
+    import plotly.graph_objects as go
+
+Status = Literal["good", "care", "bad"]
+
+
+@dataclass(frozen=True)
+class Check:
+    """One question about trust, its answer in a sentence, and whether that is good news."""
+
+    question: str
+    answer: str
+    status: Status
+
+
+@dataclass(frozen=True)
+class Fact:
+    """One of the three questions of the first screen, answered by a number; `status` colours only a judgement."""
+
+    question: str
+    value: str
+    unit: str
+    detail: str
+    status: Status | None = None
+
+
+@dataclass(frozen=True)
+class Rung:
+    """A range of errors on the first screen's scale: mean, 90th percentile and maximum in metres (nan where unknown)."""
+
+    label: str
+    mean: float
+    p90: float
+    maximum: float
+    kind: Literal["nominal", "rigid", "elastic", "floor", "published"]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """The first screen."""
+
+    status: Status
+    headline: str
+    sentence: str
+    facts: tuple[Fact, ...]
+    rungs: tuple[Rung, ...]
+    rungs_caption: str
+    checks: tuple[Check, ...]
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table; the first cell of a row names it. `text_columns` are the numbers of columns that hold words.
+
+    `strong` are numbers of rows that matter most, `folded` hides the table behind its caption until asked for.
+    """
+
+    id: str
+    caption: str
+    columns: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    note: str = ""
+    text_columns: tuple[int, ...] = ()
+    strong: tuple[int, ...] = ()
+    folded: bool = False
+    kind: Literal["table"] = "table"
+
+
+@dataclass(frozen=True)
+class Selector:
+    """A choice of which traces a figure shows: those whose `meta[key]` is the chosen option, or that have no such key."""
+
+    label: str
+    key: str
+    options: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class FigureBlock:
+    """A figure with what a reader needs: title, how to read it, and a description for those who cannot see it."""
+
+    id: str
+    title: str
+    figure: go.Figure
+    caption: str
+    description: str
+    selectors: tuple[Selector, ...] = ()
+    kind: Literal["figure"] = "figure"
+
+
+@dataclass(frozen=True)
+class Text:
+    """Paragraphs, and points beneath them, with a heading of their own where there is one."""
+
+    paragraphs: tuple[str, ...]
+    title: str = ""
+    points: tuple[str, ...] = ()
+    kind: Literal["text"] = "text"
+
+
+Block = Table | FigureBlock | Text
+
+
+@dataclass(frozen=True)
+class Section:
+    """A part of the report under one heading."""
+
+    id: str
+    title: str
+    lead: str
+    blocks: tuple[Block, ...]
+
+
+@dataclass(frozen=True)
+class Page:
+    """A whole report; `document` is embedded for machines."""
+
+    title: str
+    subtitle: str
+    verdict: Verdict
+    sections: Sequence[Section]
+    document: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def figures(self) -> tuple[FigureBlock, ...]:
+        """All figures in the order of the page."""
+        return tuple(b for s in self.sections for b in s.blocks if isinstance(b, FigureBlock))
+
+
+def worst(checks: Sequence[Check]) -> Status:
+    """The status of the least good check."""
+    for status in ("bad", "care"):
+        if any(check.status == status for check in checks):
+            return status
+    return "good"

@@ -1,0 +1,80 @@
+"""Which geometric parameters the poses determine, and what absorbed the others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.estimation import Identifiability
+from flexcal.report.figures.singular_values import singular_values
+from flexcal.report.notation import significant
+from flexcal.report.page import Block, FigureBlock, Table, Text
+from flexcal.report.publication import Publication
+
+_MOST = 4
+
+
+def identifiability_blocks(found: Identifiability, paper: Publication | None) -> tuple[Block, ...]:
+    """The gap, the dropped parameters and the weakest directions that were kept."""
+    dropped = len(found.names) - found.rank
+    words = (
+        f"Of {len(found.names)} geometric parameters, the measured points determine {found.rank} combinations. The other {dropped} would "
+        "move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, cannot be told apart. "
+        "They stay at their nominal values, and the kept ones absorb what they would have been; predictions lose nothing by it."
+    )
+    paragraphs = [words]
+    if paper is not None and paper.rank is not None and paper.rank != found.rank:
+        paragraphs.append(
+            f"The paper keeps {paper.rank} of {paper.parameters}. Exact derivatives give {found.rank}; derivatives by one-sided "
+            "differences blur the gap below, which the figure shows to be wide, and can make a dependent parameter look independent."
+        )
+    blocks: list[Block] = [
+        Text(tuple(paragraphs), "What the poses can and cannot tell"),
+        FigureBlock(
+            "figure-rank",
+            "The gap between determined and undetermined",
+            singular_values(found),
+            "Each mark is one direction in the space of parameters, by how far it moves the measured points, relative to the strongest. "
+            "Blue directions are determined; grey ones are rounding errors of the computer. The wider the gap between them, the less the "
+            "choice depends on a threshold.",
+            f"Singular values and the diagonal of R of {len(found.names)} parameters; {found.rank} are kept, {dropped} are smaller by "
+            f"{found.gap:.0f} decades.",
+        ),
+    ]
+    if dropped:
+        blocks.append(_dropped_table(found))
+    blocks.append(_weak_table(found))
+    return tuple(blocks)
+
+
+def _dropped_table(found: Identifiability) -> Table:
+    rows = []
+    for item in found.dropped:
+        terms = [f"{significant(c, 3)} × {name}" for name, c in item.absorbed_by[:_MOST]]
+        more = len(item.absorbed_by) - len(terms)
+        if more > 0:
+            terms.append(f"and {more} more")
+        rows.append((item.name, "; ".join(terms) if terms else "nothing: the points do not depend on it"))
+    return Table(
+        "table-dropped",
+        f"The {len(rows)} dropped parameters, and what absorbed each",
+        ("dropped parameter", "absorbed by (amount per unit of the dropped one, SI)"),
+        tuple(rows),
+        text_columns=(1,),
+    )
+
+
+def _weak_table(found: Identifiability) -> Table:
+    weakest = np.arange(found.rank - 1, max(-1, found.rank - 4), -1)
+    from flexcal.estimation import name_direction
+
+    rows = tuple(
+        (name_direction(found.directions[i], found.names, threshold=0.15), f"{found.singular_values[i]:.1e}")
+        for i in weakest
+    )
+    return Table(
+        "table-weak",
+        "The weakest combinations that were kept",
+        ("combination", "strength, relative to the strongest"),
+        rows,
+        "These have the widest intervals; more or better spread poses strengthen them.",
+    )

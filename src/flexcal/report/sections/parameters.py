@@ -1,0 +1,54 @@
+"""The table of estimated geometric parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from flexcal.estimation import Estimate
+from flexcal.report.notation import NOTHING, scaled, significant
+from flexcal.report.page import Table
+
+
+def parameter_table(
+    estimate: Estimate, names: tuple[str, ...], truth: Mapping[str, float] | None, *, folded: bool = True
+) -> Table:
+    """Estimate, 95 % interval and, where known, the regrouped truth of the named parameters."""
+    should = estimate.regrouped(truth) if truth is not None else None
+    rows = []
+    for name in names:
+        factor, unit = scaled(estimate.parameters[name].unit)
+        interval, value = estimate.interval(name), estimate.values[name]
+        if interval is None:
+            cells = ["not determined by these data", NOTHING]
+        else:
+            bounds = [significant(factor * v, 3) for v in interval]
+            cells = [significant(factor * value, 3), f"{bounds[0]} to {bounds[1]}"]
+        if should is not None:
+            inside = interval is not None and interval[0] <= should[name] <= interval[1]
+            cells += [significant(factor * should[name], 3), "yes" if inside else "no"]
+        rows.append((name, unit, *cells))
+    columns = ("parameter", "unit", "estimate", "95 % interval")
+    if should is not None:
+        columns += ("truth, regrouped", "in interval")
+    note = (
+        "A kept parameter estimates a combination: the truth beside it has what the dropped parameters really are added in the same way."
+        if should is not None
+        else "A kept parameter estimates a combination: itself and what it absorbed of the dropped ones."
+    )
+    return Table(
+        "table-parameters",
+        f"All {len(rows)} estimated geometric parameters",
+        columns,
+        tuple(rows),
+        note,
+        text_columns=(1,),
+        folded=folded,
+    )
+
+
+def coverage(estimate: Estimate, names: tuple[str, ...], truth: Mapping[str, float]) -> tuple[int, int]:
+    """How many 95 % intervals contain the (regrouped) truth, of how many."""
+    should = estimate.regrouped(truth)
+    seen = [(estimate.interval(name), should[name]) for name in names if name in truth]
+    known = [(interval, value) for interval, value in seen if interval is not None]
+    return sum(low <= value <= high for (low, high), value in known), len(known)

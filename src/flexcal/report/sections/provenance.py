@@ -1,0 +1,28 @@
+"""Where the numbers come from, and how to get them again."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from importlib.metadata import version
+
+from flexcal.report.page import Block, Section, Table, Text
+
+
+def provenance_section(
+    command: str, seed: int | None, seconds: Mapping[str, float], origin: Mapping[str, str]
+) -> Section:
+    """Program version, seed, inputs with their hashes, the command, and how long each stage took."""
+    rows = [("program", f"flexcal {version('flexcal')}")]
+    rows += [("command", command)] if command else []
+    rows += [("seed of all random numbers", str(seed))] if seed is not None else []
+    rows += [(name, value) for name, value in origin.items()]
+    blocks: list[Block] = [
+        Table("table-provenance", "What made this report", ("", "value"), tuple(rows), text_columns=(1,))
+    ]
+    if seconds:
+        times = tuple((name, f"{value:.1f} s") for name, value in seconds.items())
+        strong = tuple(k for k, (name, _) in enumerate(times) if name == "total")
+        blocks.append(Table("table-seconds", "How long each stage took", ("stage", "time"), times, strong=strong))
+    if command:
+        blocks.append(Text(("The same command with the same program gives the same numbers; only the durations differ.",)))
+    return Section("provenance", "Provenance", "", tuple(blocks))

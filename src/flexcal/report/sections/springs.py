@@ -1,0 +1,90 @@
+"""Table 1: stiffness and damping with intervals, beside the truth and what was published."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from flexcal.estimation import Estimate
+from flexcal.report.notation import NOTHING, percent, scaled, significant, spring_label
+from flexcal.report.page import Table
+
+
+def spring_names(estimate: Estimate, kind: str) -> tuple[str, ...]:
+    """Names of all stiffnesses or all dampings (`kind`) of drives and bearings in an estimate."""
+    parts = ("drive", "bearing_x", "bearing_y")
+    names = (name.rsplit(".", 2) for name in estimate.parameters.names if name.count(".") >= 2)
+    return tuple(".".join(n) for n in names if n[2] == kind and n[1] in parts)
+
+
+def spring_table(
+    estimate: Estimate, kind: str, truth: Mapping[str, float] | None, published: Mapping[str, float], source: str
+) -> Table:
+    """Every stiffness or damping; columns of truth and publication only where there is any."""
+    names = spring_names(estimate, kind)
+    factor, unit = scaled("N m/rad" if kind == "stiffness" else "N m s/rad")
+    with_published = any(name in published for name in names)
+    columns = ["spring", f"estimate ({unit})", "95 % interval", "std"]
+    columns += ["truth", "difference", "truth in interval"] if truth is not None else []
+    columns += [source] if with_published else []
+    rows = tuple(_row(estimate, name, factor, truth, published if with_published else None) for name in names)
+    note = (
+        "Orientation only: the published robot is another individual, and on a simulated robot the truth is drawn around these values."
+        if with_published
+        else ""
+    )
+    return Table(
+        id=f"table-{kind}",
+        caption=f"Table 1: {kind} of drives and bearings",
+        columns=tuple(columns),
+        rows=rows,
+        note=note,
+    )
+
+
+def unseen_springs(estimate: Estimate) -> tuple[str, ...]:
+    """A sentence for every stiffness and damping that the data do not determine."""
+    sentences = []
+    for kind in ("stiffness", "damping"):
+        for name in spring_names(estimate, kind):
+            if estimate.interval(name) is None:
+                sentences.append(f"{spring_label(name)}, {kind}: {_reason(estimate, name)}")
+    return tuple(sentences)
+
+
+def _row(
+    estimate: Estimate, name: str, factor: float, truth: Mapping[str, float] | None, published: Mapping[str, float] | None
+) -> tuple[str, ...]:
+    interval, value = estimate.interval(name), estimate.values[name]
+    if interval is None:
+        cells = ["not determined by these data", NOTHING, NOTHING]
+    else:
+        std = estimate.std(name) or 0.0
+        cells = [
+            significant(factor * value),
+            f"{significant(factor * interval[0])} to {significant(factor * interval[1])}",
+            percent(std / value),
+        ]
+    if truth is not None:
+        known = truth.get(name)
+        inside = interval is not None and known is not None and interval[0] <= known <= interval[1]
+        cells.append(significant(None if known is None else factor * known))
+        cells.append(NOTHING if interval is None or known is None else percent(value / known - 1, signed=True))
+        cells.append(NOTHING if interval is None or known is None else "yes" if inside else "no")
+    if published is not None:
+        found = published.get(name)
+        cells.append(significant(None if found is None else factor * found))
+    return (spring_label(name), *cells)
+
+
+def _reason(estimate: Estimate, name: str) -> str:
+    number = estimate.parameters.index(name)
+    spread = float(estimate.covariance[number, number]) ** 0.5
+    dropped = next((d for d in estimate.dropped if d.name == name), None)
+    if dropped is not None and dropped.absorbed_by:
+        return f"the data cannot tell it from {', '.join(n for n, _ in dropped.absorbed_by[:3])}."
+    if dropped is not None or spread == 0:
+        return "the measured responses do not depend on it in these poses."
+    return (
+        f"the responses hardly depend on it in these poses: any value within a factor of {2.718281828 ** (1.96 * spread):.0f} fits as "
+        "well. Another pose, or a payload farther off the axis, would excite it."
+    )

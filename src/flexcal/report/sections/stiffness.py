@@ -1,0 +1,135 @@
+"""Stage 1 in the report: what shaking the motors told about springs and dampers."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.frequency import FrequencyResponse
+from flexcal.report.figures.response_fit import response_fit
+from flexcal.report.figures.response_levels import response_levels
+from flexcal.report.figures.spring_intervals import spring_intervals
+from flexcal.report.notation import percent, significant
+from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text
+from flexcal.report.sections.springs import spring_names, spring_table, unseen_springs
+from flexcal.report.study import TwoStageStudy
+from flexcal.units import DEGREE
+
+
+def stiffness_section(study: TwoStageStudy) -> Section:
+    """Fig. 5, Table 1 and Figs. 7-9."""
+    estimate, paper = study.stiffness.estimate, study.paper
+    published = paper.springs if paper else {}
+    source = paper.short if paper else ""
+    stiffness, damping = spring_names(estimate, "stiffness"), spring_names(estimate, "damping")
+    reference = study.truth if study.truth is not None else study.nominal.values
+    word = "the truth" if study.truth is not None else "robot.yaml"
+    unseen = unseen_springs(estimate)
+    first = study.responses[0]
+    labels = tuple(_label(study, k) for k in range(len(study.responses)))
+    blocks: list[Block] = [
+        spring_table(estimate, "stiffness", study.truth, published, source),
+        spring_table(estimate, "damping", study.truth, published, source),
+    ]
+    if unseen:
+        blocks.append(Text((), "Not determined by these data", unseen))
+    blocks += [
+        FigureBlock(
+            "figure-springs",
+            "Estimates and their 95 % intervals",
+            spring_intervals(estimate, stiffness, damping, reference, word),
+            f"Each dot is an estimate relative to {word}, each bar its 95 % interval: about 19 of 20 bars should reach zero where zero "
+            "is the truth. Bars that leave the picture are cut.",
+            f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to {word}, with 95 % intervals. "
+            "The numbers are in Table 1.",
+        ),
+        FigureBlock(
+            "figure-5",
+            f"Figure 5: the measured frequency response, {labels[0].lower()}",
+            response_levels(first),
+            f"How strongly each motor accelerates (row) for a torque on each motor (column), at {len(first.frequencies_hz)} frequencies. "
+            "Valleys and peaks are the arm swinging on its springs. The lower curves are one standard deviation of the mean: noise of "
+            "the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
+            _levels_in_words(first),
+        ),
+        FigureBlock(
+            "figure-7",
+            "Figures 7 to 9: measured responses against the fitted model",
+            response_fit(study.responses, study.stiffness.fitted, labels),
+            "Dots are measured, lines are the model with the one set of springs and dampers that fits all poses at once. Where an element "
+            "nearly vanishes, because the pose hardly couples the two axes, dots scatter and carry little weight.",
+            f"Magnitudes of all elements and phases of the diagonal ones in {len(labels)} poses; the table below says how well they fit.",
+            (Selector("Pose", "pose", labels),),
+        ),
+        _fit_table(study, labels),
+    ]
+    return Section(
+        "stage1",
+        "Stage 1: springs and dampers",
+        "Motors and bearings give way under load, so the arm is not where its motors are. Small random torques on the motors, and the "
+        "accelerations that answer, show how stiff each drive and each bearing is: the arm resonates where its springs say. "
+        f"{_experiment(study)}",
+        tuple(blocks),
+    )
+
+
+def _experiment(study: TwoStageStudy) -> str:
+    plan = study.plan
+    minutes = len(plan.poses) * plan.recordings_per_pose * plan.duration / 60
+    low, high = plan.frequencies_hz.min(), plan.frequencies_hz.max()
+    return (
+        f"Here: {len(plan.poses)} poses, {len(plan.lines)} frequencies from {low:.1f} to {high:.1f} Hz, {plan.realisations} random draws, "
+        f"{minutes:.0f} minutes of shaking in all."
+    )
+
+
+def _label(study: TwoStageStudy, k: int) -> str:
+    response = study.responses[k]
+    return f"Pose {response.pose + 1}"
+
+
+def _levels_in_words(response: FrequencyResponse) -> str:
+    size = np.abs(np.diagonal(response.response, axis1=1, axis2=2))
+    share = np.median(np.diagonal(response.std, axis1=1, axis2=2) / size)
+    noise = np.median(np.diagonal(response.noise_std, axis1=1, axis2=2) / size)
+    return (
+        f"Grid of {len(response.joints)} by {len(response.joints)} magnitudes against frequency. On the diagonal the standard deviation "
+        f"of the mean is {percent(float(share))} of the response at the median frequency, {percent(float(noise))} from noise alone."
+    )
+
+
+def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
+    rows = []
+    for label, response, model in zip(labels, study.responses, study.stiffness.fitted, strict=True):
+        off = np.abs(np.diagonal(response.response / model - 1, axis1=1, axis2=2))
+        scaled = np.abs(response.response - model) / response.std
+        angles = ", ".join(f"{q / DEGREE:.1f}" for q in response.q_mean)
+        payload = study.nominal.payload
+        mass = response.payload if response.payload is not None else (payload.mass if payload else 0.0)
+        rows.append(
+            (
+                label,
+                f"{angles}°",
+                f"{mass:g} kg",
+                percent(float(np.median(off))),
+                significant(float(np.sqrt((scaled**2).mean())), 3),
+                f"{response.degrees_of_freedom:.0f}",
+            )
+        )
+    estimate = study.stiffness.estimate
+    return Table(
+        "table-fit",
+        "How well the model fits, pose by pose",
+        (
+            "pose",
+            "mean joint position",
+            "payload",
+            "median misfit of the diagonal",
+            "misfit / measured std",
+            "degrees of freedom of the std",
+        ),
+        tuple(rows),
+        f"Over all poses χ² per degree of freedom is {estimate.reduced_chi2:.2f} ({estimate.degrees_of_freedom} degrees of freedom, "
+        f"{estimate.status} after {estimate.iterations} iterations). Misfit / std near one means that noise and distortion explain what "
+        "is left; the poses are the paper's A, B and C only with the paper's plan.",
+        text_columns=(1,),
+    )

@@ -1,0 +1,91 @@
+"use strict";
+// Words and tables are painted first; then Plotly, which is carried as plain text, is run and the figures are drawn one by one.
+(function () {
+  const dark = JSON.parse(document.getElementById("dark-colours").textContent);
+  const scheme = window.matchMedia("(prefers-color-scheme: dark)");
+  const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  const figures = new Map();
+  let printing = false;
+
+  function recoloured(value) {
+    if (typeof value === "string") return dark[value] || value;
+    if (Array.isArray(value)) return value.map(recoloured);
+    if (value && typeof value === "object") {
+      return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, key === "bdata" ? item : recoloured(item)]));
+    }
+    return value;
+  }
+
+  function shown(figure) {
+    return figure.data.map(function (trace) {
+      const meta = trace.meta || {};
+      const visible = Object.entries(figure.selected).every(([key, option]) => !(key in meta) || meta[key] === option);
+      return Object.assign({}, trace, { visible: visible });
+    });
+  }
+
+  function draw(id) {
+    const figure = figures.get(id);
+    const place = document.getElementById(id);
+    const narrow = place.clientWidth < 560;
+    let layout = Object.assign({}, figure.layout);
+    if (narrow) {
+      layout.font = Object.assign({}, layout.font, { size: 11 });
+      layout.margin = Object.assign({}, layout.margin, { l: Math.min(layout.margin.l, 44), r: 6 });
+      layout.dragmode = false;
+    }
+    let data = shown(figure);
+    if (scheme.matches && !printing) {
+      data = recoloured(data);
+      layout = recoloured(layout);
+    }
+    const waiting = place.querySelector(".waiting");
+    if (waiting) waiting.remove();
+    return Plotly.react(place, data, layout, config);
+  }
+
+  function drawAll() {
+    for (const id of figures.keys()) draw(id);
+  }
+
+  function start() {
+    const program = document.createElement("script");
+    program.textContent = document.getElementById("plotly").textContent;
+    if (!program.textContent) return;
+    document.head.append(program);
+    for (const holder of document.querySelectorAll("script[data-specification]")) {
+      figures.set(holder.dataset.specification, JSON.parse(holder.textContent));
+    }
+    const waiting = [...figures.keys()];
+    (function next() {
+      if (!waiting.length) {
+        document.documentElement.dataset.figures = "drawn";
+        return;
+      }
+      draw(waiting.shift());
+      setTimeout(next, 0);
+    })();
+    for (const choice of document.querySelectorAll("select[data-figure]")) {
+      choice.addEventListener("change", function () {
+        figures.get(choice.dataset.figure).selected[choice.dataset.key] = choice.value;
+        draw(choice.dataset.figure);
+      });
+    }
+    scheme.addEventListener("change", drawAll);
+    window.addEventListener("beforeprint", function () {
+      for (const folded of document.querySelectorAll("details")) folded.open = true;
+      printing = true;
+      if (scheme.matches) drawAll();
+    });
+    window.addEventListener("afterprint", function () {
+      printing = false;
+      if (scheme.matches) drawAll();
+    });
+  }
+
+  window.addEventListener("load", function () {
+    requestAnimationFrame(function () {
+      setTimeout(start, 0);
+    });
+  });
+})();

@@ -1,0 +1,82 @@
+"""Recordings of a frequency experiment to one frequency response a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data import FolderCell, MultisinePlan, Recording
+from flexcal.errors import InputError
+from flexcal.frequency import Average, FrequencyResponse, frequency_responses
+from flexcal.model import RobotModel
+from flexcal.workflow.results import write_results
+
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedResponses:
+    """The responses by pose, and the files they are in."""
+
+    responses: tuple[FrequencyResponse, ...]
+    files: tuple[Path, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json; the relative numbers are medians over lines and diagonal elements."""
+        return {"responses": [_summary(r, f) for r, f in zip(self.responses, self.files, strict=True)]}
+
+
+def identify_response(
+    robot: Path, folder: Path, out: Path, *, average: Average = "arithmetic", progress: Progress | None = None
+) -> IdentifiedResponses:
+    """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, streaming: no two recordings are ever in memory.
+
+    Raises `FlexcalError` where a log is missing, has gaps or does not fit the plan.
+    """
+    tell = progress or (lambda stage, share: None)
+    model = RobotModel.from_yaml(robot, estimates=False)
+    cell = FolderCell(folder, model)
+    plan = cell.plan
+    if not isinstance(plan, MultisinePlan):
+        raise InputError(
+            f"{folder} holds measured poses, not a frequency experiment; give them to 'flexcal calibrate'."
+        )
+    total = len(plan.poses) * plan.recordings_per_pose
+    names = [model.joint_names[i] for i in plan.joints]
+    recordings = _counted(cell.record(), total, tell)
+    responses = tuple(frequency_responses(plan, recordings, average, joint_names=names))
+    files = tuple(out / f"response_pose_{response.pose + 1}.npz" for response in responses)
+    for response, file in zip(responses, files, strict=True):
+        response.save(file)
+    result = IdentifiedResponses(responses, files)
+    write_results(out, result.document())
+    return result
+
+
+def _counted(recordings: Iterable[Recording], total: int, tell: Progress) -> Iterator[Recording]:
+    tell("responses", 0.0)
+    for number, recording in enumerate(recordings, start=1):
+        yield recording
+        tell("responses", number / total)
+
+
+def _summary(response: FrequencyResponse, file: Path) -> dict[str, Any]:
+    def relative(std: np.ndarray) -> float:
+        diagonal = np.diagonal(std / np.abs(response.response), axis1=1, axis2=2)
+        return float(np.median(diagonal))
+
+    return {
+        "pose": response.pose + 1,
+        "file": file,
+        "joints": list(response.joints),
+        "lines": len(response.frequencies_hz),
+        "lowest_hz": float(response.frequencies_hz[0]),
+        "highest_hz": float(response.frequencies_hz[-1]),
+        "degrees_of_freedom": response.degrees_of_freedom,
+        "relative_std": relative(response.std),
+        "relative_noise_std": relative(response.noise_std),
+    }

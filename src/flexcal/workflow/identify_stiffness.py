@@ -1,0 +1,105 @@
+"""Frequency responses to stiffness and damping, and estimates.yaml."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data import provenance, read_estimates, write_estimates
+from flexcal.elasticity import StiffnessResult, identify_stiffness
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+from flexcal.model.names import GEOMETRY
+from flexcal.model.stored import with_blocks
+from flexcal.workflow.experiment_files import read_responses
+from flexcal.workflow.results import dropped_parameters, quantities, write_results
+
+Progress = Callable[[str, float], None]
+
+_GEOMETRIC = (*GEOMETRY, "backlash")
+"""What the calibration knows that stage 1 does not estimate itself."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotStiffness:
+    """The result of stage 1, and the file that its estimate was written to."""
+
+    result: StiffnessResult
+    estimate: Estimate
+    estimates: Path
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+        estimate = self.estimate
+        return {
+            "stage1": springs(estimate),
+            "fit": {
+                "status": estimate.status,
+                "message": estimate.message,
+                "reduced_chi2": estimate.reduced_chi2,
+                "rank": estimate.rank,
+                "dropped": dropped_parameters(estimate.dropped),
+            },
+            "parameters": quantities(estimate),
+            "estimates": self.estimates,
+        }
+
+
+def springs(estimate: Estimate) -> dict[str, Any]:
+    """{stiffness, damping} of every spring as quantities, by joint and drive, bearing_x or bearing_y."""
+    found: dict[str, Any] = {"stiffness": {}, "damping": {}}
+    for name in estimate.parameters.names:
+        owner, _, kind = name.rpartition(".")
+        joint, _, spring = owner.rpartition(".")
+        if kind in found and joint:
+            found[kind].setdefault(joint, {})[spring] = estimate.quantity(name)
+    return found
+
+
+def identify_robot_stiffness(
+    robot: Path,
+    files: Sequence[Path],
+    *,
+    inertias_known: bool = False,
+    seed: int = 0,
+    out: Path | None = None,
+    progress: Progress | None = None,
+) -> RobotStiffness:
+    """Fit the springs of a robot.yaml to frequency responses (files, or folders of them), and store the block `stiffness`.
+
+    The robot starts from nominal, the block `dynamics`, and the geometry of the block `calibration`; what that one says of stiffness
+    and inertia came from here and is left out. With `out`, estimates and results.json go to that folder. `seed` is that of the search
+    for a start. Raises `FlexcalError` where responses do not fit the robot; nothing is written then.
+    """
+    tell = progress or (lambda stage, share: None)
+    bare = RobotModel.from_yaml(robot, estimates=False)
+    source = bare.path.parent / bare.config.estimates
+    blocks = read_estimates(source, without="stiffness") if source.exists() else {}
+    model = with_blocks(bare, {block: e for block, e in blocks.items() if block == "dynamics"}, source)
+    calibrated = blocks.get("calibration")
+    if calibrated is not None:
+        geometric = {n: v for n, v in calibrated.values.items() if n.rpartition(".")[2] in _GEOMETRIC}
+        model = model.with_values(geometric)
+    inputs, responses = read_responses(files)
+    tell("stage1", 0.0)
+    result = identify_stiffness(
+        model, responses, inertias_known=inertias_known, rng=np.random.default_rng([seed, 1]), progress=tell
+    )
+    tell("stage1", 1.0)
+    options = {"inertias_known": inertias_known, "seed": seed}
+    origin = provenance([robot, bare.urdf, *inputs], options, source if blocks else None, tuple(blocks))
+    estimate = replace(result.estimate, provenance=origin)
+    target = source if out is None else out / "estimates.yaml"
+    found = RobotStiffness(result, estimate, target)
+    others: dict[Block, Estimate] = {} if target == source else blocks
+    for block, other in others.items():
+        write_estimates(target, block, other)
+    write_estimates(target, "stiffness", estimate)
+    if out is not None:
+        write_results(out, found.document())
+    return found

@@ -1,0 +1,170 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.data import PosePlan
+from flexcal.design import (
+    CollisionChecker,
+    DOptimal,
+    SpectralCriterion,
+    base_sensitivity,
+    choose_poses,
+    design_poses,
+    exchange,
+    joint_ranges,
+    observability,
+    pose_curve,
+    pose_sensitivity,
+    preloaded,
+    random_poses,
+    visible,
+)
+from flexcal.design.poses import tool_error
+from flexcal.errors import FlexcalError
+from flexcal.model import gravity_torque
+
+POOL = Path(__file__).parent / "pose_pool.csv"
+
+
+@pytest.fixture(scope="module")
+def design(tx90l):
+    return design_poses(tx90l, 40, rng=np.random.default_rng(3), candidates=800)
+
+
+@pytest.fixture(scope="module")
+def pool(tx90l):
+    return base_sensitivity(pose_sensitivity(tx90l, np.loadtxt(POOL, delimiter=","))).sensitivity
+
+
+def test_the_plan_is_feasible_and_loads_both_flanks(tx90l, design):
+    q = design.plan.q
+    assert isinstance(design.plan, PosePlan)
+    assert q.shape == (40, 6) and len(np.unique(q, axis=0)) == 40
+    lower, upper = joint_ranges(tx90l)
+    assert np.all((q > lower) & (q < upper))
+    checker = CollisionChecker(tx90l)
+    assert visible(checker, q).all() and not checker.collides(q).any() and preloaded(tx90l, q).all()
+    assert design.flank_joints == ("joint_2", "joint_3")
+    np.testing.assert_array_equal(design.flank, np.sign(gravity_torque(tx90l, q)[:, 1:3]))
+    assert np.all(np.abs(design.flank.sum(axis=0)) < 24)  # both signs, at least a fifth of each
+
+
+def test_29_directions_are_kept(design):
+    assert (len(design.identifiability.names), design.identifiability.rank) == (47, 29)
+    assert design.identifiability.gap > 6
+
+
+def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design, rng):
+    from flexcal.design.poses import tool_weight
+
+    fresh = tool_weight(design.base, tx90l, random_poses(tx90l, 400, rng).q)
+    chosen = tool_error(design.base, fresh, design.selection.chosen)
+    drawn = [tool_error(design.base, fresh, rng.choice(800, 40, replace=False)) for _ in range(100)]
+    assert chosen < 0.95 * min(drawn)
+    assert chosen < 0.88 * np.median(drawn)
+    assert design.tool_error == pytest.approx(chosen, rel=0.05)
+
+
+def test_sigma_min_beats_the_best_of_many_random_sets(pool, rng):
+    found = exchange(pool, 40, SpectralCriterion("E"))
+    assert found.merit == pytest.approx(observability(pool, found.chosen).sigma_min)
+    drawn = [observability(pool, rng.choice(len(pool), 40, replace=False)).sigma_min for _ in range(1000)]
+    assert found.merit > 1.5 * max(drawn)
+
+
+@pytest.mark.parametrize("criterion", [DOptimal(), SpectralCriterion("E")], ids=lambda c: c.name)
+def test_one_run_comes_near_the_best_of_restarts_on_the_stored_pool(pool, rng, criterion):
+    found = exchange(pool, 40, criterion).merit
+    best = max(
+        exchange(pool, 40, criterion, start=rng.choice(len(pool), 40, replace=False)).merit for _ in range(4)
+    )
+    if criterion.name == "D":
+        assert np.exp(found - best) > 0.98  # D-efficiency
+    else:
+        assert found > 0.98 * best
+
+
+@pytest.mark.slow
+def test_d_and_sigma_min_within_two_percent_of_fifty_restarts(pool, rng):
+    for criterion in (DOptimal(), SpectralCriterion("E")):
+        found = exchange(pool, 40, criterion).merit
+        best = max(
+            exchange(pool, 40, criterion, start=rng.choice(len(pool), 40, replace=False)).merit
+            for _ in range(50)
+        )
+        assert (np.exp(found - best) if criterion.name == "D" else found / best) > 0.98
+
+
+@pytest.mark.parametrize("name", ["A", "D", "E", "O1", "O2", "O3", "O4", "O5"])
+def test_every_criterion_is_best_at_what_it_is_for(tx90l, design, name):
+    rng = np.random.default_rng(3)
+    other = design_poses(tx90l, 40, rng=rng, candidates=800, criterion=name)
+    np.testing.assert_array_equal(other.candidates, design.candidates)
+    rows = design.base.sensitivity.jacobian[design.selection.chosen].reshape(-1, 29)
+    prior = design.base.sensitivity.prior_information if other.criterion.uses_prior else 0.0
+    assert other.selection.merit > other.criterion.merit(rows.T @ rows + prior)
+    assert other.tool_error > design.tool_error
+
+
+def test_the_seed_decides_and_payload_is_kept(tx90l):
+    one, two = (
+        choose_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150, payload=3.0) for _ in range(2)
+    )
+    np.testing.assert_array_equal(one.q, two.q)
+    assert one.seed == two.seed
+    np.testing.assert_array_equal(one.payload, np.full(12, 3.0))
+    assert choose_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150).payload is None
+
+
+def test_measure_where_you_will_work(tx90l, rng):
+    corner = random_poses(tx90l, 3000, rng).q
+    corner = corner[(np.abs(corner[:, 0]) < 0.3) & (np.abs(corner[:, 1] - 0.8) < 0.4)]
+    there = design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=corner)
+    everywhere = design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600)
+    assert there.tool_error < 0.97 * tool_error(
+        everywhere.base, there.tool_weight, everywhere.selection.chosen
+    )
+
+
+def test_random_poses_ask_nothing_of_the_flank(tx90l):
+    plan = random_poses(tx90l, 300, np.random.default_rng(4))
+    checker = CollisionChecker(tx90l)
+    assert len(plan) == 300 and visible(checker, plan.q).all() and not checker.collides(plan.q).any()
+    assert not preloaded(tx90l, plan.q).all()
+
+
+def test_a_rigid_robot_without_shapes_or_station(ur5):
+    found = design_poses(ur5, 20, rng=np.random.default_rng(0), candidates=300)
+    assert found.identifiability.rank == 25  # the target lies on the last axis
+    assert found.flank.shape == (20, 0)
+
+
+def test_how_many_poses_are_enough(design):
+    curve = pose_curve(design, rng=np.random.default_rng(0))
+    assert curve.counts[0] == 10 and curve.counts[-1] == 160
+    assert np.all(np.diff(curve.chosen) < 0)
+    assert np.all(curve.chosen < curve.random)
+    at_forty = pose_curve(design, rng=np.random.default_rng(0), counts=[40], random_sets=1).chosen[0]
+    assert design.tool_error <= at_forty * 1.001 and at_forty < 1.05 * design.tool_error
+    assert curve.enough(0.5) <= curve.enough(0.1) <= 160
+    with pytest.raises(FlexcalError, match="between 1 and the 800 candidates"):
+        pose_curve(design, rng=np.random.default_rng(0), counts=[2000])
+
+
+def test_bad_input(tx90l, rng):
+    with pytest.raises(FlexcalError, match=r"9 poses cannot determine 29 .* at least 10"):
+        choose_poses(tx90l, 9, rng=rng, candidates=100)
+    with pytest.raises(FlexcalError, match="no criterion 'F'"):
+        choose_poses(tx90l, 30, rng=rng, criterion="F", candidates=100)  # type: ignore[arg-type]
+    with pytest.raises(FlexcalError, match="cannot choose 200 of 100"):
+        choose_poses(tx90l, 200, rng=rng, candidates=100)
+
+
+def test_one_flank_only_is_said_by_name(tx90l, rng):
+    from dataclasses import replace
+
+    forward = tuple(replace(j, lower=0.4, upper=1.2) if j.name == "joint_2" else j for j in tx90l.joints)
+    forward = tuple(replace(j, lower=0.0, upper=0.3) if j.name == "joint_3" else j for j in forward)
+    with pytest.raises(FlexcalError, match="joint_2 onto the same flank in all 200 usable poses"):
+        choose_poses(replace(tx90l, joints=forward), 30, rng=rng, candidates=200)
