@@ -68,7 +68,7 @@ class Calibrate:
                 f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
             )
         errors = document["calibration"]
-        terms = " + ".join(found.selected.terms)
+        terms = ("elastic, " if found.selected.model.elastic else "") + " + ".join(found.selected.terms)
         labels = {"nominal": "before (registered only)", "rigid": "rigid", "selected": f"selected: {terms}"}
         console.show(
             error_table("distance to the measured points", {labels[key]: errors[key] for key in labels})

@@ -22,6 +22,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done; 2: an input or argument that cannot be used, one sentence on standard error; 130: interrupted.
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
+    # matrices here are small: threads of the linear algebra library cost more than they give
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     try:
         status = _run(given)
         sys.stdout.flush()

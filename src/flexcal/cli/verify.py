@@ -42,4 +42,5 @@ class Verify:
         rows = {label: blocks[key] for key, label in labels.items() if key in blocks}
         console.show(error_table("distance to the measured points", rows))
         console.say(f"the parameters' uncertainty alone makes {document['predicted_std_mm']:.3f} mm (1σ)")
-        console.finish(document, f"flexcal export urdf {self.robot} --out calibrated.urdf")
+        where = "" if self.estimates is None else f" --estimates {self.estimates}"
+        console.finish(document, f"flexcal export urdf {self.robot}{where} --out calibrated.urdf")

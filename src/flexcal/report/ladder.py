@@ -21,7 +21,7 @@ class Step:
     mean: float | None
     p90: float | None
     maximum: float | None
-    words: str
+    texts: tuple[str, str, str]
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,8 @@ def ladder(rungs: Sequence[Rung]) -> Ladder:
         known = [p for p in (mean, p90, maximum) if p is not None]
         if not known:
             continue
-        named = (("mean", rung.mean), ("90 % within", rung.p90), ("worst", rung.maximum))
-        words = ", ".join(f"{name} {millimetres(v)} mm" for name, v in named if math.isfinite(v))
-        steps.append(Step(rung, min(known), max(known) - min(known), mean, p90, maximum, words))
+        texts = (millimetres(rung.mean), millimetres(rung.p90), millimetres(rung.maximum))
+        steps.append(Step(rung, min(known), max(known) - min(known), mean, p90, maximum, texts))
     ticks = [m * 10.0**e for e in range(-4, 4) for m in (1, 2, 5)]
     sparse = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
     if len(sparse) > 7:

@@ -45,7 +45,7 @@ def significant(value: float | None, digits: int = 4) -> str:
         return NOTHING
     if value == 0:
         return "0"
-    magnitude = math.floor(math.log10(abs(value)))
+    magnitude = int(f"{value:.{digits - 1}e}".rpartition("e")[2])
     if not -4 < magnitude < 5:
         return f"{value:.{digits - 1}e}".replace("-", "−")
     return f"{value:.{max(0, digits - 1 - magnitude)}f}".replace("-", "−")

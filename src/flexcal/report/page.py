@@ -60,18 +60,33 @@ class Verdict:
 class Table:
     """A table; the first cell of a row names it. `text_columns` are the numbers of columns that hold words.
 
-    `strong` are numbers of rows that matter most, `folded` hides the table behind its caption until asked for.
+    A cell that is None belongs to the one before it. `strong` are numbers of rows that matter most, `folded` hides the table behind its caption until asked for.
     """
 
     id: str
     caption: str
     columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
+    rows: tuple[tuple[str | None, ...], ...]
     note: str = ""
     text_columns: tuple[int, ...] = ()
     strong: tuple[int, ...] = ()
     folded: bool = False
     kind: Literal["table"] = "table"
+
+    @property
+    def cells(self) -> tuple[tuple[tuple[int, str, int], ...], ...]:
+        """Rows of (column, text, columns spanned)."""
+        result = []
+        for row in self.rows:
+            cells: list[tuple[int, str, int]] = []
+            for column, text in enumerate(row):
+                if text is None:
+                    first, before, span = cells.pop()
+                    cells.append((first, before, span + 1))
+                else:
+                    cells.append((column, text, 1))
+            result.append(tuple(cells))
+        return tuple(result)
 
 
 @dataclass(frozen=True)

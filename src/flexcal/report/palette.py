@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 LIGHT = {
+    "page": "#ffffff",
     "ink": "#1b1f24",
     "quiet": "#5b6470",
     "grid": "#e3e6ea",
@@ -10,10 +11,9 @@ LIGHT = {
     "elastic": "#1f6fd0",
     "rigid": "#d9541e",
     "nominal": "#7d8690",
-    "good": "#16805a",
-    "band": "#9dc3f2",
 }
 DARK = {
+    "page": "#14181d",
     "ink": "#e8ebef",
     "quiet": "#a3adb8",
     "grid": "#2b323a",
@@ -21,14 +21,10 @@ DARK = {
     "elastic": "#5a9df0",
     "rigid": "#f0804f",
     "nominal": "#949ea9",
-    "good": "#3fb98a",
-    "band": "#2c4f7d",
 }
 
-INK, QUIET, GRID, AXIS = LIGHT["ink"], LIGHT["quiet"], LIGHT["grid"], LIGHT["axis"]
-ELASTIC, RIGID, NOMINAL, GOOD, BAND = (
-    LIGHT[k] for k in ("elastic", "rigid", "nominal", "good", "band")
-)
+PAGE, INK, QUIET, GRID, AXIS = (LIGHT[k] for k in ("page", "ink", "quiet", "grid", "axis"))
+ELASTIC, RIGID, NOMINAL = (LIGHT[k] for k in ("elastic", "rigid", "nominal"))
 
 
 def dark_of() -> dict[str, str]:

@@ -52,7 +52,7 @@ TX90L_PAPER = Publication(
         "M. Neubauer, H. Gattringer, A. Müller, A. Steinhauser, W. Höbarth: A two-stage calibration method for industrial robots "
         "with joint and drive flexibilities, Mechanical Sciences, 2015"
     ),
-    short="paper (TX90L, hardware)",
+    short="paper",
     springs=MappingProxyType(_springs()),
     calibration=ErrorStatistics(40, _NAN, _NAN, 0.10 * MILLIMETRE),
     elastic=ErrorStatistics(150, _NAN, 0.23 * MILLIMETRE, 0.32 * MILLIMETRE),

@@ -136,17 +136,17 @@ def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
     rungs = [Rung("as delivered", before.mean, before.p90, before.max, "nominal")]
     for fit, verification in zip(study.rigid, study.rigid_verification, strict=True):
         s = verification.all
-        rungs.append(Rung(f"rigid calibration, {len(fit.poses)} poses", s.mean, s.p90, s.max, "rigid"))
+        rungs.append(Rung(f"rigid, {len(fit.poses)} poses", s.mean, s.p90, s.max, "rigid"))
     if study.paper is not None and study.paper.rigid is not None:
         s = study.paper.rigid
-        rungs.append(Rung("paper, rigid (hardware)", s.mean, s.p90, s.max, "published"))
+        rungs.append(Rung("paper: rigid, hardware", s.mean, s.p90, s.max, "published"))
     rungs.append(
-        Rung(f"elastic calibration, {len(study.calibration.poses)} poses", after.mean, after.p90, after.max, "elastic")
+        Rung(f"elastic, {len(study.calibration.poses)} poses", after.mean, after.p90, after.max, "elastic")
     )
     if study.paper is not None and study.paper.elastic is not None:
         s = study.paper.elastic
-        rungs.append(Rung("paper, elastic (hardware)", s.mean, s.p90, s.max, "published"))
+        rungs.append(Rung("paper: elastic, hardware", s.mean, s.p90, s.max, "published"))
     if study.floor is not None:
         s = study.floor
-        rungs.append(Rung("floor: everything known", s.mean, s.p90, s.max, "floor"))
+        rungs.append(Rung("floor: all known", s.mean, s.p90, s.max, "floor"))
     return tuple(rungs)

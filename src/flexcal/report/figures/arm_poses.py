@@ -10,7 +10,10 @@ import plotly.graph_objects as go
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 from flexcal.report.figures.canvas import canvas, single
-from flexcal.report.palette import ELASTIC, GRID, NOMINAL, QUIET, RIGID
+from flexcal.report.palette import ELASTIC, GRID, INK, NOMINAL, QUIET, RIGID
+
+_EXAMPLES = 3
+"""Poses drawn boldly, as in the paper's figure."""
 
 
 def arm_poses(
@@ -23,7 +26,11 @@ def arm_poses(
     """
     corners = skeletons(model, poses)
     figure = canvas(620)
-    figure.add_trace(_polyline(corners, "arm", NOMINAL, 3.0, opacity=0.5))
+    figure.add_trace(_polyline(corners, "all poses", NOMINAL, 2.5, opacity=0.45))
+    chosen = corners[:: max(1, len(corners) // _EXAMPLES)][:_EXAMPLES]
+    examples = _polyline(chosen, f"{len(chosen)} of the poses", INK, 9.0)
+    examples.update(mode="lines+markers", marker={"size": 4, "color": INK})
+    figure.add_trace(examples)
     tips = corners[:, -1]
     figure.add_trace(
         go.Scatter3d(
@@ -36,7 +43,7 @@ def arm_poses(
         colour = ELASTIC if calibrated else RIGID
         ends = tips + factor * vectors
         shown = number == 0
-        shafts = _polyline(np.stack([tips, ends], axis=1), "error", colour, 5.0)
+        shafts = _polyline(np.stack([tips, ends], axis=1), "error", colour, 6.0)
         shafts.update(meta={"arrows": label}, visible=shown)
         sizes = np.linalg.norm(vectors, axis=1) * 1e3
         heads = go.Scatter3d(
@@ -60,7 +67,7 @@ def arm_poses(
             "xaxis": axis | {"title": {"text": "x / m"}},
             "yaxis": axis | {"title": {"text": "y / m"}},
             "zaxis": axis | {"title": {"text": "z / m"}},
-            "camera": {"eye": {"x": 1.25, "y": 1.25, "z": 0.7}, "center": {"x": 0, "y": 0, "z": -0.1}},
+            "camera": {"eye": {"x": 1.2, "y": 1.2, "z": 0.55}, "center": {"x": 0, "y": 0, "z": -0.12}},
         },
         margin={"l": 0, "r": 0, "t": 40, "b": 0},
     )

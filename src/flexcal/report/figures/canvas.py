@@ -45,6 +45,16 @@ def positive(values: np.ndarray) -> np.ndarray:
     return single(np.where(values > 0, values, np.nan))
 
 
+def decades(low: int, high: int, step: int = 1) -> dict[str, list]:
+    """Tick values and labels 10ᵏ for a logarithmic axis, in plain characters that keep their size."""
+    powers = range(low, high + 1, step)
+    raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+    return {
+        "tickvals": [10.0**k for k in powers],
+        "ticktext": ["1" if k == 0 else "10" if k == 1 else f"10{str(k).translate(raised)}" for k in powers],
+    }
+
+
 def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
     axis = {
         "gridcolor": GRID,
@@ -68,6 +78,7 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
         legend={
             "orientation": "h",
             "x": 0,
+            "xref": "container",
             "xanchor": "left",
             "y": 1,
             "yref": "container",
@@ -75,9 +86,10 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
             "font": {"size": 12},
             "bgcolor": "rgba(0,0,0,0)",
         },
+        modebar={"bgcolor": "rgba(0,0,0,0)", "color": AXIS, "activecolor": QUIET},
         hoverlabel={"font": {"family": FONT, "size": 12}},
         hovermode="closest",
     )
-    figure.update_xaxes(**axis)
+    figure.update_xaxes(**axis, zeroline=False)
     figure.update_yaxes(**axis)
     return figure

@@ -40,7 +40,12 @@ def response_fit(
                 figure.add_trace(trace, row=n + 1, col=i + 1)
     frequency_axes(figure, n + 1, n)
     figure.update_yaxes(
-        type="linear", matches=f"y{n * n + 1}", range=[-200, 200], tickvals=[-180, -90, 0, 90, 180], row=n + 1
+        type="linear",
+        matches=f"y{n * n + 1}",
+        range=[-200, 200],
+        tickvals=[-180, -90, 0, 90, 180],
+        ticktext=["−180", "−90", "0", "90", "180"],
+        row=n + 1,
     )
     figure.update_yaxes(title_text="degrees", row=n + 1, col=1)
     figure.update_xaxes(tickvals=FREQUENCY_TICKS)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import plotly.graph_objects as go
 
 from flexcal.frequency import FrequencyResponse
-from flexcal.report.figures.canvas import panels, positive, single
+from flexcal.report.figures.canvas import decades, panels, positive, single
 from flexcal.report.palette import ELASTIC, NOMINAL, RIGID
 
 FREQUENCY_TICKS = (1, 3, 10, 30, 100, 300)
@@ -45,7 +45,7 @@ def response_levels(response: FrequencyResponse) -> go.Figure:
 def frequency_axes(figure: go.Figure, rows: int, columns: int) -> None:
     """Logarithmic axes for magnitudes against frequency; labels on the outer panels only, one range for all."""
     figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
-    figure.update_yaxes(type="log", dtick=1, exponentformat="power", showticklabels=False, matches="y")
+    figure.update_yaxes(type="log", **decades(-9, 6), showticklabels=False, matches="y")
     for column in range(columns):
         figure.update_xaxes(showticklabels=True, title_text="Hz", row=rows, col=column + 1)
     for row in range(rows):

@@ -6,7 +6,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.estimation import Identifiability
-from flexcal.report.figures.canvas import canvas, single
+from flexcal.report.figures.canvas import canvas, decades, single
 from flexcal.report.palette import AXIS, ELASTIC, NOMINAL, QUIET
 
 _SMALLEST = 1e-17
@@ -43,6 +43,6 @@ def singular_values(found: Identifiability) -> go.Figure:
             x=found.rank + 0.5, y=0.98, yref="paper", text=f"rank {found.rank}, {gap}", showarrow=False,
             xanchor="right", xshift=-6, yanchor="top", font={"color": QUIET, "size": 12}, yshift=-150,
         )  # fmt: skip
-    figure.update_yaxes(type="log", dtick=3, exponentformat="power", title_text="relative to the largest")
+    figure.update_yaxes(type="log", **decades(-18, 0, 3), title_text="relative to the largest")
     figure.update_xaxes(title_text="number")
     return figure

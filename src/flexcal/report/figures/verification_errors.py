@@ -12,7 +12,7 @@ from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.data import PoseSet
 from flexcal.report.figures.calibration_errors import millimetre_axis
 from flexcal.report.figures.canvas import canvas, positive, single
-from flexcal.report.palette import ELASTIC, INK
+from flexcal.report.palette import ELASTIC, INK, PAGE
 from flexcal.units import MILLIMETRE
 
 
@@ -62,12 +62,12 @@ def verification_errors(
     if paper is not None:
         for value, text in ((paper.p90, "paper, 90 %"), (paper.max, "paper, worst")):
             if np.isfinite(value):
-                figure.add_hline(
-                    y=value / MILLIMETRE,
-                    line={"color": INK, "width": 1, "dash": "dot"},
-                    annotation={"text": text, "font": {"size": 11}, "xanchor": "right", "x": 1},
-                    annotation_position="top right" if text.endswith("worst") else "bottom right",
-                )
+                figure.add_hline(y=value / MILLIMETRE, line={"color": INK, "width": 1, "dash": "dot"})
+                above = text.endswith("worst")
+                figure.add_annotation(
+                    x=1, xref="paper", xanchor="right", y=np.log10(value / MILLIMETRE), yanchor="bottom" if above else "top",
+                    text=text, showarrow=False, font={"size": 11, "color": INK}, bgcolor=PAGE, opacity=0.85,
+                )  # fmt: skip
     millimetre_axis(figure)
     figure.update_xaxes(title_text="verification pose")
     return figure

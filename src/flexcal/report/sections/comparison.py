@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexcal.calibration import ErrorStatistics
-from flexcal.report.notation import NOTHING, millimetres
+from flexcal.report.notation import NOTHING, statistics_cells
 from flexcal.report.page import Block, Section, Table, Text
 from flexcal.report.publication import Publication
 from flexcal.report.study import TwoStageStudy
@@ -12,37 +12,40 @@ from flexcal.report.study import TwoStageStudy
 def comparison_section(study: TwoStageStudy) -> Section:
     """The numbers of the run beside the paper's."""
     paper = study.paper
-    rows = [
-        *_error_rows("calibration poses", study.calibration.errors, paper.calibration if paper else None),
-        *_error_rows("fresh poses, with elasticity", study.elastic_verification.all, paper.elastic if paper else None),
-        *_error_rows("fresh poses, rigid model", study.rigid_verification[0].all, paper.rigid if paper else None),
-        ("geometric parameters modelled", str(len(study.calibration.identifiability.names)), _number(paper, "parameters")),
-        ("geometric parameters determined", str(study.calibration.identifiability.rank), _number(paper, "rank")),
-        ("poses of the frequency experiment", str(len(study.responses)), "3" if paper else NOTHING),
+    fresh = study.elastic_verification
+    found = study.calibration.identifiability
+    errors = [
+        ("calibration poses, as delivered", ErrorStatistics.of(study.nominal_at_calibration.errors), None),
+        ("calibration poses, calibrated", study.calibration.errors, paper.calibration if paper else None),
+        ("fresh poses, as delivered", study.nominal_verification.all, None),
+        ("fresh poses, rigid calibration", study.rigid_verification[0].all, paper.rigid if paper else None),
+        ("fresh poses, elastic calibration", fresh.all, paper.elastic if paper else None),
+        ("… flank certain", fresh.unambiguous, None),
+    ]
+    columns = ["", "poses", "mean / mm", "90 % within / mm", "worst / mm"]
+    columns += [f"{paper.short}, 90 %", f"{paper.short}, worst"] if paper else []
+    rows = []
+    for label, ours, theirs in errors:
+        published = statistics_cells(theirs)[1:] if paper else ()
+        rows.append((label, str(ours.poses), *statistics_cells(ours), *published))
+    counts = [
+        ("geometric parameters modelled", str(len(found.names)), _number(paper, "parameters")),
+        ("geometric parameters determined", str(found.rank), _number(paper, "rank")),
+        ("smallest singular value, relative", f"{found.singular_values[found.rank - 1]:.2g}", NOTHING),
     ]
     blocks: list[Block] = [
+        Table("table-numbers", "Errors", tuple(columns), tuple(rows), strong=(4,)),
         Table(
-            "table-numbers",
-            "All numbers",
-            ("", "this run", paper.short if paper else "published"),
-            tuple(rows),
-        )
+            "table-counts",
+            "Parameters",
+            ("", "this run", paper.short) if paper else ("", "this run"),
+            tuple(row if paper else row[:2] for row in counts),
+        ),
     ]
     if paper is not None:
         blocks.append(Text((), "Before comparing", (*paper.remarks, f"Source: {paper.citation}.")))
     lead = "The same procedure, run here and published." if paper else "The numbers of this run in one place."
     return Section("numbers", "All numbers beside the paper's" if paper else "All numbers", lead, tuple(blocks))
-
-
-def _error_rows(
-    label: str, ours: ErrorStatistics, theirs: ErrorStatistics | None
-) -> list[tuple[str, str, str]]:
-    rows = []
-    for name, key in (("mean", "mean"), ("90 % within", "p90"), ("worst", "max")):
-        published = millimetres(getattr(theirs, key)) if theirs else NOTHING
-        text = f"{millimetres(getattr(ours, key))} mm"
-        rows.append((f"{label} ({ours.poses}), {name}", text, published if published == NOTHING else f"{published} mm"))
-    return rows
 
 
 def _number(paper: Publication | None, key: str) -> str:

@@ -75,7 +75,7 @@ def component_figure(fit: Calibration) -> FigureBlock:
         "figure-12",
         "Figure 12: what is left at the calibration poses, by coordinate",
         error_components(fit.poses, fit.residuals),
-        "Measured minus predicted position in the instrument's frame. Bars that stay within the band and change sign at random are "
+        "Measured minus predicted position in the instrument's frame. Bars that stay within the dotted lines and change sign at random are "
         "measurement noise; a pattern would be something that the model misses.",
         "Residuals by pose; the largest are "
         + ", ".join(f"{millimetres(float(v))} mm in {axis}" for v, axis in zip(largest, "xyz", strict=True))

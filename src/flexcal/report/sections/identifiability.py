@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.estimation import Identifiability
+from flexcal.estimation import Identifiability, name_direction
 from flexcal.report.figures.singular_values import singular_values
-from flexcal.report.notation import significant
 from flexcal.report.page import Block, FigureBlock, Table, Text
 from flexcal.report.publication import Publication
 
@@ -49,7 +48,7 @@ def identifiability_blocks(found: Identifiability, paper: Publication | None) ->
 def _dropped_table(found: Identifiability) -> Table:
     rows = []
     for item in found.dropped:
-        terms = [f"{significant(c, 3)} × {name}" for name, c in item.absorbed_by[:_MOST]]
+        terms = [_amount(c) + name for name, c in item.absorbed_by[:_MOST]]
         more = len(item.absorbed_by) - len(terms)
         if more > 0:
             terms.append(f"and {more} more")
@@ -63,12 +62,15 @@ def _dropped_table(found: Identifiability) -> Table:
     )
 
 
+def _amount(coefficient: float) -> str:
+    text = f"{coefficient:.3g}".replace("-", "−")
+    return "" if text == "1" else "−" if text == "−1" else f"{text} × "
+
+
 def _weak_table(found: Identifiability) -> Table:
     weakest = np.arange(found.rank - 1, max(-1, found.rank - 4), -1)
-    from flexcal.estimation import name_direction
-
     rows = tuple(
-        (name_direction(found.directions[i], found.names, threshold=0.15), f"{found.singular_values[i]:.1e}")
+        (name_direction(found.directions[i], found.names, threshold=0.5), f"{found.singular_values[i]:.1e}")
         for i in weakest
     )
     return Table(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from flexcal.estimation import Estimate
-from flexcal.report.notation import NOTHING, scaled, significant
+from flexcal.report.notation import scaled, significant
 from flexcal.report.page import Table
 
 
@@ -18,8 +18,9 @@ def parameter_table(
     for name in names:
         factor, unit = scaled(estimate.parameters[name].unit)
         interval, value = estimate.interval(name), estimate.values[name]
+        cells: list[str | None]
         if interval is None:
-            cells = ["not determined by these data", NOTHING]
+            cells = ["not determined by these data", None]
         else:
             bounds = [significant(factor * v, 3) for v in interval]
             cells = [significant(factor * value, 3), f"{bounds[0]} to {bounds[1]}"]

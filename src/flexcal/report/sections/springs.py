@@ -27,11 +27,7 @@ def spring_table(
     columns += ["truth", "difference", "truth in interval"] if truth is not None else []
     columns += [source] if with_published else []
     rows = tuple(_row(estimate, name, factor, truth, published if with_published else None) for name in names)
-    note = (
-        "Orientation only: the published robot is another individual, and on a simulated robot the truth is drawn around these values."
-        if with_published
-        else ""
-    )
+    note = "Published values are for orientation only: they belong to another robot of the same type." if with_published else ""
     return Table(
         id=f"table-{kind}",
         caption=f"Table 1: {kind} of drives and bearings",
@@ -53,10 +49,11 @@ def unseen_springs(estimate: Estimate) -> tuple[str, ...]:
 
 def _row(
     estimate: Estimate, name: str, factor: float, truth: Mapping[str, float] | None, published: Mapping[str, float] | None
-) -> tuple[str, ...]:
+) -> tuple[str | None, ...]:
     interval, value = estimate.interval(name), estimate.values[name]
+    cells: list[str | None]
     if interval is None:
-        cells = ["not determined by these data", NOTHING, NOTHING]
+        cells = ["not determined by these data", None, None]
     else:
         std = estimate.std(name) or 0.0
         cells = [

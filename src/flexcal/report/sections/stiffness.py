@@ -102,7 +102,7 @@ def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
     for label, response, model in zip(labels, study.responses, study.stiffness.fitted, strict=True):
         off = np.abs(np.diagonal(response.response / model - 1, axis1=1, axis2=2))
         scaled = np.abs(response.response - model) / response.std
-        angles = ", ".join(f"{q / DEGREE:.1f}" for q in response.q_mean)
+        angles = ", ".join(f"{q / DEGREE:.1f}" for q in response.q_mean).replace("-", "−")
         payload = study.nominal.payload
         mass = response.payload if response.payload is not None else (payload.mass if payload else 0.0)
         rows.append(
@@ -130,6 +130,6 @@ def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
         tuple(rows),
         f"Over all poses χ² per degree of freedom is {estimate.reduced_chi2:.2f} ({estimate.degrees_of_freedom} degrees of freedom, "
         f"{estimate.status} after {estimate.iterations} iterations). Misfit / std near one means that noise and distortion explain what "
-        "is left; the poses are the paper's A, B and C only with the paper's plan.",
+        "is left.",
         text_columns=(1,),
     )

@@ -9,9 +9,6 @@ from flexcal.report.notation import millimetres, ratio, statistics_cells
 from flexcal.report.page import Block, FigureBlock, Section, Table, Text
 from flexcal.report.palette import ELASTIC, NOMINAL, RIGID
 from flexcal.report.study import TwoStageStudy
-from flexcal.units import MILLIMETRE
-
-_RIGID_SHADES = (RIGID, RIGID)
 
 
 def verification_section(study: TwoStageStudy) -> Section:
@@ -24,13 +21,9 @@ def verification_section(study: TwoStageStudy) -> Section:
     everything = [ErrorSeries("as delivered", NOMINAL, study.nominal_verification.errors), *series]
     published = {}
     if paper is not None and paper.elastic is not None:
-        published["paper, 90 % and worst"] = (paper.elastic.p90 / MILLIMETRE * 1e-3, 0.9)
-        published["paper, worst"] = (paper.elastic.max, 1.0)
+        published |= {"paper, 90 %": (paper.elastic.p90, 0.9), "paper, worst": (paper.elastic.max, 1.0)}
     if paper is not None and paper.rigid is not None:
         published["paper without elasticity, worst"] = (paper.rigid.max, 1.0)
-    published.pop("paper, 90 % and worst", None)
-    if paper is not None and paper.elastic is not None:
-        published = {"paper, 90 %": (paper.elastic.p90, 0.9), **published}
     unclear = int(elastic.ambiguous.sum())
     blocks: list[Block] = [
         accuracy_table(study),
@@ -128,7 +121,7 @@ def _rigid_words(study: TwoStageStudy) -> tuple[str, ...]:
     rigid, elastic = study.rigid_verification[0].all, study.elastic_verification.all
     more = (
         f" With {len(study.rigid[-1].poses)} poses instead of {len(study.rigid[0].poses)} the worst becomes "
-        f"{millimetres(study.rigid_verification[-1].all.max)} mm: more measurements do not help a model that lacks the cause."
+        f"{millimetres(study.rigid_verification[-1].all.max)} mm: measuring more does not remove the cause."
         if len(study.rigid) > 1
         else ""
     )

@@ -31,8 +31,15 @@
     let layout = Object.assign({}, figure.layout);
     if (narrow) {
       layout.font = Object.assign({}, layout.font, { size: 11 });
-      layout.margin = Object.assign({}, layout.margin, { l: Math.min(layout.margin.l, 44), r: 6 });
-      layout.dragmode = false;
+      const legend = layout.showlegend ? 30 : 0;
+      layout.margin = Object.assign({}, layout.margin, { l: Math.min(layout.margin.l, 44), r: 6, t: layout.margin.t + legend });
+      layout.height += legend;
+      layout.dragmode = layout.scene ? layout.dragmode : false;
+      if (layout.scene) {
+        const eye = layout.scene.camera.eye;
+        const farther = { x: 1.45 * eye.x, y: 1.45 * eye.y, z: 1.45 * eye.z };
+        layout.scene = Object.assign({}, layout.scene, { camera: Object.assign({}, layout.scene.camera, { eye: farther }) });
+      }
     }
     let data = shown(figure);
     if (scheme.matches && !printing) {
@@ -41,7 +48,7 @@
     }
     const waiting = place.querySelector(".waiting");
     if (waiting) waiting.remove();
-    return Plotly.react(place, data, layout, config);
+    return Plotly.react(place, data, layout, Object.assign({}, config, { displayModeBar: narrow ? false : "hover" }));
   }
 
   function drawAll() {

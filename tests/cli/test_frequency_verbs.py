@@ -1,0 +1,183 @@
+"""`measure`, `identify response` and `identify stiffness`, on an experiment of a few seconds in the virtual cell."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from cli_files import FLEXCAL, copied
+from test_bad_input import refused
+
+from flexcal.cli.main import main
+from flexcal.data import MultisinePlan, read_plan_of, write_plan
+from flexcal.frequency import FrequencyResponse
+
+LOG = "pose_2_realisation_1_experiment_3_minus.parquet"
+
+
+@pytest.fixture(scope="module")
+def recorded(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The TX90L's folder with a small plan and what the virtual cell recorded by it."""
+    folder = copied(examples / "tx90l", tmp_path_factory.mktemp("cli") / "tx90l")
+    assert main(["design", "frequency", str(folder / "robot.yaml"), "--out", str(folder / "whole.yaml")]) == 0
+    whole = read_plan_of(folder / "whole.yaml", MultisinePlan)
+    lines = np.arange(3, 60, 4)
+    small = replace(
+        whole,
+        poses=whole.poses[:2],
+        base_frequency_hz=1.0,
+        lines=lines,
+        amplitude=np.repeat(whole.amplitude[:, :1], len(lines), axis=1),
+        periods=3,
+        settle_periods=1,
+        realisations=3,
+        reference_frequency_hz=1.5,
+        rate_hz=1000.0,
+    )
+    write_plan(folder / "small.yaml", small)
+    arguments = [
+        "measure",
+        folder / "small.yaml",
+        "--cell",
+        "virtual",
+        "--seed",
+        "4",
+        "--out",
+        folder / "recorded",
+    ]
+    assert main([str(a) for a in arguments]) == 0
+    return folder
+
+
+def test_plan_says_how_long_it_takes(run, tx90l_folder: Path) -> None:
+    out = tx90l_folder / "paper.yaml"
+    found = run(
+        "design", "frequency", tx90l_folder / "robot.yaml", "--plan", "paper", "--out", out, "--json"
+    ).document
+    plan = read_plan_of(out, MultisinePlan)
+    assert found["poses"] == len(plan.poses) == 3
+    assert found["excited_axes"] == [1, 2, 3]
+    assert found["seconds_on_the_robot"] == pytest.approx(3 * 384)
+    assert plan.payload == 0.0
+
+
+def test_measure_leaves_plan_logs_truth_and_results(recorded: Path) -> None:
+    names = {p.name for p in (recorded / "recorded").iterdir()}
+    assert {"plan.yaml", "truth.yaml", "results.json", LOG} <= names
+    assert len(names) == 3 + 2 * 3 * 3 * 2
+
+
+def test_recorded_files_may_be_taken_over(run, recorded: Path, tmp_path: Path) -> None:
+    out = tmp_path / "again"
+    arguments = ("measure", recorded / "small.yaml", "--cell", recorded / "recorded", "--out", out, "--json")
+    assert run(*arguments).document["recordings"] == 36
+    assert pl.read_parquet(out / LOG).equals(pl.read_parquet(recorded / "recorded" / LOG))
+    assert not (out / "truth.yaml").exists()
+
+
+def test_same_seed_same_bytes(run, recorded: Path, tmp_path: Path) -> None:
+    arguments = (
+        "measure",
+        recorded / "small.yaml",
+        "--cell",
+        "virtual",
+        "--seed",
+        4,
+        "--out",
+        tmp_path / "again",
+    )
+    assert run(*arguments).status == 0
+    for name in (LOG, "truth.yaml"):
+        assert (tmp_path / "again" / name).read_bytes() == (recorded / "recorded" / name).read_bytes()
+
+
+def test_responses(run, recorded: Path, tmp_path: Path) -> None:
+    arguments = ("identify", "response", recorded / "robot.yaml", recorded / "recorded", "--out", tmp_path)
+    assert "flexcal identify stiffness" in run(*arguments).out
+    first, second = (FrequencyResponse.load(tmp_path / f"response_pose_{k}.npz") for k in (1, 2))
+    assert (first.pose, second.pose) == (0, 1)
+    assert first.joints == ("joint_1", "joint_2", "joint_3")
+    assert np.median(np.abs(first.std / first.response)[:, [0, 1, 2], [0, 1, 2]]) < 0.2
+    document = run(*arguments, "--json").document
+    assert [entry["pose"] for entry in document["responses"]] == [1, 2]
+
+
+def alter_log(folder: Path, change: Callable[[pl.DataFrame], pl.DataFrame]) -> None:
+    change(pl.read_parquet(folder / LOG)).write_parquet(folder / LOG)
+
+
+LOGS = {
+    "gap": (lambda f: pl.concat([f[:700], f[760:]]), ["gap of 0.061 s", "row 701"]),
+    "time runs backwards": (lambda f: pl.concat([f[:700], f[600:]]), ["runs backwards", "row 701"]),
+    "time stands still": (lambda f: pl.concat([f[:700], f[699:]]), ["stands still", "row 701"]),
+    "no time": (lambda f: f.drop("t"), ["'t'", "missing"]),
+    "no torque": (lambda f: f.drop("tau2"), ["tau"]),
+    "five joints": (lambda f: f.drop("q6"), ["5", "6 joints"]),
+    "NaN": (lambda f: f.with_columns(q1=pl.when(pl.col("t") > 1).then(float("nan")).otherwise(pl.col("q1"))), ["q1"]),
+    "degrees": (lambda f: f.with_columns(pl.col("^q.$") * (180 / np.pi)), ["degrees"]),
+    "too short": (lambda f: f[:-500], ["short"]),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("change", "words"), LOGS.values(), ids=LOGS.keys())
+def test_bad_log(
+    run, recorded: Path, tmp_path: Path, change: Callable[[pl.DataFrame], pl.DataFrame], words: list[str]
+) -> None:
+    folder = copied(recorded / "recorded", tmp_path / "recorded")
+    alter_log(folder, change)
+    arguments = ("identify", "response", recorded / "robot.yaml", folder, "--out", tmp_path / "responses")
+    sentence = refused(run, tmp_path, *arguments)
+    for word in words:
+        assert word in sentence
+    if "short" not in words:
+        assert LOG in sentence
+
+
+def test_missing_log(run, recorded: Path, tmp_path: Path) -> None:
+    folder = copied(recorded / "recorded", tmp_path / "recorded")
+    (folder / LOG).unlink()
+    arguments = ("identify", "response", recorded / "robot.yaml", folder, "--out", tmp_path / "responses")
+    assert Path(LOG).stem in refused(run, tmp_path, *arguments)
+
+
+def test_poses_are_no_frequency_experiment(run, recorded: Path, tmp_path: Path) -> None:
+    robot = recorded / "robot.yaml"
+    run("design", "poses", robot, "--random", "--count", 3, "--out", tmp_path / "poses.yaml")
+    run(
+        "measure",
+        tmp_path / "poses.yaml",
+        "--robot",
+        robot,
+        "--cell",
+        "virtual",
+        "--out",
+        tmp_path / "measured",
+    )
+    arguments = ("identify", "response", robot, tmp_path / "measured", "--out", tmp_path / "responses")
+    assert "flexcal calibrate" in refused(run, tmp_path, *arguments)
+
+
+def test_plan_of_another_robot(run, recorded: Path, ur5_folder: Path, tmp_path: Path) -> None:
+    plan = read_plan_of(recorded / "small.yaml", MultisinePlan)
+    shorter = replace(plan, poses=plan.poses[:, :5], kp=plan.kp[:5], kd=plan.kd[:5])
+    write_plan(ur5_folder / "five.yaml", shorter)
+    arguments = ("measure", ur5_folder / "five.yaml", "--cell", "virtual", "--out", tmp_path / "x")
+    assert "5 joints" in refused(run, tmp_path, *arguments)
+
+
+def test_interrupted_measurement_is_not_complete(recorded: Path, tmp_path: Path) -> None:
+    command = [FLEXCAL, "measure", recorded / "whole.yaml", "--cell", "virtual", "--out", tmp_path]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
+        assert process.stderr is not None and process.stdout is not None
+        assert process.stderr.readline().startswith("recording")
+        process.send_signal(signal.SIGINT)
+        rest = process.stderr.read()
+        assert process.wait(timeout=60) == 130
+        assert "Traceback" not in rest and "interrupted" in rest
+    assert not (tmp_path / "plan.yaml").exists()

@@ -1,0 +1,126 @@
+"""Finding verbs, help, exit statuses."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from cli_files import FLEXCAL
+
+from flexcal.cli import main as cli
+from flexcal.cli.verbs import VERBS
+
+
+def test_help_lists_every_verb_with_an_example(run) -> None:
+    page = run("--help")
+    assert page.status == 0 and page.err == ""
+    for verb in VERBS:
+        assert f"\n  {verb.name} " in page.out
+        assert f"$ {verb.example}\n" in page.out
+        assert verb.example.startswith(f"flexcal {verb.name} ")
+    assert run().out == page.out
+
+
+def test_steps_come_in_the_order_of_the_procedure(run) -> None:
+    page = run("--help").out
+    order = [
+        "design frequency",
+        "measure",
+        "identify response",
+        "identify stiffness",
+        "design poses",
+        "calibrate",
+    ]
+    order += ["verify", "export urdf"]
+    places = [page.index(f"\n  {name} ") for name in order]
+    assert places == sorted(places)
+
+
+def test_help_imports_nothing_heavy() -> None:
+    program = (
+        "import sys\nfrom flexcal.cli.main import main\nmain(['--help'])\n"
+        "print(*(n for n in ('numpy', 'tyro', 'rich', 'pinocchio', 'scipy') if n in sys.modules), file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stderr.split() == []
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.name)
+def test_every_verb_explains_itself(run, verb) -> None:
+    page = run(*verb.words, "--help")
+    assert page.status == 0
+    assert verb.example in page.out and "--json" in page.out
+
+
+@pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.name)
+def test_every_example_parses(verb, monkeypatch: pytest.MonkeyPatch) -> None:
+    import importlib
+
+    command = getattr(importlib.import_module(f"flexcal.cli.{verb.module}"), verb.command)
+    carried_out: list[object] = []
+    monkeypatch.setattr(command, "run", lambda self: carried_out.append(self))
+    assert cli.main(verb.example.split()[1:]) == 0
+    assert len(carried_out) == 1
+
+
+@pytest.mark.parametrize(
+    ("wrong", "right"),
+    [
+        (["calibrat"], "'flexcal calibrate'"),
+        (["stiffness"], "'flexcal identify stiffness'"),
+        (["identify", "stifness"], "'flexcal identify stiffness'"),
+        (["identify"], "'flexcal identify response' or 'flexcal identify stiffness'"),
+        (["identfy", "response"], "'flexcal identify response'"),
+        (["export", "--out", "x"], "'flexcal export urdf'"),
+        (["validate"], "'flexcal verify'"),
+        (["qwxz"], "'flexcal --help'"),
+    ],
+)
+def test_wrong_verb_suggests_the_right_one(run, wrong: list[str], right: str) -> None:
+    outcome = run(*wrong)
+    assert outcome.status == 2 and outcome.out == ""
+    assert right in outcome.err and outcome.err.count("\n") == 1
+
+
+def test_group_help_lists_its_verbs_only(run) -> None:
+    page = run("design", "--help")
+    assert page.status == 0
+    assert "design poses" in page.out and "flexcal calibrate" not in page.out
+
+
+def test_version(run) -> None:
+    from flexcal import __version__
+
+    assert run("--version").out == f"flexcal {__version__}\n"
+
+
+@pytest.mark.parametrize("arguments", [["calibrate"], ["calibrate", "r.yaml", "p.csv", "--los", "cauchy"]])
+def test_arguments_that_do_not_parse_exit_2_and_print_nothing(run, arguments: list[str]) -> None:
+    outcome = run(*arguments)
+    assert outcome.status == 2 and outcome.out == "" and outcome.err
+
+
+def test_interrupt_exits_130(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(self: object) -> None:
+        raise KeyboardInterrupt
+
+    from flexcal.cli.verify import Verify
+
+    monkeypatch.setattr(Verify, "run", interrupted)
+    outcome = run("verify", "robot.yaml", "poses.csv")
+    assert outcome.status == 130 and outcome.out == "" and "interrupted" in outcome.err
+
+
+def test_known_error_is_one_line_without_traceback(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [FLEXCAL, "verify", tmp_path / "none.yaml", "poses.csv", "--json"], capture_output=True, text=True
+    )
+    assert done.returncode == 2 and done.stdout == ""
+    assert done.stderr.startswith("flexcal: ") and done.stderr.count("\n") == 1
+
+
+def test_reader_that_goes_away_is_no_error() -> None:
+    done = subprocess.run(
+        f"set -o pipefail; {FLEXCAL} --help | true", shell=True, executable="/bin/bash", capture_output=True
+    )
+    assert done.returncode == 0 and done.stderr == b""
