@@ -150,6 +150,17 @@ def test_intervals_follow_the_scatter_where_no_sigma_is_given(run, ur5_folder: P
     assert stated["parameters"][name]["std"] == pytest.approx(scatter["parameters"][name]["std"], rel=1e-3)
 
 
+def test_terms_of_robot_yaml_are_kept(run, ur5_folder: Path, some: Path) -> None:
+    robot = ur5_folder / "robot.yaml"
+    robot.write_text(
+        robot.read_text().replace("terms: auto", "terms: [kinematic, gravity_compliance, transmission]")
+    )
+    found = run("calibrate", robot, some, "--json").document
+    orders = [f"transmission_{k}" for k in (1, 2, 3)]
+    assert found["terms"] == ["kinematic", "gravity_compliance", *orders]
+    assert "elbow_joint.gravity_compliance" in found["parameters"] and found["term_selection"] == []
+
+
 def test_several_files_are_one_set(run, ur5_folder: Path, some: Path) -> None:
     header, rows = read_csv(some)
     halves = [write_csv(ur5_folder / f"half{k}.csv", header, rows[k::2]) for k in (0, 1)]

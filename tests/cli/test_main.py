@@ -111,6 +111,26 @@ def test_interrupt_exits_130(run, monkeypatch: pytest.MonkeyPatch) -> None:
     assert outcome.status == 130 and outcome.out == "" and "interrupted" in outcome.err
 
 
+def test_interrupt_inside_an_import_exits_130(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An extension module that is interrupted while it loads raises an ImportError from the KeyboardInterrupt."""
+
+    def interrupted(self: object) -> None:
+        raise ImportError("initialization failed") from KeyboardInterrupt()
+
+    from flexcal.cli.verify import Verify
+
+    monkeypatch.setattr(Verify, "run", interrupted)
+    assert run("verify", "robot.yaml", "poses.csv").status == 130
+
+
+def test_a_bug_keeps_its_traceback(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    from flexcal.cli.verify import Verify
+
+    monkeypatch.setattr(Verify, "run", lambda self: 1 / 0)
+    with pytest.raises(ZeroDivisionError):
+        run("verify", "robot.yaml", "poses.csv")
+
+
 def test_known_error_is_one_line_without_traceback(tmp_path: Path) -> None:
     done = subprocess.run(
         [FLEXCAL, "verify", tmp_path / "none.yaml", "poses.csv", "--json"], capture_output=True, text=True

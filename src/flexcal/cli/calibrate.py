@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, PoseFiles, Robot
+from flexcal.cli.options import Json, PoseFiles, Robot, require_at_least, require_files
 
 
 @dataclass(frozen=True)
@@ -38,11 +38,11 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print what was found."""
-        from flexcal.cli.options import require_files
         from flexcal.cli.tables import dropped_table, error_table, weak_table
         from flexcal.workflow.calibrate_robot import calibrate_robot
 
         require_files(self.poses, "POSES")
+        require_at_least(0, secant_scale=self.secant_scale)
         console = Console(self.json)
         with console.progress() as progress:
             found = calibrate_robot(

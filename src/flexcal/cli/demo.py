@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json
+from flexcal.cli.options import Json, require_at_least
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,7 @@ class Demo:
         from flexcal.workflow.results import read_results
         from flexcal.workflow.two_stage import run_two_stage
 
+        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         robot = example_robot("tx90l") if self.robot is None else self.robot
         with console.progress() as progress:

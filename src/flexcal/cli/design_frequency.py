@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot
+from flexcal.cli.options import Json, Robot, require_at_least
 
 
 @dataclass(frozen=True)
@@ -34,6 +34,7 @@ class DesignFrequency:
         """Plan, and print how long it takes."""
         from flexcal.workflow.design_frequency import plan_frequency_experiments
 
+        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         document = plan_frequency_experiments(
             self.robot, self.out, kind=self.plan, poses=self.poses, seed=self.seed

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot
+from flexcal.cli.options import Json, Robot, require_at_least
 
 
 @dataclass(frozen=True)
@@ -42,6 +42,8 @@ class DesignPoses:
         """Choose, and print how good the choice is."""
         from flexcal.workflow.design_poses import plan_calibration_poses, plan_verification_poses
 
+        require_at_least(1, count=self.count, candidates=self.candidates)
+        require_at_least(0, seed=self.seed, payload=self.payload)
         console = Console(self.json)
         if self.random:
             drawn = plan_verification_poses(

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_files
+from flexcal.cli.options import Json, Robot, require_at_least, require_files
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class IdentifyStiffness:
         from flexcal.workflow.identify_stiffness import identify_robot_stiffness
 
         require_files(self.responses, "RESPONSES")
+        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         with console.progress() as progress:
             found = identify_robot_stiffness(

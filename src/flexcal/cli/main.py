@@ -31,13 +31,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except FlexcalError as problem:
         print(f"flexcal: {' '.join(str(problem).split())}", file=sys.stderr)
         return FAILED
-    except KeyboardInterrupt:
-        print("flexcal: interrupted; nothing is left half-written.", file=sys.stderr)
-        return INTERRUPTED
     except BrokenPipeError:
         # whoever read standard output has gone; nothing more can be said there, not even at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except BaseException as problem:
+        if not _was_interrupted(problem):
+            raise
+        print("flexcal: interrupted; no file is left half-written.", file=sys.stderr)
+        return INTERRUPTED
 
 
 def _run(arguments: list[str]) -> int:
@@ -56,6 +58,13 @@ def _run(arguments: list[str]) -> int:
             return 0
         raise FlexcalError(unknown_verb(arguments))
     return _carry_out(verb, arguments[len(verb.words) :])
+
+
+def _was_interrupted(problem: BaseException | None) -> bool:
+    """Whether Ctrl-C is behind an exception: an extension module that is interrupted at import raises ImportError from it."""
+    while problem is not None and not isinstance(problem, KeyboardInterrupt):
+        problem = problem.__cause__
+    return problem is not None
 
 
 def _carry_out(verb: Verb, arguments: list[str]) -> int:

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json
+from flexcal.cli.options import Json, require_at_least
 
 
 @dataclass(frozen=True)
@@ -43,6 +43,7 @@ class Measure:
         from flexcal.workflow.experiment_files import robot_file
         from flexcal.workflow.measure import measure
 
+        require_at_least(0, seed=self.seed)
         console = Console(self.json)
         robot = robot_file(self.plan, self.robot)
         with console.progress() as progress:

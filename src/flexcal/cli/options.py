@@ -29,3 +29,10 @@ def require_files(files: tuple[Path, ...], name: str) -> None:
     """Raise `InputError` where no file was given."""
     if not files:
         raise InputError(f"no {name} given; name at least one file after robot.yaml.")
+
+
+def require_at_least(least: float, **values: float | None) -> None:
+    """Raise `InputError` for the first named value that is smaller; None passes."""
+    for name, value in values.items():
+        if value is not None and not value >= least:
+            raise InputError(f"--{name.replace('_', '-')} is {value:g}; it must be at least {least:g}.")

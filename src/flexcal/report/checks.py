@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration import Calibration, Verification
+from flexcal.calibration import Calibration, TermSelection, Verification
 from flexcal.estimation import Estimate, Identifiability
 from flexcal.report.figures.predicted_quantiles import prediction_std
 from flexcal.report.notation import millimetres
@@ -123,3 +123,42 @@ def check_truth(covered: int, total: int) -> Check:
     answer = f"{covered} of {total} do ({100 * covered / total:.0f} %). Only a simulated robot can tell."
     share = covered / total
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
+
+
+def check_left_out(calibration: Calibration, selection: TermSelection | None) -> Check:
+    """Whether poses left out of the fit were predicted as well as those in it."""
+    question = "Does it hold at poses that the fit did not see?"
+    rows = [row for row in selection.table if row[0] == calibration.terms] if selection is not None else []
+    if not rows:
+        return Check(
+            question,
+            "Not known: nothing was left out. Measure some fresh poses and run flexcal verify before relying on it.",
+            "care",
+        )
+    _, order, workspace = rows[0]
+    mean = calibration.errors.mean
+    answer = (
+        f"Left out in turn, poses are {millimetres(workspace)} mm off on average, {millimetres(mean)} mm when part of the fit."
+    )
+    if max(order, workspace) > 1.5 * mean:
+        return Check(question, f"{answer} That is a large step: the model is too rich for these poses.", "care")
+    return Check(question, answer, "good")
+
+
+def check_outliers(calibration: Calibration) -> Check:
+    """Whether single measurements stand out."""
+    question = "Are there measurements that stand out?"
+    found = len(calibration.estimate.outliers)
+    if found:
+        share = found / len(calibration.poses)
+        answer = f"{found} of {len(calibration.poses)} were set aside by the robust loss; they are listed below."
+        return Check(question, answer, "good" if share <= 0.02 else "care")
+    fit = calibration.errors
+    if fit.max > 4 * fit.p90:
+        return Check(
+            question,
+            f"The worst, {millimetres(fit.max)} mm, is more than four times what nine of ten stay within; look at it, or fit with the "
+            "robust loss cauchy.",
+            "care",
+        )
+    return Check(question, "No.", "good")

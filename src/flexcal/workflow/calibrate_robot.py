@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -132,7 +133,19 @@ def calibrate_robot(
 
     def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> Calibration:
         tell(stage, 0.0)
-        found = _fit(robot_, poses, blocks.get("stiffness"), chosen, elastic, loss, secant_scale, elasticity)
+        once = partial(
+            calibrate,
+            robot_,
+            stiffness=blocks.get("stiffness"),
+            terms=chosen,
+            elastic=elastic,
+            elasticity=elasticity,
+            secant_scale=secant_scale,
+            loss=loss,
+        )
+        found = once(poses)
+        if not poses.sigma_given:
+            found = once(_with_scatter(found, loss))
         tell(stage, 1.0)
         return found
 
@@ -189,32 +202,6 @@ def with_stations(calibration: Calibration) -> Estimate:
         covariance=covariance,
         identifiable=estimate.identifiable + (False,) * len(held),
     )
-
-
-def _fit(
-    model: RobotModel,
-    poses: PoseSet,
-    stiffness: Estimate | None,
-    terms: Sequence[str],
-    elastic: bool,
-    loss: LossName,
-    secant_scale: float,
-    elasticity: Literal["reestimated", "marginalised"],
-) -> Calibration:
-    def once(measured: PoseSet) -> Calibration:
-        return calibrate(
-            model,
-            measured,
-            stiffness=stiffness,
-            terms=terms,
-            elastic=elastic,
-            elasticity=elasticity,
-            secant_scale=secant_scale,
-            loss=loss,
-        )
-
-    found = once(poses)
-    return found if poses.sigma_given else once(_with_scatter(found, loss))
 
 
 def _with_scatter(found: Calibration, loss: LossName) -> PoseSet:

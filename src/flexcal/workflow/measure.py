@@ -19,7 +19,7 @@ from flexcal.data import (
     write_measured_poses,
     write_recordings,
 )
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 from flexcal.workflow.experiment_files import read_fitting_plan
 from flexcal.workflow.results import write_results
@@ -86,7 +86,10 @@ def _virtual(model: RobotModel, config: Path | None, seed: int, truth: Path | No
         if truth is None
         else read_truth(truth)
     )
-    robot = model.with_values(drawn)
+    try:
+        robot = model.with_values(drawn)
+    except FlexcalError as problem:
+        raise InputError(f"{truth or 'the drawn truth'}: {problem}") from problem
     write_truth(out / "truth.yaml", drawn)
     return VirtualCell(robot, settings, seed, controller_model=model)
 

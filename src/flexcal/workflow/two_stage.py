@@ -5,22 +5,27 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration import Calibration, Verification, calibrate, predict, verify
-from flexcal.cell import VirtualCell
-from flexcal.cell.config import CellConfig
-from flexcal.cell.truth import draw_truth, read_truth, write_truth
-from flexcal.data import MultisinePlan, PosePlan, PoseSet, Recording, write_plan, write_poses
+from flexcal.calibration import ErrorStatistics, calibrate, predict, register, verify
+from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, write_truth
+from flexcal.data import MultisinePlan, Recording, provenance, write_estimates, write_plan, write_poses
 from flexcal.design import choose_poses, random_poses
-from flexcal.elasticity import StiffnessResult, identify_stiffness
+from flexcal.elasticity import identify_stiffness
+from flexcal.estimation import Estimate
+from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
+from flexcal.report.publication import TX90L_PAPER
+from flexcal.report.study import TwoStageStudy
+from flexcal.report.two_stage import write_two_stage_report
 from flexcal.workflow.frequency_plans import frequency_plan
+from flexcal.workflow.results import write_results
+from flexcal.workflow.two_stage_results import two_stage_document, write_verification
 from flexcal.yaml_reader import read_yaml
 
 Progress = Callable[[str, float], None]
@@ -31,24 +36,6 @@ RIGID_POSES = (40, 100)
 VERIFICATION_POSES = 150
 
 STAGES = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "report")
-
-
-@dataclass(frozen=True, eq=False)
-class TwoStageRun:
-    """Everything that one run of the procedure made; `truth` is filled in by the final comparison alone."""
-
-    nominal: RobotModel
-    plan: MultisinePlan
-    responses: tuple[FrequencyResponse, ...]
-    stiffness: StiffnessResult
-    calibration: Calibration
-    rigid: tuple[Calibration, ...]
-    verification_poses: PoseSet
-    elastic: Verification
-    rigid_verification: tuple[Verification, ...]
-    noise_free: np.ndarray
-    truth: dict[str, float]
-    seconds: dict[str, float]
 
 
 @dataclass
@@ -73,13 +60,14 @@ def run_two_stage(
     plan: Literal["default", "paper"] = "default",
     truth: Path | None = None,
     inertias_known: bool = False,
+    report: bool = True,
     progress: Progress | None = None,
-) -> TwoStageRun:
-    """Run the two-stage calibration on the virtual cell and leave every intermediate file in `out`.
+) -> TwoStageStudy:
+    """Run the two-stage calibration on the virtual cell and leave every intermediate file, results.json and report.html in `out`.
 
     `robot` is a robot.yaml with cell.yaml and frequency_poses.csv beside it. The hidden truth is drawn from `seed`, or taken from the file
-    `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified. `inertias_known` gives the
-    identification the true link inertias, to see what CAD costs. Raises `FlexcalError` for files that do not fit.
+    `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and stored. `inertias_known` gives
+    the identification the true link inertias, to see what CAD costs. Raises `FlexcalError` for files that do not fit.
     """
     tell = progress or (lambda stage, share: None)
     watch = Stopwatch()
@@ -113,46 +101,69 @@ def run_two_stage(
         tell("stage1", 1.0)
     with watch.stage("poses"):
         tell("poses", 0.0)
+        payload = frequency.payload
         chosen = choose_poses(
-            elastic, CALIBRATION_POSES, rng=np.random.default_rng([seed, 2]), payload=frequency.payload
+            elastic, CALIBRATION_POSES, rng=np.random.default_rng([seed, 2]), payload=payload
         )
         for_rigid = [
-            choose_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), payload=frequency.payload)
+            choose_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), payload=payload)
             for n in RIGID_POSES
         ]
         anywhere = random_poses(
-            nominal, VERIFICATION_POSES, np.random.default_rng([seed, 4]), payload=frequency.payload
+            nominal, VERIFICATION_POSES, np.random.default_rng([seed, 4]), payload=payload
         )
         tell("poses", 1.0)
     with watch.stage("stage2"):
         tell("stage2", 0.0)
-        measured = _measure(cell, chosen, out / "calibration_poses.csv")
+        measured = cell.measure(chosen)
         calibration = calibrate(elastic, measured, stiffness=stiffness.estimate)
         tell("stage2", 0.5)
         rigid = tuple(calibrate(believed, cell.measure(p), elastic=False) for p in for_rigid)
         tell("stage2", 1.0)
+    write_poses(out / "calibration_poses.csv", measured)
+    _store(out, robot, stiffness.estimate, calibration.estimate)
+    exported = write_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):
         tell("verification", 0.0)
-        seen = _measure(cell, anywhere, out / "verification_poses.csv")
-        checked = verify(calibration.model, seen)
-        rigid_checked = tuple(verify(c.model, seen, elastic=False) for c in rigid)
-        true = read_truth(hidden)
-        noise_free = cell.noise_free(anywhere)
+        seen = cell.measure(anywhere)
+        write_poses(out / "verification_poses.csv", seen)
+        known = read_truth(hidden)
+        exact = replace(seen, position=cell.noise_free(anywhere))
+        floor = exact.position - predict(nominal.with_values(known), exact).position
+        registered = register(nominal, measured, predict(nominal, measured, elastic=False).position)
+        study = TwoStageStudy(
+            nominal=nominal,
+            plan=frequency,
+            responses=responses,
+            stiffness=stiffness,
+            calibration=calibration,
+            rigid=rigid,
+            nominal_at_calibration=verify(registered, measured, elastic=False),
+            verification_poses=exact,
+            nominal_verification=verify(registered, exact, elastic=False),
+            elastic_verification=verify(calibration.model, exact),
+            rigid_verification=tuple(verify(c.model, exact, elastic=False) for c in rigid),
+            measured_poses=seen,
+            measured_verification=verify(calibration.model, seen),
+            floor=ErrorStatistics.of(floor),
+            truth=known,
+            paper=TX90L_PAPER if nominal.name == "tx90l" else None,
+            seconds=watch.seconds,
+            seed=seed,
+            command=f"flexcal demo --seed {seed} --plan {plan}"
+            + ("" if truth is None else f" --truth {truth.name}"),
+        )
         tell("verification", 1.0)
-    return TwoStageRun(
-        nominal,
-        frequency,
-        responses,
-        stiffness,
-        calibration,
-        rigid,
-        seen,
-        checked,
-        rigid_checked,
-        noise_free,
-        true,
-        watch.seconds,
-    )
+    study = replace(study, results=two_stage_document(study, exported))
+    with watch.stage("report"):
+        tell("report", 0.0)
+        write_verification(out / "verification.csv", study)
+        if report:
+            write_two_stage_report(out / "report.html", study)
+        tell("report", 1.0)
+    study = replace(study, results=two_stage_document(study, exported))
+    write_results(out, study.results)
+    return study
 
 
 def measure_responses(
@@ -170,22 +181,16 @@ def measure_responses(
     return frequency_responses(plan, counted(), joint_names=names)
 
 
-def _measure(cell: VirtualCell, plan: PosePlan, path: Path) -> PoseSet:
-    poses = cell.measure(plan)
-    write_poses(path, poses)
-    return poses
+def _store(out: Path, robot: Path, stiffness: Estimate, geometry: Estimate) -> None:
+    """Store both blocks of `out`/estimates.yaml with what they came from."""
+    path = out / "estimates.yaml"
+    responses = sorted(out.glob("response_pose_*.npz"))
+    write_estimates(path, "stiffness", replace(stiffness, provenance=provenance([robot, *responses])))
+    origin = provenance([robot, out / "calibration_poses.csv"], None, path, ("stiffness",))
+    write_estimates(path, "calibration", replace(geometry, provenance=origin))
 
 
 def _inertias(truth: dict[str, float]) -> dict[str, float]:
     return {
         name: value for name, value in truth.items() if name.endswith((".mass", ".com_x", ".com_y", ".com_z"))
     }
-
-
-def nominal_errors(run: TwoStageRun) -> np.ndarray:
-    """Error vectors (N, 3) of the uncalibrated robot at the calibration poses, m, after rigid registration alone."""
-    poses = run.calibration.poses
-    from flexcal.calibration import register
-
-    bare = predict(run.nominal, poses, elastic=False).position
-    return poses.position - predict(register(run.nominal, poses, bare), poses, elastic=False).position

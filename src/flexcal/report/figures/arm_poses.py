@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
@@ -53,6 +54,12 @@ def arm_poses(
             hovertemplate="%{text}<extra></extra>",
         )  # fmt: skip
         figure.add_traces([shafts, heads])
+    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
+    return figure
+
+
+def space_axes() -> dict[str, Any]:
+    """Axes of a scene in metres, all to one scale."""
     axis = {
         "backgroundcolor": "rgba(0,0,0,0)",
         "gridcolor": GRID,
@@ -61,17 +68,13 @@ def arm_poses(
         "showspikes": False,
         "nticks": 5,
     }
-    figure.update_layout(
-        scene={
-            "aspectmode": "data",
-            "xaxis": axis | {"title": {"text": "x / m"}},
-            "yaxis": axis | {"title": {"text": "y / m"}},
-            "zaxis": axis | {"title": {"text": "z / m"}},
-            "camera": {"eye": {"x": 1.2, "y": 1.2, "z": 0.55}, "center": {"x": 0, "y": 0, "z": -0.12}},
-        },
-        margin={"l": 0, "r": 0, "t": 40, "b": 0},
-    )
-    return figure
+    return {
+        "aspectmode": "data",
+        "xaxis": axis | {"title": {"text": "x / m"}},
+        "yaxis": axis | {"title": {"text": "y / m"}},
+        "zaxis": axis | {"title": {"text": "z / m"}},
+        "camera": {"eye": {"x": 1.2, "y": 1.2, "z": 0.55}, "center": {"x": 0, "y": 0, "z": -0.12}},
+    }
 
 
 def skeletons(model: RobotModel, poses: PoseSet) -> np.ndarray:

@@ -36,7 +36,7 @@ def error_distribution(series: Sequence[ErrorSeries], published: Mapping[str, tu
                 x=[error * 1e3],
                 y=[100 * share],
                 mode="markers",
-                marker={"color": INK, "size": 10, "symbol": "star-diamond-open" if "without" in name else "diamond-open"},
+                marker={"color": INK, "size": 10, "symbol": "star-diamond-open" if "rigid" in name else "diamond-open"},
                 name=name,
                 hovertemplate="%{fullData.name}: %{x:.2f} mm<extra></extra>",
             )

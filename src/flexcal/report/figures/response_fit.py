@@ -47,6 +47,7 @@ def response_fit(
         ticktext=["−180", "−90", "0", "90", "180"],
         row=n + 1,
     )
+    figure.update_yaxes(matches=None, row=n + 1, col=1)
     figure.update_yaxes(title_text="degrees", row=n + 1, col=1)
     figure.update_xaxes(tickvals=FREQUENCY_TICKS)
     return figure

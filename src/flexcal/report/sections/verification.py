@@ -23,7 +23,7 @@ def verification_section(study: TwoStageStudy) -> Section:
     if paper is not None and paper.elastic is not None:
         published |= {"paper, 90 %": (paper.elastic.p90, 0.9), "paper, worst": (paper.elastic.max, 1.0)}
     if paper is not None and paper.rigid is not None:
-        published["paper without elasticity, worst"] = (paper.rigid.max, 1.0)
+        published["paper, rigid model, worst"] = (paper.rigid.max, 1.0)
     unclear = int(elastic.ambiguous.sum())
     blocks: list[Block] = [
         accuracy_table(study),
@@ -71,27 +71,27 @@ def verification_section(study: TwoStageStudy) -> Section:
 def accuracy_table(study: TwoStageStudy) -> Table:
     """Mean, 90 % and worst error of every model on the verification poses."""
     against = "truth" if study.truth is not None else "instrument"
-    rows = [("as delivered (nominal)", against, str(study.nominal_verification.all.poses), *statistics_cells(study.nominal_verification.all))]  # fmt: skip
+    rows = [("as delivered (nominal)", str(study.nominal_verification.all.poses), *statistics_cells(study.nominal_verification.all), against)]  # fmt: skip
     for fit, verification in zip(study.rigid, study.rigid_verification, strict=True):
         label = f"rigid calibration, {len(fit.poses)} poses, rank {fit.identifiability.rank}"
-        rows.append((label, against, str(verification.all.poses), *statistics_cells(verification.all)))
+        rows.append((label, str(verification.all.poses), *statistics_cells(verification.all), against))
     elastic = study.elastic_verification
     label = f"elastic calibration, {len(study.calibration.poses)} poses"
     strong = len(rows)
-    rows.append((label, against, str(elastic.all.poses), *statistics_cells(elastic.all)))
+    rows.append((label, str(elastic.all.poses), *statistics_cells(elastic.all), against))
     if elastic.ambiguous.any():
-        rows.append(("… where the backlash flank is certain", against, str(elastic.unambiguous.poses), *statistics_cells(elastic.unambiguous)))  # fmt: skip
+        rows.append(("… where the backlash flank is certain", str(elastic.unambiguous.poses), *statistics_cells(elastic.unambiguous), against))  # fmt: skip
     if study.measured_verification is not None and study.truth is not None:
         seen = study.measured_verification.all
-        rows.append(("… as the tracker sees it", "instrument", str(seen.poses), *statistics_cells(seen)))
+        rows.append(("… as the instrument sees it", str(seen.poses), *statistics_cells(seen), "instrument"))
     if study.floor is not None:
-        rows.append(("floor: every parameter known", against, str(study.floor.poses), *statistics_cells(study.floor)))
+        rows.append(("floor: every parameter known", str(study.floor.poses), *statistics_cells(study.floor), against))
     return Table(
         "table-accuracy",
         "Accuracy on fresh poses",
-        ("model", "against", "poses", "mean / mm", "90 % within / mm", "worst / mm"),
+        ("model", "poses", "mean / mm", "90 % within / mm", "worst / mm", "against"),
         tuple(rows),
-        text_columns=(1,),
+        text_columns=(5,),
         strong=(strong,),
     )
 

@@ -3,7 +3,10 @@
 (function () {
   const dark = JSON.parse(document.getElementById("dark-colours").textContent);
   const scheme = window.matchMedia("(prefers-color-scheme: dark)");
-  const config = { responsive: true, displaylogo: false, modeBarButtonsToRemove: ["select2d", "lasso2d"] };
+  // Buttons by name: the default ones would offer to send the data to a server.
+  const config = { responsive: true, displaylogo: false, plotlyServerURL: "" };
+  const flatButtons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
+  const spaceButtons = [["toImage", "resetCameraDefault3d"]];
   const figures = new Map();
   let printing = false;
 
@@ -48,7 +51,10 @@
     }
     const waiting = place.querySelector(".waiting");
     if (waiting) waiting.remove();
-    return Plotly.react(place, data, layout, Object.assign({}, config, { displayModeBar: narrow ? false : "hover" }));
+    return Plotly.react(place, data, layout, Object.assign({}, config, {
+      displayModeBar: narrow ? false : "hover",
+      modeBarButtons: layout.scene ? spaceButtons : flatButtons,
+    }));
   }
 
   function drawAll() {
@@ -91,8 +97,14 @@
   }
 
   window.addEventListener("load", function () {
+    // After the first frame; a page in the background draws no frames, there the timer starts.
+    const timer = setTimeout(begin, 400);
+    function begin() {
+      clearTimeout(timer);
+      if (!figures.size) start();
+    }
     requestAnimationFrame(function () {
-      setTimeout(start, 0);
+      setTimeout(begin, 0);
     });
   });
 })();

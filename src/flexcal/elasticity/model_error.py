@@ -1,0 +1,120 @@
+"""What the fitted model leaves out, as a covariance of the residual: geometric errors, and friction that is not viscous."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.elasticity.parameters import pose_labels, viscous_name
+from flexcal.elasticity.prediction import Prediction, ResponseModel
+from flexcal.elasticity.residual import StageOneResidual
+from flexcal.frequency import FrequencyResponse
+from flexcal.model.names import GEOMETRY
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """How far the robot may be from what the model assumes, 1σ.
+
+    `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `friction`: deviation of the motor friction's
+    impedance from a viscous coefficient, relative to that coefficient, as a random function of frequency with knots every `octave`.
+    """
+
+    length: float = 3e-4
+    angle: float = 5e-4
+    friction: float = 0.15
+    octave: float = 0.5
+
+
+@dataclass(frozen=True, eq=False)
+class LowRank:
+    """Whitening of 1 + B Bᵀ by its thin factor: `basis` (m, k) orthonormal, `shrink` (k,) = 1 - 1/√(1 + s²)."""
+
+    basis: np.ndarray
+    shrink: np.ndarray
+    log_determinant: float
+
+    @classmethod
+    def of(cls, columns: np.ndarray) -> LowRank:
+        """From B (m, k) in whitened rows."""
+        factor, triangle = np.linalg.qr(columns)
+        turn, size, _ = np.linalg.svd(triangle)
+        return cls(factor @ turn, 1 - 1 / np.sqrt(1 + size**2), float(np.log1p(size**2).sum()))
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """(1 + B Bᵀ)^(-1/2) times rows (m,) or (m, c)."""
+        inner = self.basis.T @ rows
+        shrink = self.shrink if rows.ndim == 1 else self.shrink[:, None]
+        return rows - self.basis @ (shrink * inner)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelError:
+    """Model errors of all poses: of each pose alone (friction), then common to all (geometry)."""
+
+    poses: tuple[LowRank, ...]
+    common: LowRank
+
+    @classmethod
+    def of(
+        cls,
+        residual: StageOneResidual,
+        responses: Sequence[FrequencyResponse],
+        x: np.ndarray,
+        tolerances: Tolerances,
+    ) -> ModelError:
+        """To first order about the coordinates x (p,)."""
+        model = residual.model
+        blocks, columns = [], []
+        shifts = geometric_shifts(model, x, tolerances)
+        values = dict(zip(model.parameters.names, model.parameters.natural(x), strict=True))
+        labels = pose_labels(responses)
+        for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
+            nominal = model.responses(x)[k]
+            viscous = np.array([values[viscous_name(joint, label)] for joint in response.joints])
+            change = friction_shifts(nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave)
+            none = np.empty(0, dtype=int)
+            blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
+            columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shifts[k], none))))
+        return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (m,) or (m, c) that were whitened by the measurement alone, whitened by both."""
+        parts, start = [], 0
+        for block in self.poses:
+            count = len(block.basis)
+            parts.append(block.whiten(rows[start : start + count]))
+            start += count
+        return self.common.whiten(np.concatenate(parts))
+
+
+def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances) -> list[np.ndarray]:
+    """∂G (lines, E, E, g) of every pose by one standard deviation of each geometric error, by forward differences."""
+    base = model.responses(x)
+    shifts: list[list[np.ndarray]] = [[] for _ in base]
+    for joint in model.robot.joints:
+        for key in GEOMETRY:
+            size = tolerances.length if key.startswith("length") else tolerances.angle
+            name = f"{joint.name}.{key}"
+            moved = ResponseModel(
+                model.robot.with_values({name: model.robot.value(name) + size}), model.parameters, model.poses
+            )
+            for k, response in enumerate(moved.responses(x)):
+                shifts[k].append(response - base[k])
+    return [np.stack(columns, axis=-1) for columns in shifts]
+
+
+def friction_shifts(response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float) -> np.ndarray:
+    """∂G (L, E, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω."""
+    position = np.log2(frequencies_hz / frequencies_hz[0]) / octave
+    knots = np.arange(int(np.ceil(position[-1])) + 1)
+    hats = np.maximum(0.0, 1.0 - np.abs(position[:, None] - knots))
+    s = 2j * np.pi * frequencies_hz
+    columns = []
+    for axis in range(response.shape[-1]):
+        change = -size[axis] * response[:, :, axis, None] * response[:, None, axis, :] / s[:, None, None]
+        for hat in hats.T:
+            columns += [change * hat[:, None, None], 1j * change * hat[:, None, None]]
+    return np.stack(columns, axis=-1)

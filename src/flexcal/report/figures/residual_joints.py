@@ -1,0 +1,53 @@
+"""Residuals against every joint: what the model misses in one joint shows as a wave or a slope here."""
+
+from __future__ import annotations
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.data import PoseSet
+from flexcal.model import RobotModel
+from flexcal.report.figures.canvas import panels, single
+from flexcal.report.palette import ELASTIC, INK
+from flexcal.units import DEGREE, MILLIMETRE
+
+_BINS = 12
+_COLUMNS = 3
+
+
+def residual_joints(model: RobotModel, poses: PoseSet, residuals: np.ndarray) -> go.Figure:
+    """Distance (mm) of residuals (N, 3) m against each joint (degrees, or mm where prismatic), and its mean in twelve bins."""
+    rows = -(-model.n // _COLUMNS)
+    figure = panels(rows, _COLUMNS, 210 * rows + 70, list(model.joint_names))
+    distance = np.linalg.norm(residuals, axis=1) / MILLIMETRE
+    for i, joint in enumerate(model.joints):
+        at = {"row": i // _COLUMNS + 1, "col": i % _COLUMNS + 1}
+        revolute = joint.kind == "revolute"
+        q = poses.q[:, i] / (DEGREE if revolute else MILLIMETRE)
+        figure.add_trace(
+            go.Scatter(
+                x=single(q), y=single(distance), mode="markers", name="error", legendgroup="a", showlegend=i == 0,
+                marker={"color": ELASTIC, "size": 3.5, "opacity": 0.45},
+                hovertemplate="%{x:.1f}: %{y:.3f} mm",
+            ), **at,
+        )  # fmt: skip
+        centres, means = _binned(q, distance)
+        figure.add_trace(
+            go.Scatter(
+                x=single(centres), y=single(means), mode="lines+markers", name="mean", legendgroup="b", showlegend=i == 0,
+                line={"color": INK, "width": 1.6}, marker={"size": 4}, hoverinfo="skip",
+            ), **at,
+        )  # fmt: skip
+        figure.update_xaxes(title_text="degrees" if revolute else "mm", nticks=5, **at)
+        figure.update_yaxes(matches="y" if i else None, showticklabels=at["col"] == 1, **at)
+    figure.update_yaxes(rangemode="tozero", nticks=5)
+    figure.update_yaxes(title_text="error / mm", row=(rows + 1) // 2, col=1)
+    return figure
+
+
+def _binned(q: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    edges = np.linspace(q.min(), q.max() + 1e-9, _BINS + 1)
+    number = np.clip(np.digitize(q, edges) - 1, 0, _BINS - 1)
+    filled = [k for k in range(_BINS) if (number == k).any()]
+    centres = 0.5 * (edges[:-1] + edges[1:])[filled]
+    return centres, np.array([values[number == k].mean() for k in filled])

@@ -1,0 +1,88 @@
+"""The document and the table that a two-stage run leaves for scripts (FORMATS: results.json, verification.csv)."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.atomic import write_text
+from flexcal.calibration import ErrorStatistics
+from flexcal.export.urdf import UrdfExport
+from flexcal.model.names import SPRINGS
+from flexcal.report.study import TwoStageStudy
+from flexcal.workflow.results import identifiability_block
+
+
+def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, Any]:
+    """The content of results.json."""
+    truth = study.truth or {}
+    estimate = study.stiffness.estimate
+    stage_one: dict[str, dict[str, Any]] = {}
+    for kind in ("stiffness", "damping"):
+        stage_one[kind] = {
+            joint.name: {
+                SPRINGS[c]: estimate.quantity(
+                    f"{joint.name}.{SPRINGS[c]}.{kind}", truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
+                )
+                for c in joint.components
+            }
+            for joint in study.nominal.elastic
+        }
+    measured = study.measured_verification
+    rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(study.rigid, study.rigid_verification, strict=True)}
+    return {
+        "stage1": stage_one
+        | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
+        "identifiability": identifiability_block(study.calibration.identifiability),
+        "calibration": study.calibration.errors.in_millimetres(),
+        "calibration_fit": {
+            "reduced_chi2": study.calibration.estimate.reduced_chi2,
+            "nominal": study.nominal_at_calibration.all.in_millimetres(),
+            "rigid": study.rigid[0].errors.in_millimetres(),
+            "wrong_flanks": wrong_flanks(study),
+        },
+        "verification": {
+            "nominal": study.nominal_verification.all.in_millimetres(),
+            "elastic": study.elastic_verification.all.in_millimetres(),
+            "elastic_unambiguous": study.elastic_verification.unambiguous.in_millimetres(),
+            "rigid": study.rigid_verification[0].all.in_millimetres(),
+            "measured": (measured.all if measured else ErrorStatistics.of(np.zeros((0, 3)))).in_millimetres(),
+            "floor": study.floor.in_millimetres() if study.floor else None,
+        }
+        | {name: v.all.in_millimetres() for name, v in rigid.items()},
+        "export": {
+            "urdf": exported.path.name,
+            "lost": list(exported.lost),
+            "mean_mm": exported.mean_loss * 1e3,
+            "max_mm": exported.max_loss * 1e3,
+        },
+        "seconds": dict(study.seconds) | {"total": sum(study.seconds.values())},
+        "seed": study.seed,
+        "plan": study.plan.name,
+        "command": study.command,
+    }
+
+
+def wrong_flanks(study: TwoStageStudy) -> int:
+    """Calibration poses at which the flank assumed for a backlash is not the true one."""
+    from flexcal.model import static_equilibrium
+
+    if study.truth is None:
+        return 0
+    poses = study.calibration.poses
+    true = static_equilibrium(study.nominal.with_values(study.truth), poses.q, poses.payload).flank
+    return int((true != study.calibration.flank).any(axis=1).sum())
+
+
+def write_verification(path: Path, study: TwoStageStudy) -> None:
+    """Write verification.csv: pose, q1…, x, y, z (noise-free truth), elastic_x…, rigid_x…, unambiguous; m and rad."""
+    poses, elastic, rigid = study.verification_poses, study.elastic_verification, study.rigid_verification[0]
+    header = ["pose", *(f"q{i}" for i in range(1, poses.q.shape[1] + 1)), "x", "y", "z"]
+    header += [f"{kind}_{axis}" for kind in ("elastic", "rigid") for axis in "xyz"] + ["unambiguous"]
+    numbers = np.hstack([poses.q, poses.position, elastic.position, rigid.position])
+    lines = [",".join(header)]
+    for pose, row, ambiguous in zip(poses.pose, numbers, elastic.ambiguous, strict=True):
+        lines.append(",".join([str(pose), *(f"{v:.9f}" for v in row), "false" if ambiguous else "true"]))
+    write_text(path, "\n".join(lines) + "\n")

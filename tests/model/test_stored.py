@@ -1,0 +1,94 @@
+"""Estimates on disk find their way into the robot."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.errors import InputError
+from flexcal.estimates_file import write_estimates
+from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.model import RobotModel
+from flexcal.model.stored import apply_estimates
+
+
+def estimate(*parameters: Parameter) -> Estimate:
+    size = len(parameters)
+    return Estimate(
+        parameters=Parameters(parameters),
+        covariance=np.diag(np.arange(1.0, size + 1)) * 1e-8,
+        rank=size,
+        dropped=(),
+        identifiable=(True,) * size,
+        cost=1.0,
+        chi2=2.0,
+        degrees_of_freedom=10,
+        status="converged",
+        message="",
+        iterations=1,
+    )
+
+
+@pytest.fixture
+def robot(ur5: RobotModel, tmp_path: Path, examples: Path) -> Path:
+    for name in ("robot.yaml", "ur5.urdf"):
+        (tmp_path / name).write_bytes((examples / "ur5_tracker" / name).read_bytes())
+    return tmp_path / "robot.yaml"
+
+
+def test_values_and_covariance_come_with_the_robot(robot: Path) -> None:
+    found = estimate(Parameter("elbow_joint.offset", "rad", 1e-3), Parameter("tool.length_x", "m", -2e-4))
+    write_estimates(robot.parent / "estimates.yaml", "calibration", found)
+    model = RobotModel.from_yaml(robot)
+    assert model.value("elbow_joint.offset") == 1e-3 and model.value("tool.length_x") == -2e-4
+    assert model.posterior.parameters.names == found.parameters.names
+    assert np.array_equal(model.posterior.covariance, found.covariance)
+    assert RobotModel.from_yaml(robot, estimates=False).value("elbow_joint.offset") == 0.0
+
+
+def test_own_block_can_be_left_out(robot: Path) -> None:
+    path = robot.parent / "estimates.yaml"
+    write_estimates(path, "calibration", estimate(Parameter("elbow_joint.offset", "rad", 1e-3)))
+    write_estimates(path, "stiffness", estimate(Parameter("forearm_link.mass", "kg", 3.0, scale="log")))
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    assert apply_estimates(nominal, path).value("forearm_link.mass") == 3.0
+    model = apply_estimates(nominal, path, without="stiffness")
+    assert model.value("elbow_joint.offset") == 1e-3
+    assert model.value("forearm_link.mass") == nominal.value("forearm_link.mass")
+
+
+def test_estimated_backlash_counts_as_declared(ur5: RobotModel, robot: Path) -> None:
+    assert ur5.backlash_joints == ()
+    write_estimates(
+        robot.parent / "estimates.yaml",
+        "calibration",
+        estimate(Parameter("elbow_joint.backlash", "rad", 2e-5)),
+    )
+    assert RobotModel.from_yaml(robot).config.geometry.backlash == ("elbow_joint",)
+
+
+def test_values_of_one_experiment_are_not_the_robots(robot: Path) -> None:
+    found = estimate(
+        Parameter("elbow_joint.viscous.pose_3", "N m s/rad", 5.0),
+        Parameter("elbow_joint.offset", "rad", 1e-3),
+    )
+    write_estimates(robot.parent / "estimates.yaml", "stiffness", found)
+    assert RobotModel.from_yaml(robot).posterior.parameters.names == ("elbow_joint.offset",)
+
+
+def test_estimates_of_another_robot_are_refused(robot: Path) -> None:
+    path = robot.parent / "estimates.yaml"
+    write_estimates(path, "calibration", estimate(Parameter("joint_9.offset", "rad", 1e-3)))
+    with pytest.raises(InputError, match=r"estimates\.yaml: the block 'calibration' has 'joint_9\.offset'"):
+        RobotModel.from_yaml(robot)
+
+
+def test_later_block_wins_and_both_are_kept(robot: Path) -> None:
+    path = robot.parent / "estimates.yaml"
+    mass = Parameter("forearm_link.mass", "kg", 3.0, scale="log")
+    write_estimates(path, "stiffness", estimate(mass, Parameter("wrist_1_link.mass", "kg", 1.5, scale="log")))
+    write_estimates(path, "calibration", estimate(replace(mass, value=2.5)))
+    model = RobotModel.from_yaml(robot)
+    assert model.value("forearm_link.mass") == 2.5 and model.value("wrist_1_link.mass") == 1.5
+    assert set(model.posterior.parameters.names) == {"forearm_link.mass", "wrist_1_link.mass"}
