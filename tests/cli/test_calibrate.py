@@ -68,11 +68,8 @@ def test_running_twice_gives_the_same_bytes(run, ur5_folder: Path, some: Path) -
     run(*arguments)
     first = snapshot(ur5_folder)
     run(*arguments)
-    second = snapshot(ur5_folder)
-    assert set(first) == {*second} and "estimates.yaml" in first and "estimates.npz" in first
-    assert first["estimates.yaml"] == second["estimates.yaml"]
-    with np.load(ur5_folder / "estimates.npz") as arrays:
-        assert arrays["calibration.covariance"].shape[0] == len(arrays["calibration.names"])
+    assert snapshot(ur5_folder) == first
+    assert "estimates.yaml" in first and "estimates.npz" in first
 
 
 def test_out_leaves_the_robots_folder_alone(run, ur5_folder: Path, some: Path, tmp_path: Path) -> None:

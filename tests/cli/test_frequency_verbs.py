@@ -14,9 +14,11 @@ import pytest
 from cli_files import FLEXCAL, copied
 from test_bad_input import refused
 
+from flexcal.cell import read_truth
 from flexcal.cli.main import main
-from flexcal.data import MultisinePlan, read_plan_of, write_plan
+from flexcal.data import MultisinePlan, read_estimates, read_plan_of, write_plan
 from flexcal.frequency import FrequencyResponse
+from flexcal.model import RobotModel
 
 LOG = "pose_2_realisation_1_experiment_3_minus.parquet"
 
@@ -106,6 +108,67 @@ def test_responses(run, recorded: Path, tmp_path: Path) -> None:
     assert np.median(np.abs(first.std / first.response)[:, [0, 1, 2], [0, 1, 2]]) < 0.2
     document = run(*arguments, "--json").document
     assert [entry["pose"] for entry in document["responses"]] == [1, 2]
+
+
+def test_stiffness(run, recorded: Path, tmp_path: Path) -> None:
+    """Nine springs from two poses and few lines: the intervals of what is identifiable hold the truth, within reason."""
+    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
+    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
+    page = run("identify", "stiffness", robot, tmp_path / "responses")
+    assert page.status == 0
+    assert "joint_3.bearing_y.stiffness" in page.out and "flexcal design poses" in page.out
+    estimates = robot.parent / "estimates.yaml"
+    first = estimates.read_bytes()
+    document = run("identify", "stiffness", robot, tmp_path / "responses", "--json").document
+    assert estimates.read_bytes() == first
+    assert document["fit"]["reference_motion_modelled"]
+    truth = read_truth(recorded / "recorded" / "truth.yaml")
+    pulls = []
+    for joint, springs in document["stage1"]["stiffness"].items():
+        assert set(springs) == {"drive", "bearing_x", "bearing_y"}
+        for spring, found in springs.items():
+            if found["identifiable"]:
+                pulls.append((found["estimate"] - truth[f"{joint}.{spring}.stiffness"]) / found["std"])
+    assert len(pulls) >= 5 and np.median(np.abs(pulls)) < 2
+    assert RobotModel.from_yaml(robot).value("joint_1.drive.stiffness") == pytest.approx(
+        document["parameters"]["joint_1.drive.stiffness"]["estimate"]
+    )
+
+
+def test_stiffness_leaves_out_what_calibration_made_of_it(run, recorded: Path, tmp_path: Path) -> None:
+    """A calibration afterwards, which re-estimates stiffness, must not change what the same responses say of it."""
+    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
+    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
+    stiffness = ("identify", "stiffness", robot, tmp_path / "responses", "--json")
+    first = run(*stiffness).document["parameters"]
+    run("design", "poses", robot, "--count", 30, "--candidates", 300, "--out", tmp_path / "poses.yaml")
+    measured = ("measure", tmp_path / "poses.yaml", "--robot", robot, "--cell", "virtual", "--seed", 4)
+    run(*measured, "--out", tmp_path / "poses")
+    calibrated = run("calibrate", robot, tmp_path / "poses" / "poses.csv", "--json").document["parameters"]
+    name = "joint_2.drive.stiffness"
+    assert calibrated[name]["std"] < first[name]["std"]
+    assert set(read_estimates(robot.parent / "estimates.yaml")) == {"stiffness", "calibration"}
+    again = run(*stiffness).document["parameters"]
+    assert again[name]["estimate"] == pytest.approx(first[name]["estimate"], rel=2e-2)
+    assert again["link_3.mass"]["estimate"] == pytest.approx(first["link_3.mass"]["estimate"], rel=2e-2)
+
+
+def test_stiffness_of_a_rigid_robot(run, recorded: Path, ur5_folder: Path, tmp_path: Path) -> None:
+    run(
+        "identify",
+        "response",
+        recorded / "robot.yaml",
+        recorded / "recorded",
+        "--out",
+        tmp_path / "responses",
+    )
+    arguments = ("identify", "stiffness", ur5_folder / "robot.yaml", tmp_path / "responses")
+    assert "no elastic joint" in refused(run, ur5_folder, *arguments)
+
+
+def test_folder_without_responses(run, recorded: Path, tmp_path: Path) -> None:
+    arguments = ("identify", "stiffness", recorded / "robot.yaml", tmp_path)
+    assert "flexcal identify response" in refused(run, tmp_path, *arguments)
 
 
 def alter_log(folder: Path, change: Callable[[pl.DataFrame], pl.DataFrame]) -> None:

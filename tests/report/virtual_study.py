@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -37,7 +37,11 @@ class FittedStiffness:
 
 def hidden_truth(model: RobotModel, rng: np.random.Generator) -> dict[str, float]:
     """A robot as far from its data sheet as the virtual cell's."""
-    truth = {name: value * (1 + 0.07 * rng.normal()) for name, value in model.values.items() if name.endswith(".mass")}
+    truth = {
+        name: value * (1 + 0.07 * rng.normal())
+        for name, value in model.values.items()
+        if name.endswith(".mass")
+    }
     truth = {name: value for name, value in truth.items() if name != "payload.mass"}
     for joint in model.joints:
         for key in "xyz":
@@ -50,7 +54,9 @@ def hidden_truth(model: RobotModel, rng: np.random.Generator) -> dict[str, float
         for spring in SPRINGS:
             for kind in ("stiffness", "damping"):
                 name = f"{elastic.name}.{spring}.{kind}"
-                truth[name] = model.value(name) * np.exp((0.15 if kind == "stiffness" else 0.3) * rng.normal())
+                truth[name] = model.value(name) * np.exp(
+                    (0.15 if kind == "stiffness" else 0.3) * rng.normal()
+                )
     station = {f"station.tracker.{key}": 3e-4 * rng.normal() for key in "xyz"}
     return truth | BACKLASH | station
 
@@ -70,7 +76,11 @@ def stage_one(model: RobotModel, truth: dict[str, float], rng: np.random.Generat
     for i, joint in enumerate(model.joints):
         name = f"{joint.link}.mass"
         if i >= 1 and model.mass[i] > 0:
-            items.append(Parameter(name, "kg", float(truth[name] * np.exp(0.02 * rng.normal())), prior_std=0.07, scale="log"))
+            items.append(
+                Parameter(
+                    name, "kg", float(truth[name] * np.exp(0.02 * rng.normal())), prior_std=0.07, scale="log"
+                )
+            )
             stds.append(0.02)
     for i, joint in enumerate(model.joints):
         for key in "xyz":
@@ -175,11 +185,15 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
         floor=ErrorStatistics.of(floor),
         truth=truth,
         paper=TX90L_PAPER,
-        seconds={"frequency": 61.2, "stage1": 4.1, "poses": 12.6, "stage2": took, "verification": 0.8, "total": 79.0},
+        seconds={
+            "frequency": 61.2,
+            "stage1": 4.1,
+            "poses": 12.6,
+            "stage2": took,
+            "verification": 0.8,
+            "total": 79.0,
+        },
         results={"seed": seed},
         seed=seed,
         command=f"flexcal demo --seed {seed} --out demo",
     )
-
-
-__all__ = ["replace", "simulate_study"]

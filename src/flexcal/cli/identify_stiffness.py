@@ -63,6 +63,10 @@ class IdentifyStiffness:
         fit = document["fit"]
         if fit["status"] != "converged":
             console.say(f"the fit has not converged ({fit['message']}); do not trust it")
+        if not fit["reference_motion_modelled"]:
+            console.say(
+                "there is no plan.yaml beside the responses: the reference motion is ignored, damping comes out too large"
+            )
         if fit["reduced_chi2"] is not None:
             console.say(
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"

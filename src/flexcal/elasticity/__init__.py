@@ -1,1 +1,27 @@
-"""TODO"""
+"""Stage 1: from frequency responses to the stiffness and damping of drives and bearings, with true uncertainties."""
+
+from flexcal.elasticity.identify import StiffnessResult, identify_stiffness
+from flexcal.elasticity.model_error import Tolerances
+from flexcal.elasticity.parameters import spring_names, stage_one_parameters
+from flexcal.elasticity.prediction import ResponseModel
+from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
+from flexcal.elasticity.search import MultiStart, PopulationSearch, Search
+from flexcal.elasticity.weighting import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
+
+__all__ = [
+    "CovarianceWeighting",
+    "MultiStart",
+    "PaperWeighting",
+    "PopulationSearch",
+    "ReferenceMotion",
+    "ResponseModel",
+    "Search",
+    "StiffnessResult",
+    "Tolerances",
+    "UniformWeighting",
+    "Weighting",
+    "identify_stiffness",
+    "reference_shift",
+    "spring_names",
+    "stage_one_parameters",
+]

@@ -19,13 +19,25 @@ class Tolerances:
     """How far the robot may be from what the model assumes, 1σ.
 
     `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `friction`: deviation of the motor friction's
-    impedance from a viscous coefficient, relative to that coefficient, as a random function of frequency with knots every `octave`.
+    impedance from a viscous coefficient, relative to that coefficient; `backlash`: deviation of a gap's effect from the softening
+    of its drive, relative to that softening; both are complex random functions of frequency with knots every `octave`.
     """
 
     length: float = 3e-4
     angle: float = 5e-4
-    friction: float = 0.15
+    friction: float = 0.1
+    backlash: float = 0.5
     octave: float = 0.5
+
+    @classmethod
+    def none(cls) -> Tolerances:
+        """The model is exact."""
+        return cls(0.0, 0.0, 0.0, 0.0)
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is left out."""
+        return max(self.length, self.angle, self.friction, self.backlash) > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +80,18 @@ class ModelError:
         """To first order about the coordinates x (p,)."""
         model = residual.model
         blocks, columns = [], []
+        predictions = model.predict(x)
         shifts = geometric_shifts(model, x, tolerances)
         values = dict(zip(model.parameters.names, model.parameters.natural(x), strict=True))
         labels = pose_labels(responses)
         for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
-            nominal = model.responses(x)[k]
+            nominal = predictions[k].response
             viscous = np.array([values[viscous_name(joint, label)] for joint in response.joints])
             change = friction_shifts(nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave)
+            number = list(model.poses[k].softening.values())
+            column = [list(predictions[k].columns).index(n) for n in number]
+            gap = tolerances.backlash * predictions[k].derivatives[..., column]
+            change = np.concatenate([change, over_frequency(gap, response.frequencies_hz, tolerances.octave)], axis=-1)
             none = np.empty(0, dtype=int)
             blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
             columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shifts[k], none))))
@@ -108,13 +125,16 @@ def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances
 
 def friction_shifts(response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float) -> np.ndarray:
     """∂G (L, E, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω."""
+    s = 2j * np.pi * frequencies_hz[:, None, None, None]
+    change = -np.einsum("lia,laj->lija", response, response) * size / s
+    return over_frequency(change, frequencies_hz, octave)
+
+
+def over_frequency(change: np.ndarray, frequencies_hz: np.ndarray, octave: float) -> np.ndarray:
+    """Changes (L, E, E, k) that may come in any complex proportion that varies over frequency, (L, E, E, 2 k knots)."""
     position = np.log2(frequencies_hz / frequencies_hz[0]) / octave
     knots = np.arange(int(np.ceil(position[-1])) + 1)
     hats = np.maximum(0.0, 1.0 - np.abs(position[:, None] - knots))
-    s = 2j * np.pi * frequencies_hz
-    columns = []
-    for axis in range(response.shape[-1]):
-        change = -size[axis] * response[:, :, axis, None] * response[:, None, axis, :] / s[:, None, None]
-        for hat in hats.T:
-            columns += [change * hat[:, None, None], 1j * change * hat[:, None, None]]
-    return np.stack(columns, axis=-1)
+    spread = change[..., None] * hats[:, None, None, None, :]
+    spread = spread.reshape(*change.shape[:3], -1)
+    return np.concatenate([spread, 1j * spread], axis=-1)

@@ -39,6 +39,17 @@ class PoseModel:
     softening: dict[str, int]
     delays: np.ndarray
 
+    def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
+        """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
+        known = {name: float(natural[number]) for name, number in self.robot_names.items()}
+        for name, number in self.softening.items():
+            known[name] = known.get(name, robot.value(name)) * float(np.exp(-natural[number]))
+        payload = self.payload
+        if payload is not None and payload > 0 and "payload.mass" in known:
+            payload *= known["payload.mass"] / float(robot.payload_mass[0])
+            known["payload.mass"] = payload
+        return known, payload
+
 
 @dataclass(frozen=True, eq=False)
 class ResponseModel:
@@ -97,14 +108,8 @@ class ResponseModel:
     def _pose(
         self, pose: PoseModel, values: np.ndarray, slopes: np.ndarray, *, derivatives: bool
     ) -> Prediction:
-        known = {name: float(values[number]) for name, number in pose.robot_names.items()}
-        for name, number in pose.softening.items():
-            known[name] = known.get(name, self.robot.value(name)) * float(np.exp(-values[number]))
+        known, payload = pose.values(self.robot, values)
         robot = self.robot.with_values(known)
-        payload = pose.payload
-        if payload is not None and payload > 0 and "payload.mass" in known:
-            payload *= known["payload.mass"] / float(self.robot.payload_mass[0])
-            known["payload.mass"] = payload
         names = tuple(dict.fromkeys((*pose.robot_names, *pose.softening))) if derivatives else ()
         system = linearise(robot, pose.q, payload, derivatives=names)
         s = 2j * np.pi * pose.frequencies_hz

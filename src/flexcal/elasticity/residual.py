@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -24,12 +24,14 @@ class PoseResidual:
 
     `logarithmic` (L, n, n) tells the elements whose error is log(Ĝ/G); the error of the others is (Ĝ - G)/`scale`, with scale
     √|Ĝ_ii Ĝ_jj| so that a coupling near zero counts as what it is beside its axes. `factor` (L, n², n²) whitens vec of the errors.
+    `shift` (L, n, n) is added to every prediction.
     """
 
     measured: np.ndarray
     logarithmic: np.ndarray
     scale: np.ndarray
     factor: np.ndarray
+    shift: np.ndarray | float = 0.0
 
     @classmethod
     def of(cls, response: FrequencyResponse, weighting: Weighting) -> PoseResidual:
@@ -50,12 +52,12 @@ class PoseResidual:
 
     def residual(self, predicted: np.ndarray) -> np.ndarray:
         """Whitened rows (2 L n²,), line by line: real parts, then imaginary parts."""
-        white = self.factor @ _vec(self.errors(predicted))[:, :, None]
+        white = self.factor @ _vec(self.errors(predicted + self.shift))[:, :, None]
         return _real(white)[:, 0]
 
     def jacobian(self, prediction: Prediction) -> np.ndarray:
         """∂(residual)/∂x (2 L n², c) by the parameters of `prediction.columns`."""
-        unit = np.where(self.logarithmic, prediction.response, self.scale)
+        unit = np.where(self.logarithmic, prediction.response + self.shift, self.scale)
         change = prediction.derivatives / -unit[..., None]
         lines, n, _, columns = change.shape
         return _real(self.factor @ np.swapaxes(change, 1, 2).reshape(lines, n * n, columns))
@@ -74,6 +76,11 @@ class StageOneResidual:
     ) -> StageOneResidual:
         """For measured responses, in the order of the model's poses."""
         return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
+
+    def shifted(self, shifts: Sequence[np.ndarray]) -> StageOneResidual:
+        """With known changes (L, n, n) of every pose's response added to what the model predicts."""
+        poses = [replace(pose, shift=shift) for pose, shift in zip(self.poses, shifts, strict=True)]
+        return replace(self, poses=tuple(poses))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """All rows (m,), pose by pose."""

@@ -12,8 +12,9 @@ import numpy as np
 from flexcal.calibration import Calibration, ErrorStatistics, TermSelection
 from flexcal.model import RobotModel
 from flexcal.report.checks import check_left_out, check_outliers, check_rank, check_residual
-from flexcal.report.notation import millimetres, ratio, statistics_cells
-from flexcal.report.page import Check, Fact, Page, Rung, Section, Table, Verdict, worst
+from flexcal.report.first_screen import rung, three_facts
+from flexcal.report.notation import NOTHING, millimetres, ratio, statistics_cells
+from flexcal.report.page import Check, Page, Section, Table, Verdict, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.geometry import error_figure, pose_figure
 from flexcal.report.sections.identifiability import identifiability_blocks
@@ -87,26 +88,21 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     checks = calibration_checks(study)
     status = worst(checks)
     answer, headline = TRUST[status]
-    passed = sum(check.status == "good" for check in checks)
-    rungs = [_rung("as delivered", before, "nominal")]
+    rungs = [rung("as delivered", before, "nominal")]
     if study.rigid is not study.selected:
-        rungs.append(_rung("rigid geometry", rigid, "rigid"))
-    rungs.append(_rung("calibrated", after, "elastic"))
+        rungs.append(rung("rigid geometry", rigid, "rigid"))
+    rungs.append(rung("calibrated", after, "elastic"))
     return Verdict(
         status,
         headline,
-        f"As delivered, and after the best placement of the instrument, points were up to {millimetres(before.max)} mm from where the robot "
-        f"should have been. The calibrated model is within {millimetres(after.p90)} mm at nine of ten of the same {after.poses} points and "
-        f"{millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} better.",
-        (
-            Fact("How accurate was it?", millimetres(before.p90), "mm", f"9 of 10 points were within this, as delivered. Mean {millimetres(before.mean)}, worst {millimetres(before.max)} mm."),
-            Fact("How accurate is it?", millimetres(after.p90), "mm", f"9 of 10 points are within this, calibrated. Mean {millimetres(after.mean)}, worst {millimetres(after.max)} mm."),
-            Fact("Can I trust it?", answer, "", f"{passed} of {len(checks)} checks are good; each is explained below.", status),
-        ),
+        f"As delivered, and after the best placement of the instrument, points were up to {millimetres(before.max)} mm from where the "
+        f"robot should have been. The calibrated model is within {millimetres(after.p90)} mm at nine of ten of the same {after.poses} "
+        f"points and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} better.",
+        three_facts(before, after, checks, answer, "points"),
         tuple(rungs),
         f"Error of the robot at the {after.poses} measured points",
         checks,
-    )  # fmt: skip
+    )
 
 
 def calibration_checks(study: CalibrationStudy) -> tuple[Check, ...]:
@@ -123,7 +119,7 @@ def calibration_checks(study: CalibrationStudy) -> tuple[Check, ...]:
 
 
 def _accuracy_section(study: CalibrationStudy) -> Section:
-    rows = [("as delivered, after registration", *_row(ErrorStatistics.of(study.before)), "–")]
+    rows = [("as delivered, after registration", *_row(ErrorStatistics.of(study.before)), NOTHING)]
     if study.rigid is not study.selected:
         rows.append(("rigid geometry", *_row(study.rigid.errors), str(study.rigid.identifiability.rank)))
     rows.append(("calibrated", *_row(study.selected.errors), str(study.selected.identifiability.rank)))
@@ -145,10 +141,6 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
 
 def _row(statistics: ErrorStatistics) -> tuple[str, ...]:
     return (str(statistics.poses), *statistics_cells(statistics))
-
-
-def _rung(label: str, s: ErrorStatistics, kind: Any) -> Rung:
-    return Rung(label, s.mean, s.p90, s.max, kind)
 
 
 def _names(fit: Calibration) -> tuple[str, ...]:

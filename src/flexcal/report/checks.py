@@ -12,7 +12,7 @@ from flexcal.report.figures.predicted_quantiles import prediction_std
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Check
 
-BOUND_95 = 1.6142
+BOUND_95 = 1.6140
 """Distance in standard deviations (of the distance) that 95 % of errors stay below when they are alike in three directions."""
 
 FEW_POSES = 20
@@ -31,27 +31,42 @@ def check_fresh_poses(calibration: Calibration, verification: Verification) -> C
         return Check(question, f"{answer} That is few; verify on {FEW_POSES} or more.", "care")
     if fresh.p90 > 3 * fitted.p90:
         return Check(
-            question, f"{answer} Fresh poses are much worse: the fit has learnt its own poses or misses a term.", "care"
+            question,
+            f"{answer} Fresh poses are much worse: the fit has learnt its own poses or misses a term.",
+            "care",
         )
     return Check(question, answer, "good")
 
 
-def check_claimed_uncertainty(verification: Verification, noise: np.ndarray | None = None) -> Check:
+def check_claimed_uncertainty(
+    verification: Verification, noise: np.ndarray | None = None, *, noise_given: bool = True
+) -> Check:
     """Whether errors at verification poses stay within the bounds that the parameters' covariance predicts."""
     question = "Are the errors as large as predicted?"
+    if not noise_given:
+        return Check(
+            question,
+            "The files state no measurement noise, so errors cannot be compared with a prediction.",
+            "unknown",
+        )
     clear = ~verification.ambiguous
     std = prediction_std(verification, noise)[clear]
     if not clear.any() or not (std > 0).all():
-        return Check(question, "No uncertainty was predicted at these poses, so it cannot be compared.", "care")
+        return Check(
+            question, "No uncertainty was predicted at these poses, so it cannot be compared.", "unknown"
+        )
     size = np.linalg.norm(verification.errors[clear], axis=1)
     inside = float((size < BOUND_95 * std).mean())
     scale = float(np.sqrt((size**2).mean() / (std**2).mean()))
+    some = "the poses" if clear.all() else "the poses with a certain flank"
     answer = (
-        f"{100 * inside:.0f} % of the poses with a certain flank lie within the bound predicted for 95 % of them; "
+        f"{100 * inside:.0f} % of {some} lie within the bound predicted for 95 % of them; "
         f"errors are {scale:.2f} times the predicted size."
     )
     if inside < 0.75:
-        return Check(question, f"{answer} The predicted uncertainties are too small: the model lacks something.", "bad")
+        return Check(
+            question, f"{answer} The predicted uncertainties are too small: the model lacks something.", "bad"
+        )
     if inside < 0.88:
         return Check(question, f"{answer} Predicted uncertainties are somewhat too small.", "care")
     return Check(question, answer, "good")
@@ -65,12 +80,16 @@ def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = Tru
         return Check(
             question,
             "The files state no measurement noise, so the scatter about the fit stands for it and this cannot be judged.",
-            "care",
+            "unknown",
         )
     value = estimate.reduced_chi2
-    answer = f"χ² per degree of freedom is {value:.2f}; one means that noise explains everything that is left."
+    answer = (
+        f"χ² per degree of freedom is {value:.2f}; one means that noise explains everything that is left."
+    )
     if not np.isfinite(value) or value > 4:
-        return Check(question, f"{answer} The model misses something that is much larger than the noise.", "bad")
+        return Check(
+            question, f"{answer} The model misses something that is much larger than the noise.", "bad"
+        )
     if value > 1.6:
         return Check(question, f"{answer} Something small is missing from the model.", "care")
     if value < 0.4:
@@ -137,11 +156,11 @@ def check_left_out(calibration: Calibration, selection: TermSelection | None) ->
         )
     _, order, workspace = rows[0]
     mean = calibration.errors.mean
-    answer = (
-        f"Left out in turn, poses are {millimetres(workspace)} mm off on average, {millimetres(mean)} mm when part of the fit."
-    )
+    answer = f"Left out in turn, poses are {millimetres(workspace)} mm off on average, {millimetres(mean)} mm when part of the fit."
     if max(order, workspace) > 1.5 * mean:
-        return Check(question, f"{answer} That is a large step: the model is too rich for these poses.", "care")
+        return Check(
+            question, f"{answer} That is a large step: the model is too rich for these poses.", "care"
+        )
     return Check(question, answer, "good")
 
 
@@ -151,7 +170,9 @@ def check_outliers(calibration: Calibration) -> Check:
     found = len(calibration.estimate.outliers)
     if found:
         share = found / len(calibration.poses)
-        answer = f"{found} of {len(calibration.poses)} were set aside by the robust loss; they are listed below."
+        answer = (
+            f"{found} of {len(calibration.poses)} were set aside by the robust loss; they are listed below."
+        )
         return Check(question, answer, "good" if share <= 0.02 else "care")
     fit = calibration.errors
     if fit.max > 4 * fit.p90:

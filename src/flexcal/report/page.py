@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING, Any, Literal
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-Status = Literal["good", "care", "bad"]
+Status = Literal["good", "care", "bad", "unknown"]
+"""A judgement; "unknown" where the data do not allow one, which counts neither way."""
 
 
 @dataclass(frozen=True)
@@ -55,12 +56,18 @@ class Verdict:
     rungs_caption: str
     checks: tuple[Check, ...]
 
+    @property
+    def tally(self) -> str:
+        """How many checks are good, in words."""
+        return tally(self.checks)
+
 
 @dataclass(frozen=True)
 class Table:
-    """A table; the first cell of a row names it. `text_columns` are the numbers of columns that hold words.
+    """A table; the first cell of a row names it, and a cell that is None belongs to the one before it.
 
-    A cell that is None belongs to the one before it. `strong` are numbers of rows that matter most, `folded` hides the table behind its caption until asked for.
+    `text_columns` are the numbers of columns that hold words, `strong` of the rows that matter most; `folded` hides the table behind
+    its caption until asked for.
     """
 
     id: str
@@ -150,8 +157,15 @@ class Page:
         return tuple(b for s in self.sections for b in s.blocks if isinstance(b, FigureBlock))
 
 
+def tally(checks: Sequence[Check]) -> str:
+    """How many checks are good, and how many could not be judged, in words."""
+    good, unknown = (sum(check.status == status for check in checks) for status in ("good", "unknown"))
+    words = f"{good} of {len(checks)} checks are good"
+    return f"{words}, {unknown} cannot be judged" if unknown else words
+
+
 def worst(checks: Sequence[Check]) -> Status:
-    """The status of the least good check."""
+    """The status of the least good check; those that could not be judged do not count."""
     for status in ("bad", "care"):
         if any(check.status == status for check in checks):
             return status

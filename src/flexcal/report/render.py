@@ -14,8 +14,8 @@ from flexcal.report.ladder import ladder
 from flexcal.report.page import FigureBlock, Page
 from flexcal.report.palette import DARK, LIGHT, dark_of
 
-_MARKS = {"good": "✓", "care": "!", "bad": "✗"}
-_WORDS = {"good": "good", "care": "take care", "bad": "not good"}
+_MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
+_WORDS = {"good": "good", "care": "take care", "bad": "not good", "unknown": "not known"}
 
 
 def write_page(path: str | Path, page: Page) -> None:

@@ -13,8 +13,9 @@ from flexcal.report.checks import (
     check_springs,
     check_truth,
 )
+from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.notation import millimetres, ratio
-from flexcal.report.page import Check, Fact, Page, Rung, Status, Verdict, worst
+from flexcal.report.page import Check, Page, Rung, Status, Verdict, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.comparison import comparison_section
 from flexcal.report.sections.geometry import geometry_section
@@ -29,6 +30,7 @@ TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Calibrated, and the numbers can be trusted"),
     "care": ("With care", "Calibrated; read the remarks before relying on it"),
     "bad": ("No", "Do not rely on this calibration yet"),
+    "unknown": ("Unknown", "Calibrated; nothing could be checked"),
 }
 """Answer and headline by what the worst check says."""
 
@@ -67,37 +69,16 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
     checks = two_stage_checks(study)
     status = worst(checks)
     answer, headline = TRUST[status]
-    passed = sum(check.status == "good" for check in checks)
     sentence = (
-        f"As delivered, the tool was up to {millimetres(before.max)} mm from where it should be. On {after.poses} fresh poses it is now within "
-        f"{millimetres(after.p90)} mm at nine of ten and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} better. The best "
-        f"calibration without elasticity would leave {millimetres(rigid.p90)} and {millimetres(rigid.max)} mm."
+        f"As delivered, the tool was up to {millimetres(before.max)} mm from where it should be. On {after.poses} fresh poses it is "
+        f"now within {millimetres(after.p90)} mm at nine of ten and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} "
+        f"better. The best calibration without elasticity would leave {millimetres(rigid.p90)} and {millimetres(rigid.max)} mm."
     )
     return Verdict(
         status,
         headline,
         sentence,
-        (
-            Fact(
-                "How accurate was it?",
-                millimetres(before.p90),
-                "mm",
-                f"9 of 10 poses were within this, as delivered. Mean {millimetres(before.mean)}, worst {millimetres(before.max)} mm.",
-            ),
-            Fact(
-                "How accurate is it?",
-                millimetres(after.p90),
-                "mm",
-                f"9 of 10 poses are within this, calibrated. Mean {millimetres(after.mean)}, worst {millimetres(after.max)} mm.",
-            ),
-            Fact(
-                "Can I trust it?",
-                answer,
-                "",
-                f"{passed} of {len(checks)} checks are good; each is explained below.",
-                status,
-            ),
-        ),
+        three_facts(before, after, checks, answer, "poses"),
         _rungs(study),
         f"Error of the tool on {after.poses} poses that were not used for the fit, against {study.reference}",
         checks,
@@ -113,7 +94,9 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         check_fresh_poses(fit, study.elastic_verification),
         check_claimed_uncertainty(study.elastic_verification, noise),
         check_residual(
-            "Does noise explain what the geometric fit leaves?", fit.estimate, sigma_given=fit.poses.sigma_given
+            "Does noise explain what the geometric fit leaves?",
+            fit.estimate,
+            sigma_given=fit.poses.sigma_given,
         ),
         check_residual("Does noise explain what the elastic fit leaves?", found),
         check_springs(found, stiffness, damping),
@@ -132,21 +115,16 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
 
 
 def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
-    before, after = study.nominal_verification.all, study.elastic_verification.all
-    rungs = [Rung("as delivered", before.mean, before.p90, before.max, "nominal")]
+    paper = study.paper
+    rungs = [rung("as delivered", study.nominal_verification.all, "nominal")]
     for fit, verification in zip(study.rigid, study.rigid_verification, strict=True):
-        s = verification.all
-        rungs.append(Rung(f"rigid, {len(fit.poses)} poses", s.mean, s.p90, s.max, "rigid"))
-    if study.paper is not None and study.paper.rigid is not None:
-        s = study.paper.rigid
-        rungs.append(Rung("paper: rigid, hardware", s.mean, s.p90, s.max, "published"))
-    rungs.append(
-        Rung(f"elastic, {len(study.calibration.poses)} poses", after.mean, after.p90, after.max, "elastic")
-    )
-    if study.paper is not None and study.paper.elastic is not None:
-        s = study.paper.elastic
-        rungs.append(Rung("paper: elastic, hardware", s.mean, s.p90, s.max, "published"))
+        rungs.append(rung(f"rigid, {len(fit.poses)} poses", verification.all, "rigid"))
+    if paper is not None and paper.rigid is not None:
+        rungs.append(rung("paper: rigid, hardware", paper.rigid, "published"))
+    words = f"elastic, {len(study.calibration.poses)} poses"
+    rungs.append(rung(words, study.elastic_verification.all, "elastic"))
+    if paper is not None and paper.elastic is not None:
+        rungs.append(rung("paper: elastic, hardware", paper.elastic, "published"))
     if study.floor is not None:
-        s = study.floor
-        rungs.append(Rung("floor: all known", s.mean, s.p90, s.max, "floor"))
+        rungs.append(rung("floor: all known", study.floor, "floor"))
     return tuple(rungs)

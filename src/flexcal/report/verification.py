@@ -17,11 +17,19 @@ from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.residual_order import residual_order
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
+from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.notation import millimetres, statistics_cells
-from flexcal.report.page import Block, Check, Fact, FigureBlock, Page, Rung, Section, Table, Verdict, worst
+from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Verdict, worst
 from flexcal.report.palette import ELASTIC, NOMINAL
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
+
+_TRUST: dict[Status, tuple[str, str]] = {
+    "good": ("Yes", "Verified on fresh poses"),
+    "care": ("With care", "Verified; read the remarks before relying on it"),
+    "bad": ("No", "Less accurate than predicted"),
+    "unknown": ("Unknown", "Measured; nothing could be checked"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +61,10 @@ def verification_page(study: VerificationStudy) -> Page:
         title=f"{study.model.name}: verification report",
         subtitle=f"Accuracy of the calibrated robot at {len(study.poses)} measured points that the fit never saw",
         verdict=_verdict(study),
-        sections=(_errors_section(study), provenance_section(study.command, None, study.seconds, study.provenance)),
+        sections=(
+            _errors_section(study),
+            provenance_section(study.command, None, study.seconds, study.provenance),
+        ),
         document=study.results,
     )
 
@@ -61,40 +72,39 @@ def verification_page(study: VerificationStudy) -> Page:
 def _verdict(study: VerificationStudy) -> Verdict:
     after = study.verification.all
     before = None if study.before is None else ErrorStatistics.of(study.before)
-    checks = [_check_enough(after.poses), check_claimed_uncertainty(study.verification, study.poses.sigma)]
+    checks = [_check_enough(after.poses), _check_predicted(study)]
     if study.model.backlash_joints:
         checks.append(check_flanks(study.verification))
     status = worst(checks)
-    headline = {
-        "good": "Verified, and as accurate as predicted",
-        "care": "Verified; read the remarks before relying on it",
-        "bad": "Less accurate than predicted",
-    }[status]
-    passed = sum(check.status == "good" for check in checks)
-    rungs = [] if before is None else [Rung("as delivered", before.mean, before.p90, before.max, "nominal")]
-    rungs.append(Rung("calibrated", after.mean, after.p90, after.max, "elastic"))
-    was = "–" if before is None else millimetres(before.p90)
+    answer, headline = _TRUST[status]
+    rungs = [] if before is None else [rung("as delivered", before, "nominal")]
     return Verdict(
         status,
         headline,
-        f"At nine of ten of {after.poses} fresh points the calibrated model is within {millimetres(after.p90)} mm of what the instrument reads, "
-        f"and within {millimetres(after.max)} mm at all of them. The instrument's own noise is part of these numbers.",
-        (
-            Fact("How accurate was it?", was, "mm", "Too few poses to tell." if before is None else f"9 of 10 points were within this, as delivered. Mean {millimetres(before.mean)}, worst {millimetres(before.max)} mm."),
-            Fact("How accurate is it?", millimetres(after.p90), "mm", f"9 of 10 points are within this, calibrated. Mean {millimetres(after.mean)}, worst {millimetres(after.max)} mm."),
-            Fact("Can I trust it?", {"good": "Yes", "care": "With care", "bad": "No"}[status], "", f"{passed} of {len(checks)} checks are good; each is explained below.", status),
-        ),
-        tuple(rungs),
+        f"At nine of ten of {after.poses} fresh points the calibrated model is within {millimetres(after.p90)} mm of what the instrument "
+        f"reads, and within {millimetres(after.max)} mm at all of them. The instrument's own noise is part of these numbers.",
+        three_facts(before, after, checks, answer, "points"),
+        (*rungs, rung("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} fresh points, against the instrument",
         tuple(checks),
-    )  # fmt: skip
+    )
+
+
+def _check_predicted(study: VerificationStudy) -> Check:
+    return check_claimed_uncertainty(
+        study.verification, study.poses.sigma, noise_given=study.poses.sigma_given
+    )
 
 
 def _check_enough(poses: int) -> Check:
     question = "Were enough fresh poses measured?"
     if poses >= FEW_POSES:
-        return Check(question, f"{poses} points; the 90 % value rests on about {max(1, poses // 10)} of them.", "good")
-    return Check(question, f"{poses} points are few; with {FEW_POSES} or more the worst ones mean something.", "care")
+        return Check(
+            question, f"{poses} points; the 90 % value rests on about {max(1, poses // 10)} of them.", "good"
+        )
+    return Check(
+        question, f"{poses} points are few; with {FEW_POSES} or more the worst ones mean something.", "care"
+    )
 
 
 def _errors_section(study: VerificationStudy) -> Section:
@@ -106,11 +116,12 @@ def _errors_section(study: VerificationStudy) -> Section:
         before = ErrorStatistics.of(study.before)
         rows.insert(0, ("as delivered, after registration", str(before.poses), *statistics_cells(before)))
     if result.ambiguous.any():
-        rows.append(("… where the backlash flank is certain", str(result.unambiguous.poses), *statistics_cells(result.unambiguous)))  # fmt: skip
-    blocks: tuple[Block, ...] = (
+        certain = result.unambiguous
+        rows.append(("… where the backlash flank is certain", str(certain.poses), *statistics_cells(certain)))
+    blocks: list[Block] = [
         Table(
             "table-accuracy",
-            "Errors at the fresh poses",
+            "Distances",
             ("model", "points", "mean / mm", "90 % within / mm", "worst / mm"),
             tuple(rows),
         ),
@@ -128,20 +139,25 @@ def _errors_section(study: VerificationStudy) -> Section:
             "Read across at 90 %: nine of ten points have an error smaller than where the curve crosses.",
             f"Cumulative distribution; 90 % of points are within {millimetres(result.all.p90)} mm.",
         ),
-        FigureBlock(
-            "figure-predicted",
-            "Predicted against observed errors",
-            predicted_quantiles(result, study.poses.sigma),
-            "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed line: the "
-            "prediction was right. Above it: the robot is worse than promised. Below: better.",
-            "Sorted observed errors against predicted quantiles.",
-        ),
+    ]
+    if study.poses.sigma_given:
+        blocks.append(
+            FigureBlock(
+                "figure-predicted",
+                "Predicted against observed errors",
+                predicted_quantiles(result, study.poses.sigma),
+                "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed "
+                "line: the prediction was right. Above it: the robot is worse than promised. Below: better.",
+                "Sorted observed errors against predicted quantiles.",
+            )
+        )
+    blocks.append(
         FigureBlock(
             "figure-order",
             "Errors in the order of measuring",
             residual_order(result.errors),
             "A drift points to warm-up or to an instrument that moved since the calibration.",
             "Error components in measuring order.",
-        ),
+        )
     )
-    return Section("errors", "Errors at fresh poses", "", blocks)
+    return Section("errors", "Errors at fresh poses", "", tuple(blocks))

@@ -5,10 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flexcal.data import MultisinePlan, PosePlan, read_plan
+from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of
+from flexcal.data.experiment_folder import PLAN
+from flexcal.elasticity import ReferenceMotion
 from flexcal.errors import InputError
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.yaml_writer import to_plain
 
 
 def robot_file(plan: Path, given: Path | None) -> Path:
@@ -44,15 +47,30 @@ def read_fitting_plan(path: Path, model: RobotModel) -> MultisinePlan | PosePlan
 
 
 def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyResponse]]:
-    """Frequency responses from files, or from all .npz files of folders, in the order of their poses; raises `InputError`."""
+    """Frequency responses from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
     files: list[Path] = []
     for path in paths:
-        found = sorted(path.glob("*.npz")) if path.is_dir() else [path]
+        found = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
         if not found:
             raise InputError(
-                f"{path} holds no frequency responses (.npz); run 'flexcal identify response' first."
+                f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first."
             )
         files += found
     responses = [FrequencyResponse.load(file) for file in files]
     order = sorted(range(len(files)), key=lambda i: responses[i].pose)
     return [files[i] for i in order], [responses[i] for i in order]
+
+
+def reference_of(files: Sequence[Path]) -> ReferenceMotion | None:
+    """The reference motion under which responses were measured, from plan.yaml beside them; None where there is no plan.
+
+    Raises `InputError` where plans differ in it.
+    """
+    plans = [folder / PLAN for folder in dict.fromkeys(file.parent for file in files)]
+    motions = [ReferenceMotion.of(read_plan_of(plan, MultisinePlan)) for plan in plans if plan.is_file()]
+    for plan, motion in zip(plans[1:], motions[1:], strict=False):
+        if to_plain(motion) != to_plain(motions[0]):
+            raise InputError(
+                f"{plan} has another reference motion or controller than {plans[0]}; identify from responses of one plan."
+            )
+    return motions[0] if len(motions) == len(plans) else None

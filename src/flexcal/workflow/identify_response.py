@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import FolderCell, MultisinePlan, Recording
+from flexcal.data import FolderCell, MultisinePlan, Recording, write_plan
+from flexcal.data.experiment_folder import PLAN
 from flexcal.errors import InputError
 from flexcal.frequency import Average, FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
@@ -35,6 +36,7 @@ def identify_response(
 ) -> IdentifiedResponses:
     """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, streaming: no two recordings are ever in memory.
 
+    The plan goes with them: the fit of stage 1 needs its reference motion.
     Raises `FlexcalError` where a log is missing, has gaps or does not fit the plan.
     """
     tell = progress or (lambda stage, share: None)
@@ -52,6 +54,7 @@ def identify_response(
     files = tuple(out / f"response_pose_{response.pose + 1}.npz" for response in responses)
     for response, file in zip(responses, files, strict=True):
         response.save(file)
+    write_plan(out / PLAN, plan)
     result = IdentifiedResponses(responses, files)
     write_results(out, result.document())
     return result

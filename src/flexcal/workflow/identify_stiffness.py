@@ -16,7 +16,7 @@ from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
-from flexcal.workflow.experiment_files import read_responses
+from flexcal.workflow.experiment_files import read_responses, reference_of
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 
 Progress = Callable[[str, float], None]
@@ -27,9 +27,10 @@ _GEOMETRIC = (*GEOMETRY, "backlash")
 
 @dataclass(frozen=True, eq=False)
 class RobotStiffness:
-    """The result of stage 1, and the file that its estimate was written to."""
+    """The result of stage 1, whether it knew the reference motion, and the file that its estimate was written to."""
 
     result: StiffnessResult
+    reference_known: bool
     estimate: Estimate
     estimates: Path
 
@@ -43,6 +44,7 @@ class RobotStiffness:
                 "message": estimate.message,
                 "reduced_chi2": estimate.reduced_chi2,
                 "rank": estimate.rank,
+                "reference_motion_modelled": self.reference_known,
                 "dropped": dropped_parameters(estimate.dropped),
             },
             "parameters": quantities(estimate),
@@ -73,8 +75,8 @@ def identify_robot_stiffness(
     """Fit the springs of a robot.yaml to frequency responses (files, or folders of them), and store the block `stiffness`.
 
     The robot starts from nominal, the block `dynamics`, and the geometry of the block `calibration`; what that one says of stiffness
-    and inertia came from here and is left out. With `out`, estimates and results.json go to that folder. `seed` is that of the search
-    for a start. Raises `FlexcalError` where responses do not fit the robot; nothing is written then.
+    and inertia came from here and is left out. The reference motion is that of plan.yaml beside the responses. With `out`, estimates
+    and results.json go to that folder. `seed` is that of the search for a start. Raises `FlexcalError` where responses do not fit the robot; nothing is written then.
     """
     tell = progress or (lambda stage, share: None)
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -86,16 +88,20 @@ def identify_robot_stiffness(
         geometric = {n: v for n, v in calibrated.values.items() if n.rpartition(".")[2] in _GEOMETRIC}
         model = model.with_values(geometric)
     inputs, responses = read_responses(files)
-    tell("stage1", 0.0)
+    reference = reference_of(inputs)
     result = identify_stiffness(
-        model, responses, inertias_known=inertias_known, rng=np.random.default_rng([seed, 1]), progress=tell
+        model,
+        responses,
+        rng=np.random.default_rng([seed, 1]),
+        inertias_known=inertias_known,
+        reference=reference,
+        progress=tell,
     )
-    tell("stage1", 1.0)
     options = {"inertias_known": inertias_known, "seed": seed}
     origin = provenance([robot, bare.urdf, *inputs], options, source if blocks else None, tuple(blocks))
     estimate = replace(result.estimate, provenance=origin)
     target = source if out is None else out / "estimates.yaml"
-    found = RobotStiffness(result, estimate, target)
+    found = RobotStiffness(result, reference is not None, estimate, target)
     others: dict[Block, Estimate] = {} if target == source else blocks
     for block, other in others.items():
         write_estimates(target, block, other)

@@ -89,15 +89,18 @@ def skeletons(model: RobotModel, poses: PoseSet) -> np.ndarray:
     target = model.point(str(poses.target[0]))
 
     def place(index: int, rotation: np.ndarray, translation: np.ndarray, xyz: np.ndarray) -> np.ndarray:
-        arrays = (np.ascontiguousarray(a) for a in (rotation, translation, xyz, model.geometry))
-        return model.tree.point(index, *arrays, np.zeros(6), q, still, False)[0]
+        frame = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
+        geometry = np.ascontiguousarray(model.geometry)
+        return model.tree.point(index, frame[0], frame[1], xyz, geometry, np.zeros(6), q, still, False)[0]
 
     origins = [place(k, np.eye(3), np.zeros(3), np.zeros(3)) for k in chain]
     tip = place(target.joint, target.rotation, target.translation, target.xyz)
     return np.stack([np.zeros_like(tip), *origins, tip], axis=1)
 
 
-def _polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0) -> go.Scatter3d:
+def _polyline(
+    corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0
+) -> go.Scatter3d:
     """Several lines (lines, corners, 3) as one trace, parted by gaps."""
     parted = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1).reshape(-1, 3)
     return go.Scatter3d(

@@ -19,7 +19,13 @@ def canvas(height: int, *, legend: bool = True) -> go.Figure:
 
 
 def panels(
-    rows: int, columns: int, height: int, titles: Sequence[str] = (), *, legend: bool = True, row_gap: float | None = None
+    rows: int,
+    columns: int,
+    height: int,
+    titles: Sequence[str] = (),
+    *,
+    legend: bool = True,
+    row_gap: float | None = None,
 ) -> go.Figure:
     """A grid of small panels with one title each, in the report's look."""
     figure = make_subplots(

@@ -13,7 +13,9 @@ from flexcal.report.figures.verification_errors import ErrorSeries
 from flexcal.report.palette import GRID, INK, QUIET
 
 
-def error_distribution(series: Sequence[ErrorSeries], published: Mapping[str, tuple[float, float]]) -> go.Figure:
+def error_distribution(
+    series: Sequence[ErrorSeries], published: Mapping[str, tuple[float, float]]
+) -> go.Figure:
     """Share of poses (percent) against error (mm, log scale); `published` holds points (error in m, share) by name."""
     figure = canvas(400)
     figure.add_hline(y=90, line={"color": GRID, "width": 2})
@@ -36,12 +38,23 @@ def error_distribution(series: Sequence[ErrorSeries], published: Mapping[str, tu
                 x=[error * 1e3],
                 y=[100 * share],
                 mode="markers",
-                marker={"color": INK, "size": 10, "symbol": "star-diamond-open" if "rigid" in name else "diamond-open"},
+                marker={
+                    "color": INK,
+                    "size": 10,
+                    "symbol": "star-diamond-open" if "rigid" in name else "diamond-open",
+                },
                 name=name,
                 hovertemplate="%{fullData.name}: %{x:.2f} mm<extra></extra>",
             )
         )
     millimetre_axis(figure, "x")
+    everything = np.concatenate([item.millimetres for item in series])
+    everything = everything[everything > 0]
+    if len(everything):
+        low, high = float(np.quantile(everything, 0.002)), float(everything.max())
+        figure.update_xaxes(range=[np.log10(low / 1.2), np.log10(high * 1.2)])
     figure.update_yaxes(title_text="share of poses", ticksuffix=" %", range=[0, 104])
-    figure.add_annotation(x=0, xref="paper", y=90, text="90 %", showarrow=False, xanchor="left", yshift=8, font={"size": 11, "color": QUIET})  # fmt: skip
+    figure.add_annotation(
+        x=0, xref="paper", y=90, text="90 %", showarrow=False, xanchor="left", yshift=8, font={"size": 11, "color": QUIET}
+    )  # fmt: skip
     return figure

@@ -18,10 +18,10 @@ _COLUMNS = 3
 def residual_joints(model: RobotModel, poses: PoseSet, residuals: np.ndarray) -> go.Figure:
     """Distance (mm) of residuals (N, 3) m against each joint (degrees, or mm where prismatic), and its mean in twelve bins."""
     rows = -(-model.n // _COLUMNS)
-    figure = panels(rows, _COLUMNS, 210 * rows + 70, list(model.joint_names))
+    figure = panels(rows, _COLUMNS, 230 * rows + 70, list(model.joint_names), row_gap=0.3 / rows)
     distance = np.linalg.norm(residuals, axis=1) / MILLIMETRE
     for i, joint in enumerate(model.joints):
-        at = {"row": i // _COLUMNS + 1, "col": i % _COLUMNS + 1}
+        row, column = i // _COLUMNS + 1, i % _COLUMNS + 1
         revolute = joint.kind == "revolute"
         q = poses.q[:, i] / (DEGREE if revolute else MILLIMETRE)
         figure.add_trace(
@@ -29,17 +29,17 @@ def residual_joints(model: RobotModel, poses: PoseSet, residuals: np.ndarray) ->
                 x=single(q), y=single(distance), mode="markers", name="error", legendgroup="a", showlegend=i == 0,
                 marker={"color": ELASTIC, "size": 3.5, "opacity": 0.45},
                 hovertemplate="%{x:.1f}: %{y:.3f} mm",
-            ), **at,
+            ), row=row, col=column,
         )  # fmt: skip
         centres, means = _binned(q, distance)
         figure.add_trace(
             go.Scatter(
                 x=single(centres), y=single(means), mode="lines+markers", name="mean", legendgroup="b", showlegend=i == 0,
                 line={"color": INK, "width": 1.6}, marker={"size": 4}, hoverinfo="skip",
-            ), **at,
+            ), row=row, col=column,
         )  # fmt: skip
-        figure.update_xaxes(title_text="degrees" if revolute else "mm", nticks=5, **at)
-        figure.update_yaxes(matches="y" if i else None, showticklabels=at["col"] == 1, **at)
+        figure.update_xaxes(title_text="degrees" if revolute else "mm", nticks=5, row=row, col=column)
+        figure.update_yaxes(matches="y" if i else None, showticklabels=column == 1, row=row, col=column)
     figure.update_yaxes(rangemode="tozero", nticks=5)
     figure.update_yaxes(title_text="error / mm", row=(rows + 1) // 2, col=1)
     return figure

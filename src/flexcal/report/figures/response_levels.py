@@ -45,7 +45,7 @@ def response_levels(response: FrequencyResponse) -> go.Figure:
 def frequency_axes(figure: go.Figure, rows: int, columns: int) -> None:
     """Logarithmic axes for magnitudes against frequency; labels on the outer panels only, one range for all."""
     figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
-    figure.update_yaxes(type="log", **decades(-9, 6), showticklabels=False, matches="y")
+    figure.update_yaxes({"type": "log", "showticklabels": False, "matches": "y"} | decades(-9, 6))
     figure.update_yaxes(matches=None, row=1, col=1)
     for column in range(columns):
         figure.update_xaxes(showticklabels=True, title_text="Hz", row=rows, col=column + 1)

@@ -30,7 +30,10 @@ def singular_values(found: Identifiability) -> go.Figure:
                     "color": [ELASTIC if k else NOMINAL for k in kept],
                     "size": 7 if symbol == "circle" else 11,
                     "symbol": symbol,
-                    "line": {"width": 0 if symbol == "circle" else 2, "color": [ELASTIC if k else NOMINAL for k in kept]},
+                    "line": {
+                        "width": 0 if symbol == "circle" else 2,
+                        "color": [ELASTIC if k else NOMINAL for k in kept],
+                    },
                 },
                 name=name,
                 hovertemplate="%{x}: %{y:.1e}",
@@ -43,6 +46,6 @@ def singular_values(found: Identifiability) -> go.Figure:
             x=found.rank + 0.5, y=0.98, yref="paper", text=f"rank {found.rank}, {gap}", showarrow=False,
             xanchor="right", xshift=-6, yanchor="top", font={"color": QUIET, "size": 12}, yshift=-150,
         )  # fmt: skip
-    figure.update_yaxes(type="log", **decades(-18, 0, 3), title_text="relative to the largest")
+    figure.update_yaxes({"type": "log", "title": {"text": "relative to the largest"}} | decades(-18, 0, 3))
     figure.update_xaxes(title_text="number")
     return figure

@@ -16,7 +16,11 @@ _WIDEST = 1.0
 
 
 def spring_intervals(
-    estimate: Estimate, stiffness: Sequence[str], damping: Sequence[str], reference: Mapping[str, float], word: str
+    estimate: Estimate,
+    stiffness: Sequence[str],
+    damping: Sequence[str],
+    reference: Mapping[str, float],
+    word: str,
 ) -> go.Figure:
     """Estimate/reference - 1 in percent with 95 % intervals; `word` says what the reference is. Unidentifiable ones are named."""
     figure = panels(

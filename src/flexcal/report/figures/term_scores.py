@@ -6,7 +6,7 @@ import plotly.graph_objects as go
 
 from flexcal.calibration import TermSelection
 from flexcal.report.figures.canvas import canvas, single
-from flexcal.report.palette import ELASTIC, NOMINAL
+from flexcal.report.palette import ELASTIC, NOMINAL, PAGE
 from flexcal.units import MILLIMETRE
 
 
@@ -14,15 +14,17 @@ def term_scores(selection: TermSelection) -> go.Figure:
     """Mean error (mm) on left-out poses by set of terms, for folds contiguous in measuring order and in the workspace."""
     labels = step_labels(selection)
     figure = canvas(120 + 46 * len(labels))
-    for name, column, colour in (
-        ("left out by place in the workspace", 2, ELASTIC),
-        ("left out by measuring order", 1, NOMINAL),
+    in_order = [order / MILLIMETRE for _, order, _ in selection.table]
+    in_place = [place / MILLIMETRE for _, _, place in selection.table]
+    for name, values, colour in (
+        ("left out by place in the workspace", in_place, ELASTIC),
+        ("left out by measuring order", in_order, NOMINAL),
     ):
-        values = [row[column] / MILLIMETRE for row in selection.table]
         figure.add_trace(
             go.Bar(
                 x=single(values), y=labels, orientation="h", name=name, marker={"color": colour},
-                text=[f"{v:.4f}" for v in values], textposition="auto", hovertemplate="%{y}: %{x:.4f} mm",
+                text=[f"{v:.4f}" for v in values], textposition="inside", insidetextanchor="end", constraintext="none",
+                textfont={"size": 11, "color": PAGE}, hovertemplate="%{y}: %{x:.4f} mm",
             )
         )  # fmt: skip
     figure.update_layout(bargap=0.3, bargroupgap=0.08, barmode="group")

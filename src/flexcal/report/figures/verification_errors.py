@@ -54,7 +54,12 @@ def verification_errors(
                 x=single(poses.pose[unclear]),
                 y=positive(distance[unclear]),
                 mode="markers",
-                marker={"color": ELASTIC, "size": 14, "symbol": "circle-open", "line": {"width": 2, "color": INK}},
+                marker={
+                    "color": ELASTIC,
+                    "size": 14,
+                    "symbol": "circle-open",
+                    "line": {"width": 2, "color": INK},
+                },
                 name="backlash flank uncertain",
                 hovertemplate="pose %{x}: %{y:.3f} mm, backlash flank uncertain",
             )

@@ -22,7 +22,7 @@ def comparison_section(study: TwoStageStudy) -> Section:
         ("fresh poses, elastic calibration", fresh.all, paper.elastic if paper else None),
         ("… flank certain", fresh.unambiguous, None),
     ]
-    columns = ["", "poses", "mean / mm", "90 % within / mm", "worst / mm"]
+    columns = ["errors at", "poses", "mean / mm", "90 % within / mm", "worst / mm"]
     columns += [f"{paper.short}, 90 %", f"{paper.short}, worst"] if paper else []
     rows = []
     for label, ours, theirs in errors:
@@ -38,14 +38,16 @@ def comparison_section(study: TwoStageStudy) -> Section:
         Table(
             "table-counts",
             "Parameters",
-            ("", "this run", paper.short) if paper else ("", "this run"),
+            ("number", "this run", paper.short) if paper else ("number", "this run"),
             tuple(row if paper else row[:2] for row in counts),
         ),
     ]
     if paper is not None:
         blocks.append(Text((), "Before comparing", (*paper.remarks, f"Source: {paper.citation}.")))
     lead = "The same procedure, run here and published." if paper else "The numbers of this run in one place."
-    return Section("numbers", "All numbers beside the paper's" if paper else "All numbers", lead, tuple(blocks))
+    return Section(
+        "numbers", "All numbers beside the paper's" if paper else "All numbers", lead, tuple(blocks)
+    )
 
 
 def _number(paper: Publication | None, key: str) -> str:

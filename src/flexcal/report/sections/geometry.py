@@ -9,13 +9,15 @@ from flexcal.report.figures.arm_poses import arm_poses
 from flexcal.report.figures.calibration_errors import calibration_errors
 from flexcal.report.figures.error_components import error_components
 from flexcal.report.notation import millimetres
-from flexcal.report.page import Block, FigureBlock, Section, Selector
+from flexcal.report.page import FigureBlock, Section, Selector
 from flexcal.report.sections.identifiability import identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.study import TwoStageStudy
 
 _ARROW_LENGTH = 0.25
 """Length (m) at which the largest error is drawn, about."""
+
+_MOST_POSES = 60
 
 
 def geometry_section(study: TwoStageStudy) -> Section:
@@ -29,8 +31,8 @@ def geometry_section(study: TwoStageStudy) -> Section:
         "what remains is geometry: axes that are not quite parallel, links that are not quite as long as drawn, zero positions of the "
         "encoders, and play in the gears.",
         (
-            pose_figure(fit, before),
-            error_figure(fit, before),
+            pose_figure(fit, before, "Figure 10"),
+            error_figure(fit, before, "Figure 11"),
             component_figure(fit),
             *identifiability_blocks(fit.identifiability, study.paper),
             parameter_table(fit.estimate, fit.identifiability.kept_names, study.truth),
@@ -38,28 +40,34 @@ def geometry_section(study: TwoStageStudy) -> Section:
     )
 
 
-def pose_figure(fit: Calibration, before: np.ndarray) -> FigureBlock:
-    """Fig. 10."""
+def pose_figure(fit: Calibration, before: np.ndarray, number: str = "") -> FigureBlock:
+    """Fig. 10; of many poses only some, evenly chosen, are drawn."""
+    total = len(fit.poses)
+    rows = np.unique(np.linspace(0, total - 1, min(total, _MOST_POSES)).astype(int))
     arrows = {}
-    for words, errors, calibrated in (("after calibration", fit.residuals, True), ("as delivered", before, False)):
+    for words, errors, calibrated in (
+        ("after calibration", fit.residuals, True),
+        ("as delivered", before, False),
+    ):
         factor = exaggeration(errors)
-        arrows[f"{words}, × {factor:g}"] = (in_base(fit, errors), factor, calibrated)
+        arrows[f"{words}, × {factor:g}"] = (in_base(fit, errors)[rows], factor, calibrated)
     return FigureBlock(
         "figure-10",
-        f"Figure 10: the {len(fit.poses)} calibration poses",
-        arm_poses(fit.model, fit.poses, arrows),
-        "The arm as lines from joint to joint, in every pose that was measured; drag to turn it. Arrows show which way and how far the "
-        "measured point is from the predicted one, exaggerated as the choice above says.",
-        f"Three-dimensional line drawing of the arm in {len(fit.poses)} poses with exaggerated error arrows.",
+        title(number, f"the {total} calibration poses"),
+        arm_poses(fit.model, fit.poses.subset(rows), arrows),
+        ("" if len(rows) == total else f"{len(rows)} of the {total} poses, evenly chosen. ")
+        + "The arm as lines from joint to joint; drag to turn it. Arrows show which way and how far the measured point is from the "
+        "predicted one, exaggerated as the choice above says.",
+        f"Three-dimensional line drawing of the arm in {len(rows)} poses with exaggerated error arrows.",
         (Selector("Error arrows", "arrows", tuple(arrows)),),
     )
 
 
-def error_figure(fit: Calibration, before: np.ndarray) -> FigureBlock:
+def error_figure(fit: Calibration, before: np.ndarray, number: str = "") -> FigureBlock:
     """Fig. 11."""
     return FigureBlock(
         "figure-11",
-        "Figure 11: error at the calibration poses, before and after",
+        title(number, "error at the calibration poses, before and after"),
         calibration_errors(fit.poses, before, fit.residuals),
         "Distance between measured and predicted point. The scale is logarithmic: one step of the grid is about a factor of two. These "
         "poses were used for the fit, so this is not yet the accuracy to expect elsewhere.",
@@ -81,6 +89,11 @@ def component_figure(fit: Calibration) -> FigureBlock:
         + ", ".join(f"{millimetres(float(v))} mm in {axis}" for v, axis in zip(largest, "xyz", strict=True))
         + ".",
     )
+
+
+def title(number: str, words: str) -> str:
+    """ "Figure 10: the poses", or "The poses" without a number."""
+    return f"{number}: {words}" if number else words[0].upper() + words[1:]
 
 
 def in_base(fit: Calibration, errors: np.ndarray) -> np.ndarray:

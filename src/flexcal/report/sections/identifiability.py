@@ -11,6 +11,9 @@ from flexcal.report.publication import Publication
 
 _MOST = 4
 
+_NOTHING = 1e-9
+"""Amounts (SI) below this are rounding errors of a column that is zero."""
+
 
 def identifiability_blocks(found: Identifiability, paper: Publication | None) -> tuple[Block, ...]:
     """The gap, the dropped parameters and the weakest directions that were kept."""
@@ -48,8 +51,9 @@ def identifiability_blocks(found: Identifiability, paper: Publication | None) ->
 def _dropped_table(found: Identifiability) -> Table:
     rows = []
     for item in found.dropped:
-        terms = [_amount(c) + name for name, c in item.absorbed_by[:_MOST]]
-        more = len(item.absorbed_by) - len(terms)
+        absorbed = [(name, c) for name, c in item.absorbed_by if abs(c) > _NOTHING]
+        terms = [_amount(c) + name for name, c in absorbed[:_MOST]]
+        more = len(absorbed) - len(terms)
         if more > 0:
             terms.append(f"and {more} more")
         rows.append((item.name, "; ".join(terms) if terms else "nothing: the points do not depend on it"))

@@ -17,12 +17,18 @@ def provenance_section(
     rows += [("seed of all random numbers", str(seed))] if seed is not None else []
     rows += [(name, value) for name, value in origin.items()]
     blocks: list[Block] = [
-        Table("table-provenance", "What made this report", ("", "value"), tuple(rows), text_columns=(1,))
+        Table("table-provenance", "What made this report", ("what", "value"), tuple(rows), text_columns=(1,))
     ]
     if seconds:
         times = tuple((name, f"{value:.1f} s") for name, value in seconds.items())
         strong = tuple(k for k, (name, _) in enumerate(times) if name == "total")
-        blocks.append(Table("table-seconds", "How long each stage took", ("stage", "time"), times, strong=strong))
+        blocks.append(
+            Table("table-seconds", "How long each stage took", ("stage", "time"), times, strong=strong)
+        )
     if command:
-        blocks.append(Text(("The same command with the same program gives the same numbers; only the durations differ.",)))
+        blocks.append(
+            Text(
+                ("The same command with the same program gives the same numbers; only the durations differ.",)
+            )
+        )
     return Section("provenance", "Provenance", "", tuple(blocks))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from flexcal.calibration import Calibration
 from flexcal.report.figures.residual_joints import residual_joints
 from flexcal.report.figures.residual_order import residual_order
@@ -14,7 +16,8 @@ _MOST = 12
 
 def residuals_section(fit: Calibration) -> Section:
     """Residuals in order, by joint and in space, and the outliers."""
-    worst = int((fit.residuals**2).sum(axis=1).argmax())
+    distance = np.linalg.norm(fit.residuals, axis=1)
+    worst = int(distance.argmax())
     blocks: list[Block] = [
         FigureBlock(
             "figure-order",
@@ -37,7 +40,7 @@ def residuals_section(fit: Calibration) -> Section:
             residual_workspace(fit.poses, fit.residuals),
             "Each measured point in the instrument's frame, coloured by its error; drag to turn. Neighbours of one colour mean that the "
             "model misses something that depends on where the robot is.",
-            f"Points in space coloured by error; the largest, {millimetres(float((fit.residuals[worst] ** 2).sum() ** 0.5))} mm, is at pose "
+            f"Points in space coloured by error; the largest, {millimetres(float(distance[worst]))} mm, is at pose "
             f"{int(fit.poses.pose[worst])}.",
         ),
     ]
@@ -52,7 +55,7 @@ def residuals_section(fit: Calibration) -> Section:
 
 
 def _outlier_table(fit: Calibration) -> Table:
-    distance = (fit.residuals**2).sum(axis=1) ** 0.5
+    distance = np.linalg.norm(fit.residuals, axis=1)
     rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
     cells = tuple(
         (str(int(fit.poses.pose[i])), str(fit.poses.target[i]), millimetres(float(distance[i])))

@@ -17,7 +17,11 @@ def spring_names(estimate: Estimate, kind: str) -> tuple[str, ...]:
 
 
 def spring_table(
-    estimate: Estimate, kind: str, truth: Mapping[str, float] | None, published: Mapping[str, float], source: str
+    estimate: Estimate,
+    kind: str,
+    truth: Mapping[str, float] | None,
+    published: Mapping[str, float],
+    source: str,
 ) -> Table:
     """Every stiffness or damping; columns of truth and publication only where there is any."""
     names = spring_names(estimate, kind)
@@ -27,7 +31,11 @@ def spring_table(
     columns += ["truth", "difference", "truth in interval"] if truth is not None else []
     columns += [source] if with_published else []
     rows = tuple(_row(estimate, name, factor, truth, published if with_published else None) for name in names)
-    note = "Published values are for orientation only: they belong to another robot of the same type." if with_published else ""
+    note = (
+        "Published values are for orientation only: they belong to another robot of the same type."
+        if with_published
+        else ""
+    )
     return Table(
         id=f"table-{kind}",
         caption=f"Table 1: {kind} of drives and bearings",
@@ -48,7 +56,11 @@ def unseen_springs(estimate: Estimate) -> tuple[str, ...]:
 
 
 def _row(
-    estimate: Estimate, name: str, factor: float, truth: Mapping[str, float] | None, published: Mapping[str, float] | None
+    estimate: Estimate,
+    name: str,
+    factor: float,
+    truth: Mapping[str, float] | None,
+    published: Mapping[str, float] | None,
 ) -> tuple[str | None, ...]:
     interval, value = estimate.interval(name), estimate.values[name]
     cells: list[str | None]
@@ -65,7 +77,9 @@ def _row(
         known = truth.get(name)
         inside = interval is not None and known is not None and interval[0] <= known <= interval[1]
         cells.append(significant(None if known is None else factor * known))
-        cells.append(NOTHING if interval is None or known is None else percent(value / known - 1, signed=True))
+        cells.append(
+            NOTHING if interval is None or known is None else percent(value / known - 1, signed=True)
+        )
         cells.append(NOTHING if interval is None or known is None else "yes" if inside else "no")
     if published is not None:
         found = published.get(name)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from flexcal.calibration import ErrorStatistics
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
@@ -46,7 +47,8 @@ def verification_section(study: TwoStageStudy) -> Section:
             error_distribution(everything, published),
             "Read across at 90 %: nine of ten poses have an error smaller than where the curve crosses. Curves farther left are better.",
             f"Cumulative distributions; 90 % of poses are within {millimetres(elastic.all.p90)} mm with elasticity, "
-            f"{millimetres(study.rigid_verification[0].all.p90)} mm without, {millimetres(study.nominal_verification.all.p90)} mm as delivered.",
+            f"{millimetres(study.rigid_verification[0].all.p90)} mm without, and "
+            f"{millimetres(study.nominal_verification.all.p90)} mm as delivered.",
         ),
         FigureBlock(
             "figure-predicted",
@@ -71,21 +73,23 @@ def verification_section(study: TwoStageStudy) -> Section:
 def accuracy_table(study: TwoStageStudy) -> Table:
     """Mean, 90 % and worst error of every model on the verification poses."""
     against = "truth" if study.truth is not None else "instrument"
-    rows = [("as delivered (nominal)", str(study.nominal_verification.all.poses), *statistics_cells(study.nominal_verification.all), against)]  # fmt: skip
+
+    def row(label: str, s: ErrorStatistics, reference: str = against) -> tuple[str, ...]:
+        return (label, str(s.poses), *statistics_cells(s), reference)
+
+    rows = [row("as delivered (nominal)", study.nominal_verification.all)]
     for fit, verification in zip(study.rigid, study.rigid_verification, strict=True):
         label = f"rigid calibration, {len(fit.poses)} poses, rank {fit.identifiability.rank}"
-        rows.append((label, str(verification.all.poses), *statistics_cells(verification.all), against))
+        rows.append(row(label, verification.all))
     elastic = study.elastic_verification
-    label = f"elastic calibration, {len(study.calibration.poses)} poses"
     strong = len(rows)
-    rows.append((label, str(elastic.all.poses), *statistics_cells(elastic.all), against))
+    rows.append(row(f"elastic calibration, {len(study.calibration.poses)} poses", elastic.all))
     if elastic.ambiguous.any():
-        rows.append(("… where the backlash flank is certain", str(elastic.unambiguous.poses), *statistics_cells(elastic.unambiguous), against))  # fmt: skip
+        rows.append(row("… where the backlash flank is certain", elastic.unambiguous))
     if study.measured_verification is not None and study.truth is not None:
-        seen = study.measured_verification.all
-        rows.append(("… as the instrument sees it", str(seen.poses), *statistics_cells(seen), "instrument"))
+        rows.append(row("… as the instrument sees it", study.measured_verification.all, "instrument"))
     if study.floor is not None:
-        rows.append(("floor: every parameter known", str(study.floor.poses), *statistics_cells(study.floor), against))
+        rows.append(row("floor: every parameter known", study.floor))
     return Table(
         "table-accuracy",
         "Accuracy on fresh poses",

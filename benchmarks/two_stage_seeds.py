@@ -1,0 +1,164 @@
+"""The whole demonstration on many hidden truths: how large the errors are, and whether the intervals tell the truth about them.
+
+`python -m benchmarks.two_stage_seeds --first 1000 --count 20 [--plan paper] [--inertias-known] [--half-gap 1.5e-4]`
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core below
+
+import argparse
+import json
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.cell import CellConfig, draw_truth, write_truth
+from flexcal.model import RobotModel
+from flexcal.model.names import unit_of
+from flexcal.report.study import TwoStageStudy
+from flexcal.workflow.two_stage import run_two_stage
+from flexcal.yaml_reader import read_yaml
+
+ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
+
+
+def one_seed(
+    seed: int, plan: Literal["default", "paper"], inertias_known: bool, half_gap: float | None
+) -> dict[str, Any]:
+    """Run one hidden truth and keep the numbers."""
+    with tempfile.TemporaryDirectory() as folder:
+        truth = None
+        if half_gap is not None:
+            nominal = RobotModel.from_yaml(ROBOT, estimates=False)
+            spread = read_yaml(ROBOT.parent / "cell.yaml", CellConfig).spread
+            values = draw_truth(nominal, spread, np.random.default_rng([seed, 0]))
+            values |= {name: half_gap for name in values if name.endswith(".backlash")}
+            truth = Path(folder) / "given.yaml"
+            write_truth(truth, values)
+        study = run_two_stage(
+            ROBOT,
+            Path(folder) / "out",
+            seed=seed,
+            plan=plan,
+            truth=truth,
+            inertias_known=inertias_known,
+            report=False,
+        )
+    return {"seed": seed, "springs": _springs(study), "geometry": _geometry(study), "results": study.results}
+
+
+def _springs(study: TwoStageStudy) -> dict[str, dict[str, Any]]:
+    """Relative error, and error over standard deviation in the logarithm, of every spring parameter."""
+    estimate, truth = study.stiffness.estimate, study.truth or {}
+    found = {}
+    for name in study.stiffness.springs:
+        k = estimate.parameters.index(name)
+        error = float(np.log(estimate.values[name] / truth[name]))
+        found[name] = {
+            "relative": estimate.values[name] / truth[name] - 1,
+            "std": float(np.sqrt(estimate.covariance[k, k])),
+            "normalised": error / float(np.sqrt(estimate.covariance[k, k])),
+            "identifiable": estimate.identifiable[k],
+        }
+    return found
+
+
+def _geometry(study: TwoStageStudy) -> list[float]:
+    """Error over standard deviation of every kept geometric parameter against the regrouped truth."""
+    estimate = study.calibration.estimate
+    expected = estimate.regrouped(study.truth or {})
+    names = [n for n in study.calibration.identifiability.kept_names if unit_of(n) in ("m", "rad")]
+    return [(estimate.values[n] - expected[n]) / (estimate.std(n) or np.inf) for n in names]
+
+
+def summary(runs: list[dict[str, Any]]) -> str:
+    """The issue's numbers as a text table."""
+    names = list(runs[0]["springs"])
+    stiff = [n for n in names if n.endswith("stiffness")]
+    lines = [f"{len(runs)} seeds {runs[0]['seed']}..{runs[-1]['seed']}"]
+    worst = [max(abs(r["springs"][n]["relative"]) for n in stiff) for r in runs]
+    lines.append(
+        f"largest of nine stiffness errors: median {100 * np.median(worst):.2f} %, worst {100 * max(worst):.2f} %"
+    )
+    lines.append(
+        f"{'parameter':32s} {'median |error|':>15s} {'worst':>9s} {'median std':>11s} {'identifiable':>13s}"
+    )
+    for name in names:
+        rows = [r["springs"][name] for r in runs]
+        error = np.abs([row["relative"] for row in rows])
+        known = sum(row["identifiable"] for row in rows)
+        lines.append(
+            f"{name:32s} {100 * np.median(error):13.2f} % {100 * error.max():7.1f} % "
+            f"{100 * np.median([row['std'] for row in rows]):9.2f} % {known:8d}/{len(rows)}"
+        )
+    for label, z in (
+        ("springs", [q["normalised"] for r in runs for q in r["springs"].values() if q["identifiable"]]),
+        ("geometry", [z for r in runs for z in r["geometry"]]),
+    ):
+        inside = np.mean(np.abs(z) < 1.96)
+        lines.append(
+            f"{label}: {len(z)} pairs, {100 * inside:.1f} % inside, mean normalised square {np.mean(np.square(z)):.2f}"
+        )
+    for key in ("rank",):
+        lines.append(f"{key}: {sorted({r['results']['identifiability'][key] for r in runs})}")
+    lines.append(
+        f"wrong flanks in calibration: {sum(r['results']['calibration_fit']['wrong_flanks'] for r in runs)}"
+    )
+    lines.append(f"{'mm':28s} {'mean':>17s} {'p90':>17s} {'max':>17s}   (median over seeds, worst seed)")
+    blocks = {"calibration": [r["results"]["calibration"] for r in runs]}
+    for key in ("elastic", "elastic_unambiguous", "measured", "floor", "rigid_40", "rigid_100", "nominal"):
+        blocks[key] = [r["results"]["verification"][key] for r in runs]
+    for label, rows in blocks.items():
+        cells = []
+        for key in ("mean_mm", "p90_mm", "max_mm"):
+            values = [row[key] for row in rows]
+            cells.append(f"{np.median(values):8.4f} {max(values):8.4f}")
+        lines.append(f"{label:28s} " + " ".join(cells))
+    seconds = [r["results"]["seconds"]["total"] for r in runs]
+    lines.append(f"seconds a seed: median {np.median(seconds):.0f}")
+    return "\n".join(lines)
+
+
+def run() -> list[tuple[str, float, str]]:
+    """The paper's 0.23 mm (p90, measured on a real robot) over ours on 20 hidden truths."""
+    runs = collect(range(1000, 1020), "default", False, None)
+    print(summary(runs))
+    p90 = float(np.median([r["results"]["verification"]["elastic"]["p90_mm"] for r in runs]))
+    return [("p90 of the verification, paper over ours", 0.23 / p90, f"{p90:.4f} mm")]
+
+
+def collect(
+    seeds: range, plan: Literal["default", "paper"], inertias_known: bool, half_gap: float | None
+) -> list[dict[str, Any]]:
+    """All seeds, one process a core."""
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        waiting = [pool.submit(one_seed, seed, plan, inertias_known, half_gap) for seed in seeds]
+        return [future.result() for future in waiting]
+
+
+def main() -> None:
+    """Command line."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=1000)
+    parser.add_argument("--count", type=int, default=20)
+    parser.add_argument("--plan", choices=("default", "paper"), default="default")
+    parser.add_argument("--inertias-known", action="store_true")
+    parser.add_argument("--half-gap", type=float)
+    parser.add_argument("--save", type=Path)
+    given = parser.parse_args()
+    runs = collect(
+        range(given.first, given.first + given.count), given.plan, given.inertias_known, given.half_gap
+    )
+    print(summary(runs))
+    if given.save:
+        given.save.write_text(json.dumps(runs))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""Stage 1 (METHODS; Neubauer et al. 2015, §4.2): from frequency responses to the stiffness and damping of drives and bearings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.elasticity.model_error import ModelError, Tolerances
+from flexcal.elasticity.parameters import spring_names, stage_one_parameters
+from flexcal.elasticity.prediction import PoseModel, ResponseModel
+from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
+from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
+from flexcal.elasticity.search import MultiStart, Progress, Search
+from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
+from flexcal.estimation import Estimate, Parameters, Problem, solve
+from flexcal.frequency import FrequencyResponse
+from flexcal.model import RobotModel
+
+ROUNDS = 2
+"""How often model error and reference motion are evaluated about the last estimate and the fit is repeated."""
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessResult:
+    """Result of stage 1.
+
+    `estimate` holds springs and nuisances; `springs` their names in the order of the paper's Table 1, stiffness first. Per pose:
+    `predicted` (L, n, n) of the fitted model, the reference motion included; `errors` (L, n, n), the complex errors Δ of Eq. (27);
+    `misfit` (poses, n, n), mean |error|² over the measured variance: above 1 where the model does not explain an element.
+    """
+
+    estimate: Estimate
+    responses: tuple[FrequencyResponse, ...]
+    predicted: tuple[np.ndarray, ...]
+    errors: tuple[np.ndarray, ...]
+    misfit: np.ndarray
+    springs: tuple[str, ...]
+
+    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
+        """One estimated quantity as every results file has it."""
+        return self.estimate.quantity(name, truth)
+
+
+def identify_stiffness(
+    model: RobotModel,
+    responses: Sequence[FrequencyResponse],
+    *,
+    rng: np.random.Generator,
+    inertias_known: bool = False,
+    reference: ReferenceMotion | None = None,
+    weighting: Weighting | None = None,
+    search: Search | None = None,
+    tolerances: Tolerances | None = None,
+    progress: Progress | None = None,
+) -> StiffnessResult:
+    """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
+
+    The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
+    measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With
+    `reference` (of the plan) the change of inertia along the slow motion is part of the model; without it the bearings' damping
+    comes out too large. `tolerances` are what the model leaves out (geometry, friction that is not viscous, backlash), all of it in
+    the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link and payload inertias at the model's.
+
+    The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
+    neighbouring lines, both inflated by the reduced χ² where it exceeds 1. Raises `FlexcalError` where responses do not fit the robot.
+    """
+    parameters = stage_one_parameters(model, responses, inertias_known=inertias_known)
+    weighting = CovarianceWeighting() if weighting is None else weighting
+    tolerances = Tolerances() if tolerances is None else tolerances
+    search = MultiStart() if search is None else search
+    x = search.find(model, responses, parameters, rng, progress)
+    measured = StageOneResidual.of(ResponseModel.of(model, responses, parameters), responses, weighting)
+    shifts = [np.zeros_like(response.response) for response in responses]
+    estimate = None
+    rounds = ROUNDS if tolerances.any or reference is not None else 1
+    for number in range(rounds):
+        if reference is not None:
+            shifts = reference_shifts(measured.model, x, reference)
+        residual = measured.shifted(shifts)
+        error = ModelError.of(residual, responses, x, tolerances) if tolerances.any else None
+        last = number == rounds - 1
+        estimate = _fit(residual, error, parameters, x, 1e-7 if last else 1e-3)
+        x = estimate.parameters.coordinates()
+        if progress is not None:
+            progress("fitting", (number + 1) / rounds)
+    assert estimate is not None
+    predicted = tuple(g + shift for g, shift in zip(measured.model.responses(x), shifts, strict=True))
+    pairs = list(zip(measured.poses, predicted, strict=True))
+    errors = tuple(pose.errors(g) for pose, g in pairs)
+    misfit = np.array(
+        [np.mean(np.abs(r.response - g) ** 2 / r.std**2, axis=0) for r, g in zip(responses, predicted, strict=True)]
+    )
+    return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
+
+
+def reference_shifts(model: ResponseModel, x: np.ndarray, reference: ReferenceMotion) -> list[np.ndarray]:
+    """What the reference motion adds to the response of every pose at the coordinates x (p,), (L, E, E)."""
+    values = model.parameters.natural(x)
+    return [_shift(model.robot, pose, values, reference) for pose in model.poses]
+
+
+def _shift(robot: RobotModel, pose: PoseModel, values: np.ndarray, reference: ReferenceMotion) -> np.ndarray:
+    known, payload = pose.values(robot, values)
+    shift = reference_shift(robot.with_values(known), pose.q, payload, pose.frequencies_hz, reference)
+    late = np.array([values[number] if number >= 0 else 0.0 for number in pose.delays])
+    return shift * np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]
+
+
+def _fit(
+    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, x: np.ndarray, tolerance: float
+) -> Estimate:
+    def whiten(rows: np.ndarray) -> np.ndarray:
+        return rows if error is None else error.whiten(rows)
+
+    def linearise(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows, jacobian = residual.linearise(at)
+        return whiten(rows), whiten(jacobian)
+
+    problem = Problem(
+        parameters,
+        linearise,
+        lambda at: whiten(residual.residual(at)),
+        groups=residual.clusters(CLUSTER_LINES),
+    )
+    fitted = solve(problem, starts=x[None], tolerance=tolerance)
+    clusters = int(residual.clusters(CLUSTER_LINES)[-1]) + 1
+    robust = None
+    if clusters > len(parameters) + 1:
+        robust = solve(problem, starts=fitted.parameters.coordinates()[None], covariance="sandwich", tolerance=tolerance)
+    return _widened(fitted, robust)
+
+
+def _widened(fitted: Estimate, robust: Estimate | None) -> Estimate:
+    """The posterior with every standard deviation raised to the sandwich's, and by the reduced χ², where these are larger."""
+    from flexcal.estimation.solve import LOG_STD_LIMIT
+
+    std = np.sqrt(np.diag(fitted.covariance))
+    factor = np.full(std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0)))
+    if robust is not None:
+        wider = np.sqrt(np.diag(robust.covariance))
+        factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
+    std *= factor
+    known = tuple(
+        flag and (item.scale != "log" or bool(size <= LOG_STD_LIMIT))
+        for flag, item, size in zip(fitted.identifiable, fitted.parameters, std, strict=True)
+    )
+    return replace(fitted, covariance=fitted.covariance * np.outer(factor, factor), identifiable=known)

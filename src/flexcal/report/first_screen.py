@@ -1,0 +1,34 @@
+"""The parts of the first screen that all reports share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal
+
+from flexcal.calibration import ErrorStatistics
+from flexcal.report.notation import NOTHING, millimetres
+from flexcal.report.page import Check, Fact, Rung, tally, worst
+
+
+def three_facts(
+    before: ErrorStatistics | None, after: ErrorStatistics, checks: Sequence[Check], answer: str, noun: str
+) -> tuple[Fact, ...]:
+    """How accurate it was, how accurate it is, and `answer` to whether it can be trusted; `noun` is poses or points."""
+    was = _fact("How accurate was it?", before, f"9 of 10 {noun} were within this, as delivered.")
+    now = _fact("How accurate is it?", after, f"9 of 10 {noun} are within this, calibrated.")
+    trust = Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", worst(checks))
+    return (was, now, trust)
+
+
+def rung(
+    label: str, s: ErrorStatistics, kind: Literal["nominal", "rigid", "elastic", "floor", "published"]
+) -> Rung:
+    """A rung of the scale from error statistics."""
+    return Rung(label, s.mean, s.p90, s.max, kind)
+
+
+def _fact(question: str, s: ErrorStatistics | None, words: str) -> Fact:
+    if s is None:
+        return Fact(question, NOTHING, "", "Too few poses to tell.")
+    spread = f"Mean {millimetres(s.mean)}, worst {millimetres(s.max)} mm."
+    return Fact(question, millimetres(s.p90), "mm", f"{words} {spread}")

@@ -1,0 +1,74 @@
+"""The verdict follows from the results, and turns bad when they do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.report import TwoStageStudy
+from flexcal.report.checks import (
+    check_claimed_uncertainty,
+    check_flanks,
+    check_fresh_poses,
+    check_rank,
+    check_residual,
+    check_truth,
+)
+from flexcal.report.two_stage import two_stage_checks, two_stage_verdict
+
+
+def test_a_good_study_passes_every_check(study: TwoStageStudy) -> None:
+    assert [c.question for c in two_stage_checks(study) if c.status != "good"] == []
+    assert two_stage_verdict(study).status == "good"
+
+
+def test_errors_larger_than_predicted_are_bad(study: TwoStageStudy) -> None:
+    worse = replace(study.elastic_verification, errors=4.0 * study.elastic_verification.errors)
+    assert check_claimed_uncertainty(worse).status == "bad"
+    assert two_stage_verdict(replace(study, elastic_verification=worse)).status == "bad"
+
+
+def test_noise_of_the_instrument_counts_where_points_are_measured(study: TwoStageStudy) -> None:
+    assert study.measured_verification is not None and study.measured_poses is not None
+    assert check_claimed_uncertainty(study.measured_verification).status != "good"
+    assert check_claimed_uncertainty(study.measured_verification, study.measured_poses.sigma).status == "good"
+
+
+def test_without_noise_nothing_is_claimed(study: TwoStageStudy) -> None:
+    checked = check_claimed_uncertainty(study.elastic_verification, noise_given=False)
+    assert checked.status == "unknown"
+
+
+def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None:
+    v = study.elastic_verification
+    few = replace(v, errors=v.errors[:9], std=v.std[:9], ambiguous=v.ambiguous[:9], position=v.position[:9])
+    assert check_fresh_poses(study.calibration, few).status == "care"
+    assert check_fresh_poses(study.calibration, replace(v, errors=9 * v.errors)).status == "care"
+
+
+def test_chi2_is_judged(study: TwoStageStudy) -> None:
+    estimate = study.calibration.estimate
+    freedom = estimate.degrees_of_freedom
+    by_size = {
+        k: check_residual("q", replace(estimate, chi2=k * freedom)).status for k in (0.2, 1.0, 2.0, 9.0)
+    }
+    assert by_size == {0.2: "care", 1.0: "good", 2.0: "care", 9.0: "bad"}
+    assert check_residual("q", replace(estimate, status="stalled", message="no descent")).status == "bad"
+    assert check_residual("q", estimate, sigma_given=False).status == "unknown"
+
+
+def test_a_blurred_gap_is_flagged(study: TwoStageStudy) -> None:
+    found = study.calibration.identifiability
+    assert check_rank(found).status == "good"
+    assert check_rank(replace(found, gap=1.2)).status == "care"
+
+
+def test_many_uncertain_flanks_are_flagged(study: TwoStageStudy) -> None:
+    v = study.elastic_verification
+    assert check_flanks(replace(v, ambiguous=np.zeros(150, dtype=bool))).status == "good"
+    assert check_flanks(replace(v, ambiguous=np.arange(150) % 3 == 0)).status == "care"
+
+
+def test_coverage_is_judged() -> None:
+    assert [check_truth(k, 20).status for k in (19, 16, 10)] == ["good", "care", "bad"]

@@ -1,0 +1,99 @@
+"""What the figures show is what the results say."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from flexcal.design.skeleton import joint_origins
+from flexcal.model import RobotModel
+from flexcal.report import TwoStageStudy
+from flexcal.report.checks import BOUND_95
+from flexcal.report.figures.arm_poses import skeletons
+from flexcal.report.figures.canvas import decades
+from flexcal.report.figures.error_components import error_components
+from flexcal.report.figures.predicted_quantiles import expected_quantiles, predicted_quantiles
+from flexcal.report.figures.response_fit import response_fit
+from flexcal.report.figures.response_levels import response_levels
+from flexcal.report.figures.singular_values import singular_values
+from flexcal.report.figures.spring_intervals import spring_intervals
+from flexcal.report.sections.geometry import exaggeration
+from flexcal.report.sections.springs import spring_names
+
+
+def test_skeletons_go_through_the_joints(tx90l: RobotModel, study: TwoStageStudy) -> None:
+    poses = study.calibration.poses
+    lengths = {f"{joint}.length_{k}": 0.01 for joint in tx90l.joint_names for k in "xyz"}
+    robot = tx90l.with_values({name: 0.0 for name in lengths})
+    corners = skeletons(robot, poses)
+    np.testing.assert_allclose(corners, joint_origins(robot, poses.q), atol=1e-12)
+
+
+def test_expected_quantiles_are_those_of_a_simulation(rng: np.random.Generator) -> None:
+    std = rng.uniform(0.5, 2.0, 400)
+    draws = np.linalg.norm(std[:, None, None] / np.sqrt(3.0) * rng.normal(size=(400, 500, 3)), axis=2)
+    middle = (np.arange(400) + 0.5) / 400
+    np.testing.assert_allclose(expected_quantiles(std), np.quantile(draws, middle), rtol=0.03, atol=0.03)
+
+
+def test_bound_contains_95_percent_of_errors_alike_in_three_directions() -> None:
+    assert pytest.approx(np.sqrt(chi2.ppf(0.95, 3) / 3), rel=1e-4) == BOUND_95
+
+
+def test_quantiles_leave_out_uncertain_flanks(study: TwoStageStudy) -> None:
+    figure = predicted_quantiles(study.elastic_verification)
+    assert len(figure.data[1].y) == (~study.elastic_verification.ambiguous).sum() < 150
+
+
+def test_levels_show_response_noise_and_distortion(study: TwoStageStudy) -> None:
+    response = study.responses[0]
+    figure = response_levels(response)
+    assert len(figure.data) == 27
+    np.testing.assert_allclose(figure.data[0].y, np.abs(response.response[:, 0, 0]), rtol=1e-6)
+    np.testing.assert_allclose(figure.data[3 * 5 + 2].y, response.noise_std[:, 1, 2], rtol=1e-6)
+
+
+def test_fit_shows_one_pose_at_first(study: TwoStageStudy) -> None:
+    labels = ("A", "B", "C")
+    figure = response_fit(study.responses, study.stiffness.fitted, labels)
+    assert {t.meta["pose"] for t in figure.data if t.visible} == {"A"}
+    assert len(figure.data) == 3 * 2 * (9 + 3)
+
+
+def test_spring_intervals_are_relative(study: TwoStageStudy) -> None:
+    estimate = study.stiffness.estimate
+    stiffness, damping = spring_names(estimate, "stiffness"), spring_names(estimate, "damping")
+    assert len(stiffness) == len(damping) == 9
+    figure = spring_intervals(estimate, stiffness, damping, study.nominal.values, "robot.yaml")
+    name = stiffness[0]
+    drawn = figure.data[0]
+    assert drawn.x[0] == pytest.approx(
+        100 * (estimate.values[name] / study.nominal.value(name) - 1), rel=1e-5
+    )
+    low, high = estimate.interval(name) or (0.0, 0.0)
+    width = 100 * (high - low) / study.nominal.value(name)
+    assert drawn.error_x.array[0] + drawn.error_x.arrayminus[0] == pytest.approx(width, rel=1e-4)
+    assert "not determined by these data" in {text for t in figure.data if t.text for text in t.text}
+
+
+def test_components_share_one_scale(study: TwoStageStudy) -> None:
+    figure = error_components(study.calibration.poses, study.calibration.residuals)
+    ranges = {tuple(axis.range) for axis in figure.select_yaxes()}
+    assert len(ranges) == 1
+    assert max(ranges)[1] >= 1e3 * np.abs(study.calibration.residuals).max()
+
+
+def test_rank_is_marked_where_it_is(study: TwoStageStudy) -> None:
+    figure = singular_values(study.calibration.identifiability)
+    assert "rank 29" in figure.layout.annotations[0].text
+    assert figure.layout.shapes[0].x0 == 29.5
+
+
+def test_ticks_keep_their_size() -> None:
+    assert decades(-1, 1)["ticktext"] == ["10⁻¹", "1", "10"]
+
+
+def test_arrows_are_round_and_short() -> None:
+    assert exaggeration(np.array([[1e-4, 0.0, 0.0]])) == 2000
+    assert exaggeration(np.array([[0.0, 5e-3, 0.0]])) == 50

@@ -1,0 +1,152 @@
+"""The two-stage report: one file, complete without scripts, readable by machines and people."""
+
+from __future__ import annotations
+
+import base64
+import re
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from outline import Outline
+
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.report import TX90L_PAPER, TwoStageStudy, write_two_stage_report
+from flexcal.report.notation import millimetres
+
+MEBIBYTE = 1e6
+
+
+@pytest.fixture(scope="module")
+def html(report: Path) -> str:
+    return report.read_text("utf-8")
+
+
+@pytest.fixture(scope="module")
+def outline(html: str) -> Outline:
+    return Outline(html)
+
+
+def test_is_one_small_file_that_loads_nothing(html: str, outline: Outline) -> None:
+    assert len(html.encode()) < 6.5 * MEBIBYTE
+    loaded = [
+        a
+        for tag in ("script", "img", "link", "iframe")
+        for a in outline.all(tag)
+        if "src" in a or "href" in a
+    ]
+    assert loaded == []
+    assert all(str(a["href"]).startswith("#") for a in outline.all("a"))
+    style = html[html.index("<style>") : html.index("</style>")]
+    assert not re.search(r"@import|url\(", style)
+
+
+def test_everything_readable_stands_before_the_first_script(html: str) -> None:
+    first = html.index("<script")
+    assert html.rindex("</table>") < first
+    assert html.rindex("</figcaption>") < first
+    assert html.index('id="verdict"') < html.index("<table")
+
+
+def test_markup_is_balanced_and_ids_are_unique(outline: Outline) -> None:
+    assert outline.unbalanced == []
+    ids = [a["id"] for _, a in outline.elements if "id" in a]
+    assert len(ids) == len(set(ids))
+    targets = {str(a["href"])[1:] for a in outline.all("a")}
+    labels = {i for _, a in outline.elements for i in str(a.get("aria-labelledby", "")).split()} - {""}
+    assert (targets | labels) <= set(ids)
+
+
+def test_headings_do_not_skip_a_level(outline: Outline) -> None:
+    levels = [int(tag[1]) for tag, _ in outline.elements if re.fullmatch("h[1-6]", tag)]
+    assert levels[0] == 1 and levels.count(1) == 1
+    assert all(after <= before + 1 for before, after in pairwise(levels))
+
+
+def test_every_figure_and_table_says_what_it_is(outline: Outline) -> None:
+    plots = [a for a in outline.all("div") if "plot" in str(a.get("class", "")).split()]
+    assert {a["id"] for a in plots} == set(outline.figures())
+    assert all(a["role"] == "img" and len(str(a["aria-label"])) > 30 for a in plots)
+    assert all(a.get("aria-labelledby") for a in outline.all("table"))
+    assert all(a.get("scope") for a in outline.all("th"))
+    for number in ("5", "7", "10", "11", "12", "13"):
+        assert f"Figure {number}" in outline.words or f"Figures {number}" in outline.words
+
+
+def test_arrays_are_float32_in_base64(outline: Outline, study: TwoStageStudy) -> None:
+    before, after = outline.figures()["figure-11"]["data"]
+    assert after["y"]["dtype"] == "f4"
+    drawn = np.frombuffer(base64.b64decode(after["y"]["bdata"]), dtype=np.float32)
+    np.testing.assert_allclose(drawn, 1e3 * np.linalg.norm(study.calibration.residuals, axis=1), rtol=1e-6)
+    drawn = np.frombuffer(base64.b64decode(before["y"]["bdata"]), dtype=np.float32)
+    np.testing.assert_allclose(
+        drawn, 1e3 * np.linalg.norm(study.nominal_at_calibration.errors, axis=1), rtol=1e-6
+    )
+
+
+def test_first_screen_answers_the_three_questions(html: str, study: TwoStageStudy) -> None:
+    screen = html[html.index('id="verdict"') : html.index('id="stage1"')]
+    for statistics in (
+        study.nominal_verification.all,
+        study.rigid_verification[0].all,
+        study.elastic_verification.all,
+    ):
+        assert millimetres(statistics.p90) in screen and millimetres(statistics.max) in screen
+    assert TX90L_PAPER.elastic is not None and millimetres(TX90L_PAPER.elastic.max) in screen
+    for question in ("How accurate was it?", "How accurate is it?", "Can I trust it?"):
+        assert question in screen
+
+
+def test_what_is_not_determined_is_said_with_a_reason(outline: Outline, study: TwoStageStudy) -> None:
+    assert "not determined by these data" in outline.words
+    assert "joint_3 bearing y, damping: the responses hardly depend on it in these poses" in outline.words
+    for dropped in study.calibration.identifiability.dropped:
+        assert dropped.name in outline.words
+
+
+def test_poses_are_chosen_by_name(outline: Outline, study: TwoStageStudy) -> None:
+    figure = outline.figures()["figure-7"]
+    poses = {trace["meta"]["pose"] for trace in figure["data"]}
+    assert poses == {f"Pose {r.pose + 1}" for r in study.responses}
+    assert figure["selected"] == {"pose": "Pose 1"}
+    keys = {(a["data-figure"], a["data-key"]) for a in outline.all("select")}
+    assert keys == {("figure-7", "pose"), ("figure-10", "arrows")}
+
+
+def test_the_same_study_gives_the_same_bytes(html: str, study: TwoStageStudy, tmp_path: Path) -> None:
+    write_two_stage_report(tmp_path / "again.html", study)
+    assert (tmp_path / "again.html").read_text("utf-8") == html
+
+
+def test_a_measured_robot_has_no_truth_columns(study: TwoStageStudy, tmp_path: Path) -> None:
+    path = tmp_path / "measured.html"
+    write_two_stage_report(
+        path, replace(study, truth=None, paper=None, floor=None, seed=None, measured_verification=None)
+    )
+    words = Outline(path.read_text("utf-8")).words
+    assert (
+        "truth in interval" not in words and "noise-free truth" not in words and "paper" not in words.lower()
+    )
+
+
+def test_names_from_files_cannot_break_the_page(study: TwoStageStudy, tmp_path: Path) -> None:
+    path = tmp_path / "odd.html"
+    odd = "</script><script>alert(1)</script>"
+    write_two_stage_report(path, replace(study, command=odd, results={"note": odd}))
+    assert Outline(path.read_text("utf-8")).unbalanced == []
+    assert odd not in path.read_text("utf-8")
+
+
+def test_a_place_that_cannot_be_written_leaves_nothing(study: TwoStageStudy, tmp_path: Path) -> None:
+    (tmp_path / "report.html").mkdir()
+    with pytest.raises(InputError):
+        write_two_stage_report(tmp_path / "report.html", study)
+    assert list(tmp_path.iterdir()) == [tmp_path / "report.html"]
+
+
+def test_the_papers_springs_are_those_of_the_example(tx90l: RobotModel) -> None:
+    for name, value in TX90L_PAPER.springs.items():
+        assert tx90l.value(name) == pytest.approx(value, rel=1e-12)
