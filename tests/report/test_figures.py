@@ -19,7 +19,6 @@ from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.figures.spring_intervals import spring_intervals
 from flexcal.report.sections.geometry import exaggeration
-from flexcal.report.sections.springs import spring_names
 
 
 def test_skeletons_go_through_the_joints(tx90l: RobotModel, study: TwoStageStudy) -> None:
@@ -56,14 +55,14 @@ def test_levels_show_response_noise_and_distortion(study: TwoStageStudy) -> None
 
 def test_fit_shows_one_pose_at_first(study: TwoStageStudy) -> None:
     labels = ("A", "B", "C")
-    figure = response_fit(study.responses, study.stiffness.fitted, labels)
+    figure = response_fit(study.responses, study.stiffness.predicted, labels)
     assert {t.meta["pose"] for t in figure.data if t.visible} == {"A"}
     assert len(figure.data) == 3 * 2 * (9 + 3)
 
 
 def test_spring_intervals_are_relative(study: TwoStageStudy) -> None:
     estimate = study.stiffness.estimate
-    stiffness, damping = spring_names(estimate, "stiffness"), spring_names(estimate, "damping")
+    stiffness, damping = study.springs("stiffness"), study.springs("damping")
     assert len(stiffness) == len(damping) == 9
     figure = spring_intervals(estimate, stiffness, damping, study.nominal.values, "robot.yaml")
     name = stiffness[0]

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, verify
 from flexcal.data import MultisinePlan, PoseSet
+from flexcal.elasticity import StiffnessResult, spring_names
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -25,14 +25,6 @@ DEFAULT_POSES_DEG = (
 )
 UNSEEN = "joint_3.bearing_y.damping"
 BACKLASH = {"joint_2.backlash": 3.5e-5, "joint_3.backlash": 4.1e-5}
-
-
-@dataclass(frozen=True, eq=False)
-class FittedStiffness:
-    """What the report reads of a result of stage 1."""
-
-    estimate: Estimate
-    fitted: tuple[np.ndarray, ...]
 
 
 def hidden_truth(model: RobotModel, rng: np.random.Generator) -> dict[str, float]:
@@ -153,6 +145,12 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
     responses = tuple(measured_response(robot, q, k, lines, rng) for k, q in enumerate(poses))
     estimate = stage_one(nominal, truth, rng)
     softer = nominal.with_estimate(estimate)
+    predicted = tuple(response_at(softer, r.q_mean, lines) for r in responses)
+    errors = tuple(r.response - g for r, g in zip(responses, predicted, strict=True))
+    misfit = np.array(
+        [np.mean((np.abs(e) / r.std) ** 2, axis=0) for e, r in zip(errors, responses, strict=True)]
+    )
+    stiffness = StiffnessResult(estimate, responses, predicted, errors, misfit, spring_names(nominal))
     plan = MultisinePlan(
         name="default", poses=poses, joints=(0, 1, 2), payload=6.0, base_frequency_hz=0.25, lines=np.arange(13, 320, 2),
         amplitude=np.full((3, len(lines)), 8.0), periods=4, settle_periods=2, realisations=4, signs=True,
@@ -172,7 +170,7 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
         nominal=nominal,
         plan=plan,
         responses=responses,
-        stiffness=FittedStiffness(estimate, tuple(response_at(softer, r.q_mean, lines) for r in responses)),
+        stiffness=stiffness,
         calibration=calibrated,
         rigid=rigid,
         nominal_at_calibration=verify(nominal, calibrated.poses, elastic=False),

@@ -20,6 +20,7 @@ from flexcal.estimation import Dropped, Estimate, Identifiability, Loss, Paramet
 from flexcal.model import RobotModel
 
 _FLANK_PASSES = 4
+_STRUCTURAL_POSES = 100
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,11 +75,7 @@ def calibrate(
         require_both_flanks(model, predict(start, poses, elastic=elastic).rest.flank)
     geometric = geometric_parameters(start, poses, terms)
     found = _kinematic_identifiability(start, poses, geometric)
-    if 3 * len(poses.q) < found.rank or len(poses.q) * 3 - found.rank < 1:
-        raise FlexcalError(
-            f"{len(poses.q)} poses give {3 * len(poses.q)} coordinates, too few for {found.rank} identifiable parameters; "
-            f"measure at least {found.rank // 3 + 1} poses, better three times as many."
-        )
+    _require_enough(start, poses, geometric, found)
     kept = geometric.subset(found.kept_names)
     prior = (
         ElasticPrior.of(start, poses, stiffness, secant_scale=secant_scale)
@@ -134,6 +131,23 @@ def _kinematic_identifiability(model: RobotModel, poses: PoseSet, parameters: Pa
     columns = straight.jacobian(parameters.names).reshape(-1, len(parameters))
     preferred = [name for name in parameters.names if name.endswith("backlash")]
     return analyse(columns, parameters.names, scale=tolerances(parameters), prefer=preferred)
+
+
+def _require_enough(
+    model: RobotModel, poses: PoseSet, parameters: Parameters, found: Identifiability
+) -> None:
+    """Raise `FlexcalError` where the rows are too few for the parameters that many random poses would determine."""
+    rows = 3 * len(poses)
+    if found.rank < rows:
+        return
+    limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.joints])
+    many = poses.subset(np.resize(np.arange(len(poses)), _STRUCTURAL_POSES))
+    spread = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], many.q.shape)
+    rank = _kinematic_identifiability(model, replace(many, q=spread), parameters).rank
+    raise FlexcalError(
+        f"{len(poses)} poses give {rows} coordinates, too few for {rank} identifiable parameters; "
+        f"measure at least {rank // 3 + 1} poses, better three times as many."
+    )
 
 
 def _problem(

@@ -36,4 +36,5 @@ class ErrorStatistics:
         }
 
     def __str__(self) -> str:
-        return f"mean {self.mean / MILLIMETRE:.3f}, p90 {self.p90 / MILLIMETRE:.3f}, max {self.max / MILLIMETRE:.3f} mm over {self.poses} poses"
+        mean, p90, largest = (v / MILLIMETRE for v in (self.mean, self.p90, self.max))
+        return f"mean {mean:.3f}, p90 {p90:.3f}, max {largest:.3f} mm over {self.poses} poses"

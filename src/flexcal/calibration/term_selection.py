@@ -56,11 +56,11 @@ def select_terms(model: RobotModel, poses: PoseSet, *, stiffness: Estimate | Non
     folds = [order_folds(len(poses.q), FOLDS), workspace_folds(poses.position, FOLDS)]
     columns = _columns(wider, rigid, base + options)
     chosen, scores = tuple(base), _left_out(columns, rigid.residuals, base, folds)
-    table = [(chosen, *(float(s.mean()) for s in scores))]
+    table = [(chosen, float(scores[0].mean()), float(scores[1].mean()))]
     while options:
         trials = {o: _left_out(columns, rigid.residuals, [*chosen, o], folds) for o in options}
         best = min(trials, key=lambda o: sum(float(s.mean()) for s in trials[o]))
-        table.append(((*chosen, best), *(float(s.mean()) for s in trials[best])))
+        table.append(((*chosen, best), float(trials[best][0].mean()), float(trials[best][1].mean())))
         if not all(_better(old, new, f) for old, new, f in zip(scores, trials[best], folds, strict=True)):
             break
         chosen, scores = (*chosen, best), trials[best]

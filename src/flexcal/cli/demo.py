@@ -52,15 +52,21 @@ class Demo:
         seen = document["identifiability"]
         console.say(f"{seen['rank']} of {seen['parameters']} geometric parameters can be told apart")
         rows = {"calibration poses": document["calibration"]}
-        rows |= {label: document["verification"][key] for key, label in _VERIFICATION.items()}
+        rows |= {
+            label: document["verification"][key]
+            for key, label in _VERIFICATION.items()
+            if document["verification"].get(key)
+        }
         console.show(error_table("distance between prediction and point", rows))
         console.say(f"took {document['seconds']['total']:.0f} s; everything is in {self.out}")
         console.finish(document, f"open {self.out / 'report.html'}")
 
 
 _VERIFICATION = {
+    "nominal": "fresh poses, before (registered only)",
     "elastic": "fresh poses, against the truth",
     "elastic_unambiguous": "  of these, flank certain",
     "measured": "  against the tracker",
     "rigid": "  calibrated as rigid",
+    "floor": "  with every parameter known",
 }

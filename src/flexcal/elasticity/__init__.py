@@ -2,7 +2,8 @@
 
 from flexcal.elasticity.identify import StiffnessResult, identify_stiffness
 from flexcal.elasticity.model_error import Tolerances
-from flexcal.elasticity.parameters import spring_names, stage_one_parameters
+from flexcal.elasticity.naming import spring_names
+from flexcal.elasticity.parameters import stage_one_parameters
 from flexcal.elasticity.prediction import ResponseModel
 from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
 from flexcal.elasticity.search import MultiStart, PopulationSearch, Search

@@ -7,8 +7,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexcal.data import MultisinePlan
 from flexcal.elasticity.model_error import ModelError, Tolerances
-from flexcal.elasticity.parameters import spring_names, stage_one_parameters
+from flexcal.elasticity.naming import spring_names
+from flexcal.elasticity.parameters import stage_one_parameters
 from flexcal.elasticity.prediction import PoseModel, ResponseModel
 from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
 from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
@@ -49,7 +51,7 @@ def identify_stiffness(
     *,
     rng: np.random.Generator,
     inertias_known: bool = False,
-    reference: ReferenceMotion | None = None,
+    plan: MultisinePlan | None = None,
     weighting: Weighting | None = None,
     search: Search | None = None,
     tolerances: Tolerances | None = None,
@@ -58,15 +60,17 @@ def identify_stiffness(
     """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
 
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
-    measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With
-    `reference` (of the plan) the change of inertia along the slow motion is part of the model; without it the bearings' damping
-    comes out too large. `tolerances` are what the model leaves out (geometry, friction that is not viscous, backlash), all of it in
-    the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link and payload inertias at the model's.
+    measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the
+    `plan`, the change of inertia along the reference motion is part of the model (without it the bearings' damping comes out too
+    large), and the softening of drives by backlash is predicted. `tolerances` are what the model leaves out (geometry, friction that
+    is not viscous, backlash), all of it in the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link
+    and payload inertias at the model's.
 
     The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
     neighbouring lines, both inflated by the reduced χ² where it exceeds 1. Raises `FlexcalError` where responses do not fit the robot.
     """
-    parameters = stage_one_parameters(model, responses, inertias_known=inertias_known)
+    parameters = stage_one_parameters(model, responses, inertias_known=inertias_known, plan=plan)
+    reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
     weighting = CovarianceWeighting() if weighting is None else weighting
     tolerances = Tolerances() if tolerances is None else tolerances
     search = MultiStart() if search is None else search
@@ -90,7 +94,10 @@ def identify_stiffness(
     pairs = list(zip(measured.poses, predicted, strict=True))
     errors = tuple(pose.errors(g) for pose, g in pairs)
     misfit = np.array(
-        [np.mean(np.abs(r.response - g) ** 2 / r.std**2, axis=0) for r, g in zip(responses, predicted, strict=True)]
+        [
+            np.mean(np.abs(r.response - g) ** 2 / r.std**2, axis=0)
+            for r, g in zip(responses, predicted, strict=True)
+        ]
     )
     return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
 
@@ -109,7 +116,11 @@ def _shift(robot: RobotModel, pose: PoseModel, values: np.ndarray, reference: Re
 
 
 def _fit(
-    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, x: np.ndarray, tolerance: float
+    residual: StageOneResidual,
+    error: ModelError | None,
+    parameters: Parameters,
+    x: np.ndarray,
+    tolerance: float,
 ) -> Estimate:
     def whiten(rows: np.ndarray) -> np.ndarray:
         return rows if error is None else error.whiten(rows)
@@ -128,7 +139,9 @@ def _fit(
     clusters = int(residual.clusters(CLUSTER_LINES)[-1]) + 1
     robust = None
     if clusters > len(parameters) + 1:
-        robust = solve(problem, starts=fitted.parameters.coordinates()[None], covariance="sandwich", tolerance=tolerance)
+        robust = solve(
+            problem, starts=fitted.parameters.coordinates()[None], covariance="sandwich", tolerance=tolerance
+        )
     return _widened(fitted, robust)
 
 
@@ -137,7 +150,9 @@ def _widened(fitted: Estimate, robust: Estimate | None) -> Estimate:
     from flexcal.estimation.solve import LOG_STD_LIMIT
 
     std = np.sqrt(np.diag(fitted.covariance))
-    factor = np.full(std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0)))
+    factor = np.full(
+        std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0))
+    )
     if robust is not None:
         wider = np.sqrt(np.diag(robust.covariance))
         factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.elasticity.parameters import pose_labels, viscous_name
+from flexcal.elasticity.naming import pose_labels, viscous_name
 from flexcal.elasticity.prediction import Prediction, ResponseModel
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.frequency import FrequencyResponse
@@ -87,11 +87,15 @@ class ModelError:
         for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
             nominal = predictions[k].response
             viscous = np.array([values[viscous_name(joint, label)] for joint in response.joints])
-            change = friction_shifts(nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave)
+            change = friction_shifts(
+                nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave
+            )
             number = list(model.poses[k].softening.values())
             column = [list(predictions[k].columns).index(n) for n in number]
             gap = tolerances.backlash * predictions[k].derivatives[..., column]
-            change = np.concatenate([change, over_frequency(gap, response.frequencies_hz, tolerances.octave)], axis=-1)
+            change = np.concatenate(
+                [change, over_frequency(gap, response.frequencies_hz, tolerances.octave)], axis=-1
+            )
             none = np.empty(0, dtype=int)
             blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
             columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shifts[k], none))))
@@ -123,7 +127,9 @@ def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances
     return [np.stack(columns, axis=-1) for columns in shifts]
 
 
-def friction_shifts(response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float) -> np.ndarray:
+def friction_shifts(
+    response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float
+) -> np.ndarray:
     """∂G (L, E, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω."""
     s = 2j * np.pi * frequencies_hz[:, None, None, None]
     change = -np.einsum("lia,laj->lija", response, response) * size / s

@@ -6,11 +6,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from flexcal.data import MultisinePlan
+from flexcal.elasticity.gap import open_share
+from flexcal.elasticity.naming import pose_labels, softening_name, spring_names, viscous_name
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.names import SPRINGS, unit_of
+from flexcal.model.names import unit_of
 
 SPRING_LOG_STD = 1.5
 """Prior of every stiffness and damping, 1σ of the logarithm about robot.yaml (a factor of 4.5): it only keeps the posterior proper."""
@@ -18,48 +21,33 @@ SPRING_LOG_STD = 1.5
 FRICTION_LOG_STD = 1.5
 """Prior of the motor's viscous coefficient in one pose, 1σ of the logarithm about what the lowest lines show."""
 
+HALF_GAP = 3.5e-5
+"""Half gap (rad) of a drive with backlash that is assumed where the model has no estimate of it."""
+
 SOFTENING = 0.005
 SOFTENING_LOG_STD = 1.5
-"""Prior of the softening of a drive with backlash in one pose: the share of time its gap is open, median and 1σ of the logarithm."""
+"""Prior of the softening of a drive with backlash in one pose, median and 1σ of the logarithm, where the plan is not known."""
 
-
-def spring_names(model: RobotModel) -> tuple[str, ...]:
-    """Names of the stiffness, then of the damping of every spring, joint by joint: drive, bearing_x, bearing_y."""
-    springs = [
-        f"{joint.name}.{SPRINGS[c]}"
-        for joint in model.elastic
-        for c in ((2, 0, 1) if joint.bearings else (2,))
-    ]
-    return tuple(f"{spring}.{kind}" for kind in ("stiffness", "damping") for spring in springs)
-
-
-def pose_labels(responses: Sequence[FrequencyResponse]) -> tuple[str, ...]:
-    """A label for every response: its pose number in the plan, or its place where numbers repeat."""
-    numbers = [response.pose for response in responses]
-    if len(set(numbers)) < len(numbers):
-        numbers = range(len(responses))
-    return tuple(f"pose_{number + 1}" for number in numbers)
-
-
-def viscous_name(joint: str, pose: str) -> str:
-    """Name of a motor's viscous coefficient in one pose."""
-    return f"{joint}.viscous.{pose}"
-
-
-def softening_name(joint: str, pose: str) -> str:
-    """Name of the softening of a drive by its backlash in one pose."""
-    return f"{joint}.drive.softening.{pose}"
+PREDICTED_SOFTENING_LOG_STD = 0.7
+SMALLEST_SOFTENING = 1e-5
+"""The same about what `open_share` predicts from the plan: the gap's own spread, and the tail of a torque not quite Gaussian."""
 
 
 def stage_one_parameters(
-    model: RobotModel, responses: Sequence[FrequencyResponse], *, inertias_known: bool = False
+    model: RobotModel,
+    responses: Sequence[FrequencyResponse],
+    *,
+    inertias_known: bool = False,
+    plan: MultisinePlan | None = None,
 ) -> Parameters:
     """Every parameter of stage 1 with its prior.
 
     Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
     in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
     prior 0 ± the sample time. Rotor inertias have the prior of robot.yaml; so have mass and centre of mass of every link that an
-    elastic joint moves, and the payload's mass, unless `inertias_known`. Raises `FlexcalError` where responses do not fit the robot.
+    elastic joint moves, and the payload's mass, unless `inertias_known`. A drive with backlash has a softening in every pose: an
+    open gap lowers its apparent stiffness; with the `plan` its size is known beforehand to within a factor. Raises `FlexcalError`
+    where responses do not fit the robot.
     """
     check_responses(model, responses)
     items = [
@@ -83,19 +71,7 @@ def stage_one_parameters(
             )
             for joint, value in zip(model.elastic, loss, strict=True)
         ]
-    for joint in model.elastic:
-        if joint.index in model.backlash_joints:
-            items += [
-                Parameter(
-                    softening_name(joint.name, label),
-                    "1",
-                    SOFTENING,
-                    prior_std=SOFTENING_LOG_STD,
-                    scale="log",
-                )
-                for label in pose_labels(responses)
-            ]
-    return Parameters(items)
+    return Parameters(items + _softening(model, responses, plan))
 
 
 def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
@@ -154,6 +130,23 @@ def _inertial(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list
     if held is not None and held.mass > 0 and held.mass_std > 0 and any(r.payload != 0 for r in responses):
         std = held.mass_std / held.mass
         items.append(Parameter("payload.mass", "kg", held.mass, prior_std=std, scale="log"))
+    return items
+
+
+def _softening(
+    model: RobotModel, responses: Sequence[FrequencyResponse], plan: MultisinePlan | None
+) -> list[Parameter]:
+    items = []
+    for response, label in zip(responses, pose_labels(responses), strict=True):
+        share, std = np.full(len(model.elastic), SOFTENING), SOFTENING_LOG_STD
+        if plan is not None:
+            known = model.backlash[[joint.index for joint in model.elastic]]
+            share = open_share(model, response, plan, np.where(known > 0, known, HALF_GAP))
+            share, std = np.maximum(share, SMALLEST_SOFTENING), PREDICTED_SOFTENING_LOG_STD
+        for joint, value in zip(model.elastic, share, strict=True):
+            if joint.index in model.backlash_joints:
+                name = softening_name(joint.name, label)
+                items.append(Parameter(name, "1", float(value), prior_std=std, scale="log"))
     return items
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.elasticity.parameters import pose_labels, softening_name, viscous_name
+from flexcal.elasticity.naming import pose_labels, softening_name, viscous_name
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel

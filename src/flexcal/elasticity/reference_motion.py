@@ -87,19 +87,32 @@ def reference_shift(
 
 
 def _harmonics(
-    robot: RobotModel, q: np.ndarray, payload: float | None, motion: ReferenceMotion, sidebands: int, phases: int
+    robot: RobotModel,
+    q: np.ndarray,
+    payload: float | None,
+    motion: ReferenceMotion,
+    sidebands: int,
+    phases: int,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Fourier coefficients (2 sidebands + 1, d, d) of M, D and K of the arm, from order -sidebands."""
     angles = 2 * np.pi * np.arange(phases) / phases
     sampled = [_arm_matrices(robot, q, payload, motion, angle, moving=True) for angle in angles]
     orders = np.arange(-sidebands, sidebands + 1)
     turn = np.exp(-1j * np.outer(orders, angles)) / phases
-    mass, damping, stiffness = (np.tensordot(turn, np.array(kind), axes=1) for kind in zip(*sampled, strict=True))
+    mass, damping, stiffness = (
+        np.tensordot(turn, np.array(kind), axes=1) for kind in zip(*sampled, strict=True)
+    )
     return mass, damping, stiffness
 
 
 def _arm_matrices(
-    robot: RobotModel, q: np.ndarray, payload: float | None, motion: ReferenceMotion, angle: float, *, moving: bool
+    robot: RobotModel,
+    q: np.ndarray,
+    payload: float | None,
+    motion: ReferenceMotion,
+    angle: float,
+    *,
+    moving: bool,
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """M, ∂τ/∂q̇ and ∂τ/∂q (d, d) of the elastic coordinates at one phase of the motion, springs left out."""
     import pinocchio as pin

@@ -11,7 +11,7 @@ from flexcal.elasticity.prediction import Prediction, ResponseModel
 from flexcal.elasticity.weighting import Weighting
 from flexcal.frequency import FrequencyResponse
 
-LOGARITHM_LIMIT = 0.3
+LOGARITHM_LIMIT = 0.1
 """Largest relative standard deviation of an element whose logarithm is compared; near a zero log Ĝ is biased."""
 
 CLUSTER_LINES = 4
@@ -115,5 +115,5 @@ def _vec(matrix: np.ndarray) -> np.ndarray:
 
 def _real(white: np.ndarray) -> np.ndarray:
     """(L, k, c) complex of unit variance to (2 L k, c) real of unit variance: √2 times real and imaginary part of each line."""
-    both = np.sqrt(2.0) * np.concatenate([white.real, white.imag], axis=1)
+    both = np.sqrt(2.0) * np.concatenate([np.real(white), np.imag(white)], axis=1)
     return both.reshape(-1, white.shape[-1])

@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from flexcal.elasticity.parameters import spring_names
+from flexcal.elasticity.naming import spring_names
 from flexcal.elasticity.prediction import ResponseModel
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.errors import FlexcalError

@@ -23,7 +23,7 @@ class CovarianceWeighting:
     """The inverse of the measured covariance, by its Cholesky factor: the default, and maximum likelihood where it is right."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
-        std = np.sqrt(np.diagonal(covariance, axis1=1, axis2=2).real)
+        std = np.sqrt(np.real(np.diagonal(covariance, axis1=1, axis2=2)))
         lower = np.linalg.cholesky(covariance / (std[:, :, None] * std[:, None, :]))
         identity = np.broadcast_to(np.eye(lower.shape[-1]), lower.shape)
         return np.linalg.solve(lower, identity) / std[:, None, :]
@@ -35,7 +35,7 @@ class UniformWeighting:
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
         n = response.response.shape[-1]
-        variance = np.diagonal(covariance, axis1=1, axis2=2).real
+        variance = np.real(np.diagonal(covariance, axis1=1, axis2=2))
         size = np.sqrt(np.median(variance[:, :: n + 1]))
         return np.broadcast_to(np.eye(n * n) / size, covariance.shape)
 

@@ -19,7 +19,8 @@ class Equilibrium:
     (samples, n) N m of the motor on the arm that holds gravity; `flank` (samples, n) its sign where the joint has backlash, else 0;
     `axes` (d, 2) joint and component of each elastic coordinate; `compliance` (samples, d, d) rad/(N m), the inverse of spring plus
     gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each coordinate by mass and first moment of each link;
-    `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every joint. The last three are empty without sensitivities.
+    `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every joint. The last three are empty
+    without sensitivities.
     """
 
     deflection: np.ndarray
@@ -127,7 +128,9 @@ def static_equilibrium(
     deflection[:, :, 2] += slack
     sign = np.sign(load) if flank is None else flank
     has_backlash = np.isin(np.arange(model.n), model.backlash_joints)
-    return Equilibrium(deflection, load, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives)
+    return Equilibrium(
+        deflection, load, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
+    )
 
 
 def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:

@@ -2,32 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Any, Literal
 
 from flexcal.calibration import Calibration, ErrorStatistics, Verification
 from flexcal.data import MultisinePlan, PoseSet
-from flexcal.estimation import Estimate
+from flexcal.elasticity import StiffnessResult
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.report.publication import Publication
-
-
-class StiffnessResult(Protocol):
-    """What the report reads of a result of stage 1: the estimate, and the fitted response (L, n, n) of every measured pose."""
-
-    @property
-    def estimate(self) -> Estimate:
-        """Stiffness, damping and nuisances."""
-        ...
-
-    @property
-    def fitted(self) -> Sequence[np.ndarray]:
-        """The model's response at the lines of each measured response, in their order."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,3 +50,7 @@ class TwoStageStudy:
     def reference(self) -> str:
         """What verification errors are measured against, in words."""
         return "the noise-free truth" if self.truth is not None else "the instrument"
+
+    def springs(self, kind: Literal["stiffness", "damping"]) -> tuple[str, ...]:
+        """Names of all stiffnesses or all dampings of drives and bearings."""
+        return tuple(name for name in self.stiffness.springs if name.endswith(f".{kind}"))

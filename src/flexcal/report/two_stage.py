@@ -21,7 +21,6 @@ from flexcal.report.sections.comparison import comparison_section
 from flexcal.report.sections.geometry import geometry_section
 from flexcal.report.sections.parameters import coverage
 from flexcal.report.sections.provenance import provenance_section
-from flexcal.report.sections.springs import spring_names
 from flexcal.report.sections.stiffness import stiffness_section
 from flexcal.report.sections.verification import verification_section
 from flexcal.report.study import TwoStageStudy
@@ -88,7 +87,7 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
 def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     fit, found = study.calibration, study.stiffness.estimate
-    stiffness, damping = spring_names(found, "stiffness"), spring_names(found, "damping")
+    stiffness, damping = study.springs("stiffness"), study.springs("damping")
     noise = None if study.truth is not None else study.verification_poses.sigma
     checks = [
         check_fresh_poses(fit, study.elastic_verification),

@@ -62,11 +62,11 @@ def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyRes
 
 
 def reference_of(files: Sequence[Path]) -> ReferenceMotion | None:
-    """The reference motion under which responses were measured, from plan.yaml beside them; None where there is no plan.
+    """The reference motion under which responses were measured, from the plan beside them; None where there is none.
 
     Raises `InputError` where plans differ in it.
     """
-    plans = [folder / PLAN for folder in dict.fromkeys(file.parent for file in files)]
+    plans = [_plan_in(folder) for folder in dict.fromkeys(file.parent for file in files)]
     motions = [ReferenceMotion.of(read_plan_of(plan, MultisinePlan)) for plan in plans if plan.is_file()]
     for plan, motion in zip(plans[1:], motions[1:], strict=False):
         if to_plain(motion) != to_plain(motions[0]):
@@ -74,3 +74,8 @@ def reference_of(files: Sequence[Path]) -> ReferenceMotion | None:
                 f"{plan} has another reference motion or controller than {plans[0]}; identify from responses of one plan."
             )
     return motions[0] if len(motions) == len(plans) else None
+
+
+def _plan_in(folder: Path) -> Path:
+    """The frequency plan of a folder of responses: as 'identify response' leaves it, or as the demo does."""
+    return folder / PLAN if (folder / PLAN).is_file() else folder / "frequency_plan.yaml"

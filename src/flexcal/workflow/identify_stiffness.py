@@ -76,7 +76,8 @@ def identify_robot_stiffness(
 
     The robot starts from nominal, the block `dynamics`, and the geometry of the block `calibration`; what that one says of stiffness
     and inertia came from here and is left out. The reference motion is that of plan.yaml beside the responses. With `out`, estimates
-    and results.json go to that folder. `seed` is that of the search for a start. Raises `FlexcalError` where responses do not fit the robot; nothing is written then.
+    and results.json go to that folder. `seed` is that of the search for a start. Raises `FlexcalError` where responses do not fit the
+    robot; nothing is written then.
     """
     tell = progress or (lambda stage, share: None)
     bare = RobotModel.from_yaml(robot, estimates=False)

@@ -20,7 +20,9 @@ def provenance_section(
         Table("table-provenance", "What made this report", ("what", "value"), tuple(rows), text_columns=(1,))
     ]
     if seconds:
-        times = tuple((name, f"{value:.1f} s") for name, value in seconds.items())
+        spent = {name: value for name, value in seconds.items() if value > 0}
+        spent |= {"total": sum(spent.values())} if "total" not in spent else {}
+        times = tuple((name, f"{value:.1f} s") for name, value in spent.items())
         strong = tuple(k for k, (name, _) in enumerate(times) if name == "total")
         blocks.append(
             Table("table-seconds", "How long each stage took", ("stage", "time"), times, strong=strong)

@@ -2,29 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from flexcal.estimation import Estimate
 from flexcal.report.notation import NOTHING, percent, scaled, significant, spring_label
 from flexcal.report.page import Table
 
 
-def spring_names(estimate: Estimate, kind: str) -> tuple[str, ...]:
-    """Names of all stiffnesses or all dampings (`kind`) of drives and bearings in an estimate."""
-    parts = ("drive", "bearing_x", "bearing_y")
-    names = (name.rsplit(".", 2) for name in estimate.parameters.names if name.count(".") >= 2)
-    return tuple(".".join(n) for n in names if n[2] == kind and n[1] in parts)
-
-
 def spring_table(
     estimate: Estimate,
+    names: Sequence[str],
     kind: str,
     truth: Mapping[str, float] | None,
     published: Mapping[str, float],
     source: str,
 ) -> Table:
     """Every stiffness or damping; columns of truth and publication only where there is any."""
-    names = spring_names(estimate, kind)
     factor, unit = scaled("N m/rad" if kind == "stiffness" else "N m s/rad")
     with_published = any(name in published for name in names)
     columns = ["spring", f"estimate ({unit})", "95 % interval", "std"]
@@ -45,14 +38,13 @@ def spring_table(
     )
 
 
-def unseen_springs(estimate: Estimate) -> tuple[str, ...]:
+def unseen_springs(estimate: Estimate, names: Sequence[str]) -> tuple[str, ...]:
     """A sentence for every stiffness and damping that the data do not determine."""
-    sentences = []
-    for kind in ("stiffness", "damping"):
-        for name in spring_names(estimate, kind):
-            if estimate.interval(name) is None:
-                sentences.append(f"{spring_label(name)}, {kind}: {_reason(estimate, name)}")
-    return tuple(sentences)
+    return tuple(
+        f"{spring_label(name)}, {name.rpartition('.')[2]}: {_reason(estimate, name)}"
+        for name in names
+        if estimate.interval(name) is None
+    )
 
 
 def _row(

@@ -10,7 +10,7 @@ from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.spring_intervals import spring_intervals
 from flexcal.report.notation import percent, significant
 from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text
-from flexcal.report.sections.springs import spring_names, spring_table, unseen_springs
+from flexcal.report.sections.springs import spring_table, unseen_springs
 from flexcal.report.study import TwoStageStudy
 from flexcal.units import DEGREE
 
@@ -20,15 +20,15 @@ def stiffness_section(study: TwoStageStudy) -> Section:
     estimate, paper = study.stiffness.estimate, study.paper
     published = paper.springs if paper else {}
     source = paper.short if paper else ""
-    stiffness, damping = spring_names(estimate, "stiffness"), spring_names(estimate, "damping")
+    stiffness, damping = study.springs("stiffness"), study.springs("damping")
     reference = study.truth if study.truth is not None else study.nominal.values
     word = "the truth" if study.truth is not None else "robot.yaml"
-    unseen = unseen_springs(estimate)
+    unseen = unseen_springs(estimate, study.stiffness.springs)
     first = study.responses[0]
     labels = tuple(_label(study, k) for k in range(len(study.responses)))
     blocks: list[Block] = [
-        spring_table(estimate, "stiffness", study.truth, published, source),
-        spring_table(estimate, "damping", study.truth, published, source),
+        spring_table(estimate, stiffness, "stiffness", study.truth, published, source),
+        spring_table(estimate, damping, "damping", study.truth, published, source),
     ]
     if unseen:
         blocks.append(Text((), "Not determined by these data", unseen))
@@ -54,7 +54,7 @@ def stiffness_section(study: TwoStageStudy) -> Section:
         FigureBlock(
             "figure-7",
             "Figures 7 to 9: measured responses against the fitted model",
-            response_fit(study.responses, study.stiffness.fitted, labels),
+            response_fit(study.responses, study.stiffness.predicted, labels),
             "Dots are measured, lines are the model with the one set of springs and dampers that fits all poses at once. Where an element "
             "nearly vanishes, because the pose hardly couples the two axes, dots scatter and carry little weight.",
             f"Magnitudes of all elements and phases of the diagonal ones in {len(labels)} poses; the table below says how well they fit.",
@@ -99,9 +99,11 @@ def _levels_in_words(response: FrequencyResponse) -> str:
 
 def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
     rows = []
-    for label, response, model in zip(labels, study.responses, study.stiffness.fitted, strict=True):
+    result = study.stiffness
+    for label, response, model, misfit in zip(
+        labels, study.responses, result.predicted, result.misfit, strict=True
+    ):
         off = np.abs(np.diagonal(response.response / model - 1, axis1=1, axis2=2))
-        scaled = np.abs(response.response - model) / response.std
         angles = ", ".join(f"{q / DEGREE:.1f}" for q in response.q_mean).replace("-", "−")
         payload = study.nominal.payload
         mass = response.payload if response.payload is not None else (payload.mass if payload else 0.0)
@@ -111,7 +113,7 @@ def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
                 f"{angles}°",
                 f"{mass:g} kg",
                 percent(float(np.median(off))),
-                significant(float(np.sqrt((scaled**2).mean())), 3),
+                significant(float(np.sqrt(np.diagonal(misfit).mean())), 3),
                 f"{response.degrees_of_freedom:.0f}",
             )
         )
@@ -124,12 +126,12 @@ def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
             "mean joint position",
             "payload",
             "median misfit of the diagonal",
-            "misfit / measured std",
+            "the same / measured std",
             "degrees of freedom of the std",
         ),
         tuple(rows),
         f"Over all poses χ² per degree of freedom is {estimate.reduced_chi2:.2f} ({estimate.degrees_of_freedom} degrees of freedom, "
-        f"{estimate.status} after {estimate.iterations} iterations). Misfit / std near one means that noise and distortion explain what "
-        "is left.",
+        f"{estimate.status} after {estimate.iterations} iterations). Misfit over std near one means that noise and distortion explain "
+        "what is left.",
         text_columns=(1,),
     )

@@ -1,0 +1,157 @@
+"""Stage 1 on analytic responses: exact recovery, truthful intervals, what cannot be identified, delays, searches."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexcal.elasticity import (
+    MultiStart,
+    PopulationSearch,
+    ResponseModel,
+    Tolerances,
+    UniformWeighting,
+    identify_stiffness,
+    spring_names,
+)
+from flexcal.elasticity.residual import StageOneResidual
+from flexcal.elasticity.weighting import CovarianceWeighting
+
+
+def perturbed(model, rng, factor=3.0):
+    """The robot with every spring multiplied or divided by up to `factor`."""
+    return model.with_values(
+        {name: model.value(name) * factor ** rng.uniform(-1, 1) for name in spring_names(model)}
+    )
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_noiseless_recovery_from_far_starts(stiff, poses, synthesise, seed):
+    """All 18 parameters to 1e-6 from ×÷3 starts."""
+    rng = np.random.default_rng(seed)
+    responses = synthesise(stiff, poses["default"][[0, 1, 3]], noise=1e-7, step=8)
+    result = identify_stiffness(
+        perturbed(stiff, rng), responses, rng=rng, inertias_known=True, tolerances=Tolerances.none()
+    )
+    assert result.estimate.converged
+    for name in spring_names(stiff):
+        assert result.estimate.values[name] == pytest.approx(stiff.value(name), rel=1e-6), name
+
+
+def test_delays_are_recovered(stiff, poses, synthesise, drawn, rng):
+    truth = drawn(stiff, rng, inertias=False)
+    responses = synthesise(truth, poses["default"][:3], noise=1e-3, rng=rng, step=8)
+    estimate = identify_stiffness(
+        stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none()
+    ).estimate
+    for joint in ("joint_1", "joint_2", "joint_3"):
+        std = estimate.std(f"{joint}.delay")
+        assert std is not None
+        assert std < 5e-6
+        assert abs(estimate.values[f"{joint}.delay"] - truth.value(f"{joint}.delay")) < 4 * std
+
+
+def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthesise, drawn, rng):
+    """Without a payload off the axis, bearing_y of joint_3 does not show; with the default plan everything stiff does."""
+    truth = drawn(tx90l, rng, inertias=True)
+    hidden = "joint_3.bearing_y.stiffness"
+    paper = identify_stiffness(
+        tx90l, synthesise(truth, poses["paper"], noise=0.1, rng=rng, payload=0.0), rng=rng
+    )
+    quantity = paper.quantity(hidden, truth.value(hidden))
+    assert quantity["identifiable"] is False
+    assert quantity["std"] is None
+    assert paper.quantity("joint_1.drive.stiffness")["identifiable"]
+    default = identify_stiffness(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng), rng=rng)
+    assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith("stiffness"))
+
+
+def test_population_search_reaches_the_same_fit(stiff, poses, synthesise, drawn, rng):
+    truth = drawn(stiff, rng, inertias=False)
+    responses = synthesise(truth, poses["default"][:2], noise=1e-2, rng=rng, step=12)
+    common = {"inertias_known": True, "tolerances": Tolerances.none()}
+    one = identify_stiffness(stiff, responses, rng=rng, search=MultiStart(), **common)
+    search = PopulationSearch(factor=1.6, population=54, generations=25)
+    other = identify_stiffness(stiff, responses, rng=rng, search=search, **common)
+    assert other.estimate.cost == pytest.approx(one.estimate.cost, rel=1e-3)
+
+
+def test_result_describes_the_fit(stiff, poses, synthesise, drawn, rng):
+    truth = drawn(stiff, rng, inertias=False)
+    responses = synthesise(truth, poses["default"][:2], noise=1e-2, rng=rng, step=8)
+    seen = []
+    result = identify_stiffness(
+        stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), weighting=UniformWeighting(),
+        progress=lambda what, share: seen.append((what, share)),
+    )  # fmt: skip
+    assert result.predicted[0].shape == responses[0].response.shape
+    assert result.misfit.shape == (2, 3, 3)
+    assert 0.5 < result.misfit.mean() < 1.5
+    assert seen[-1] == ("fitting", 1.0)
+
+
+def squared_errors(model, poses, synthesise, drawn, seeds, *, inertias):
+    """z (seeds, 18) of the springs, and their standard deviations over the Cramér-Rao bound."""
+    z, ratio = [], []
+    names = spring_names(model)
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        truth = drawn(model, rng, inertias=inertias)
+        responses = synthesise(truth, poses, noise=0.03, rng=rng, step=6)
+        estimate = identify_stiffness(
+            model, responses, rng=rng, inertias_known=not inertias, tolerances=Tolerances.none(),
+            search=MultiStart(agreement=1),
+        ).estimate  # fmt: skip
+        index = [estimate.parameters.index(name) for name in names]
+        std = np.sqrt(np.diag(estimate.covariance))[index]
+        error = [np.log(estimate.values[name] / truth.value(name)) for name in names]
+        known = np.array(estimate.identifiable)[index]
+        z.append(np.where(known, np.array(error) / std, np.nan))
+        bound = cramer_rao(model, truth, responses, estimate.parameters)[index]
+        ratio.append(std / bound)
+    return np.array(z), np.array(ratio)
+
+
+def cramer_rao(model, truth, responses, parameters):
+    """Standard deviations (p,) that the information at the truth and the priors allow."""
+    residual = StageOneResidual.of(
+        ResponseModel.of(model, responses, parameters), responses, CovarianceWeighting()
+    )
+    values = {name: truth.values[name] for name in parameters.names if name in truth.values}
+    jacobian = residual.linearise(parameters.coordinates(values))[1]
+    information = jacobian.T @ jacobian + parameters.prior_information()
+    return np.sqrt(np.diag(np.linalg.solve(information, np.eye(len(information)))))
+
+
+def check_intervals(z, ratio):
+    inside = np.abs(z[np.isfinite(z)]) < 1.96
+    assert 0.90 <= inside.mean() <= 0.99
+    assert 0.6 <= np.nanmean(z**2) <= 1.6
+    assert np.median(ratio) <= 1.5
+
+
+def test_intervals_are_true(stiff, poses, synthesise, drawn):
+    check_intervals(
+        *squared_errors(stiff, poses["default"][[0, 1, 3]], synthesise, drawn, range(12), inertias=False)
+    )
+
+
+@pytest.mark.slow
+def test_intervals_are_true_with_inertias_as_wrong_as_cad(stiff, poses, synthesise, drawn):
+    check_intervals(*squared_errors(stiff, poses["default"], synthesise, drawn, range(40), inertias=True))
+
+
+def test_softening_by_backlash_is_found(tx90l, poses, synthesise, rng):
+    """A drive that is softer in one pose, as an open gap makes it, does not pull the stiffness down."""
+    name = "joint_3.drive.stiffness"
+    responses = synthesise(tx90l, poses["default"], noise=0.02, rng=rng, step=8)
+    softer = tx90l.with_values({name: 0.95 * tx90l.value(name)})
+    soft = synthesise(softer, poses["default"], noise=0.02, rng=rng, step=8)
+    estimate = identify_stiffness(
+        tx90l, [*responses[:5], replace(soft[5])], rng=rng, inertias_known=True, tolerances=Tolerances.none()
+    ).estimate
+    low, high = estimate.interval(name) or (0.0, 0.0)
+    assert low < tx90l.value(name) < high
+    assert estimate.values["joint_3.drive.softening.pose_6"] == pytest.approx(0.05, abs=0.015)

@@ -1,0 +1,103 @@
+"""The residual of stage 1: its derivatives, its weights, and its robustness against phase wraps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexcal.elasticity import (
+    CovarianceWeighting,
+    PaperWeighting,
+    ResponseModel,
+    UniformWeighting,
+    stage_one_parameters,
+)
+from flexcal.elasticity.prediction import batch_transfer
+from flexcal.elasticity.residual import PoseResidual, StageOneResidual
+from flexcal.elasticity.weighting import extrema
+from flexcal.errors import FlexcalError
+from flexcal.model.linearisation import linearise
+from flexcal.model.transfer import transfer_matrix
+
+
+def test_batched_transfer_is_the_transfer_matrix(tx90l, poses):
+    names = [
+        "joint_1.drive.stiffness",
+        "joint_2.bearing_x.damping",
+        "link_3.mass",
+        "link_2.com_y",
+        "joint_3.rotor_inertia",
+    ]
+    frequencies = np.linspace(3, 80, 20)
+    system = linearise(tx90l, poses["default"][1], derivatives=names)
+    expected = transfer_matrix(system, frequencies)
+    response, change = batch_transfer(system, names, 2j * np.pi * frequencies)
+    np.testing.assert_allclose(response, expected.response, rtol=1e-12)
+    for k, name in enumerate(names):
+        reference = expected.derivatives[name]
+        np.testing.assert_allclose(change[..., k], reference, rtol=1e-9, atol=1e-12 * np.abs(reference).max())
+
+
+@pytest.mark.parametrize("weighting", [CovarianceWeighting(), UniformWeighting(), PaperWeighting()])
+def test_jacobian_is_that_of_finite_differences(tx90l, poses, synthesise, drawn, weighting, rng):
+    responses = synthesise(
+        drawn(tx90l, rng, inertias=True), poses["default"][:2], noise=0.1, rng=rng, step=24
+    )
+    parameters = stage_one_parameters(tx90l, responses)
+    residual = StageOneResidual.of(ResponseModel.of(tx90l, responses, parameters), responses, weighting)
+    assert not residual.poses[0].logarithmic.all()
+    assert residual.poses[0].logarithmic.any()
+    unit = np.array([{"s": 1e-3, "m": 0.1}.get(unit, 1.0) for unit in parameters.units])
+    x = parameters.coordinates() + 0.05 * unit * rng.standard_normal(len(parameters))
+    rows, jacobian = residual.linearise(x)
+    np.testing.assert_allclose(rows, residual.residual(x), rtol=1e-12)
+    for k, size in enumerate(unit):
+        step = np.zeros(len(x))
+        step[k] = 1e-5 * size
+        numeric = (residual.residual(x + step) - residual.residual(x - step)) / (2 * step[k])
+        np.testing.assert_allclose(jacobian[:, k], numeric, atol=1e-5 * np.abs(jacobian[:, k]).max() + 1e-9)
+
+
+def test_whitened_noise_has_unit_variance(tx90l, poses, synthesise, rng):
+    exact = synthesise(tx90l, poses["default"][:1], noise=0.02, step=1)[0]
+    rows = []
+    for _ in range(40):
+        noisy = synthesise(tx90l, poses["default"][:1], noise=0.02, rng=rng, step=1)[0]
+        rows.append(PoseResidual.of(noisy, CovarianceWeighting()).residual(exact.response))
+    scatter = np.cov(np.array(rows).reshape(-1, 18).T)
+    np.testing.assert_allclose(scatter, np.eye(18), atol=0.1)
+
+
+def test_phase_wraps_do_not_matter(tx90l, poses, synthesise):
+    """A delay that turns the phase through ±π leaves the error a small number: it is the log of the ratio."""
+    response = synthesise(tx90l.with_values({"joint_1.delay": 8e-3}), poses["default"][:1], noise=1e-3)[0]
+    nearly = synthesise(tx90l.with_values({"joint_1.delay": 8.1e-3}), poses["default"][:1], noise=1e-3)[
+        0
+    ].response
+    assert np.ptp(np.angle(response.response[:, 0, 0])) > 5
+    errors = PoseResidual.of(response, CovarianceWeighting()).errors(nearly)
+    assert np.abs(errors[:, 0, 0]).max() < 2 * np.pi * 80 * 1.01e-4
+
+
+def test_paper_weighting_stresses_poles_and_zeros(tx90l, poses, synthesise):
+    response = synthesise(tx90l, poses["default"][:1], noise=1e-2, step=1)[0]
+    factor = PaperWeighting().factor(response, response.covariance)
+    weight = factor[:, 0, 0] / factor[:, 0, 0].min()
+    assert weight.max() == pytest.approx(3.0, rel=1e-3)
+    curve = np.log(np.abs(response.response[:, 0, 0]))
+    assert weight[np.argmax(curve)] == pytest.approx(3.0, rel=1e-3)
+    assert factor[0, 1, 1] < factor[0, 0, 0]
+
+
+def test_extrema_alternate_and_ignore_ripple():
+    t = np.linspace(0, 4 * np.pi, 200)
+    found = extrema(np.sin(t) + 0.01 * np.sin(40 * t), 0.5)
+    np.testing.assert_allclose(np.sin(t[found]), [1, -1, 1, -1], atol=0.02)
+
+
+def test_unfit_responses_are_refused(tx90l, ur5, poses, synthesise):
+    responses = synthesise(tx90l, poses["default"][:1], noise=1e-2, step=40)
+    with pytest.raises(FlexcalError, match="no elastic joint"):
+        stage_one_parameters(ur5, responses)
+    with pytest.raises(FlexcalError, match="no frequency response"):
+        stage_one_parameters(tx90l, [])
