@@ -1,6 +1,8 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
+# matrices are small here: more BLAS threads only get in each other's way
+export OPENBLAS_NUM_THREADS ?= 1
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/*)
 
 .PHONY: install demo test test-all check bench docs clean

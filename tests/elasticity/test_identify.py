@@ -9,6 +9,7 @@ import pytest
 
 from flexcal.elasticity import (
     MultiStart,
+    PaperWeighting,
     PopulationSearch,
     ResponseModel,
     Tolerances,
@@ -83,13 +84,24 @@ def test_result_describes_the_fit(stiff, poses, synthesise, drawn, rng):
     responses = synthesise(truth, poses["default"][:2], noise=1e-2, rng=rng, step=8)
     seen = []
     result = identify_stiffness(
-        stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), weighting=UniformWeighting(),
+        stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(),
         progress=lambda what, share: seen.append((what, share)),
     )  # fmt: skip
     assert result.predicted[0].shape == responses[0].response.shape
     assert result.misfit.shape == (2, 3, 3)
     assert 0.5 < result.misfit.mean() < 1.5
     assert seen[-1] == ("fitting", 1.0)
+
+
+@pytest.mark.parametrize("weighting", [UniformWeighting(), PaperWeighting()])
+def test_other_weightings_find_the_springs_too(stiff, poses, synthesise, drawn, rng, weighting):
+    truth = drawn(stiff, rng, inertias=False)
+    responses = synthesise(truth, poses["default"][:3], noise=1e-3, rng=rng, step=8)
+    result = identify_stiffness(
+        stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), weighting=weighting
+    )
+    for name in spring_names(stiff)[:9]:
+        assert result.estimate.values[name] == pytest.approx(truth.value(name), rel=0.02), name
 
 
 def squared_errors(model, poses, synthesise, drawn, seeds, *, inertias):

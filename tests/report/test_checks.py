@@ -72,3 +72,11 @@ def test_many_uncertain_flanks_are_flagged(study: TwoStageStudy) -> None:
 
 def test_coverage_is_judged() -> None:
     assert [check_truth(k, 20).status for k in (19, 16, 10)] == ["good", "care", "bad"]
+
+
+def test_the_floor_counts_against_the_truth(study: TwoStageStudy) -> None:
+    noise = study.unpredicted_noise
+    assert noise is not None and study.floor is not None
+    draws = noise[0] * np.random.default_rng(3).normal(size=(20000, 3))
+    np.testing.assert_allclose(np.linalg.norm(draws, axis=1).mean(), study.floor.mean, rtol=0.02)
+    np.testing.assert_array_equal(replace(study, truth=None).unpredicted_noise, study.verification_poses.sigma)

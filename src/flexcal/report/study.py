@@ -6,12 +6,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+import numpy as np
+
 from flexcal.calibration import Calibration, ErrorStatistics, Verification
 from flexcal.data import MultisinePlan, PoseSet
 from flexcal.elasticity import StiffnessResult
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.report.publication import Publication
+
+MAXWELL_MEAN = 1.5958
+"""Mean distance over 1σ of a coordinate, for errors alike in three directions."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,3 +59,12 @@ class TwoStageStudy:
     def springs(self, kind: Literal["stiffness", "damping"]) -> tuple[str, ...]:
         """Names of all stiffnesses or all dampings of drives and bearings."""
         return tuple(name for name in self.stiffness.springs if name.endswith(f".{kind}"))
+
+    @property
+    def unpredicted_noise(self) -> np.ndarray | None:
+        """1σ (N, 3) m of what verification errors hold beyond the parameters': the instrument's noise, or against the truth the floor."""
+        if self.truth is None:
+            return self.verification_poses.sigma
+        if self.floor is None:
+            return None
+        return np.full(self.verification_poses.position.shape, self.floor.mean / MAXWELL_MEAN)

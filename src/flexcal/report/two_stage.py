@@ -88,10 +88,9 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     fit, found = study.calibration, study.stiffness.estimate
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
-    noise = None if study.truth is not None else study.verification_poses.sigma
     checks = [
         check_fresh_poses(fit, study.elastic_verification),
-        check_claimed_uncertainty(study.elastic_verification, noise),
+        check_claimed_uncertainty(study.elastic_verification, study.unpredicted_noise),
         check_residual(
             "Does noise explain what the geometric fit leaves?",
             fit.estimate,

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of
 from flexcal.data.experiment_folder import PLAN
-from flexcal.elasticity import ReferenceMotion
 from flexcal.errors import InputError
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -61,19 +60,17 @@ def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyRes
     return [files[i] for i in order], [responses[i] for i in order]
 
 
-def reference_of(files: Sequence[Path]) -> ReferenceMotion | None:
-    """The reference motion under which responses were measured, from the plan beside them; None where there is none.
+def plan_of(files: Sequence[Path]) -> MultisinePlan | None:
+    """The plan under which responses were measured, from the file beside them; None where there is none.
 
-    Raises `InputError` where plans differ in it.
+    Raises `InputError` where plans differ.
     """
-    plans = [_plan_in(folder) for folder in dict.fromkeys(file.parent for file in files)]
-    motions = [ReferenceMotion.of(read_plan_of(plan, MultisinePlan)) for plan in plans if plan.is_file()]
-    for plan, motion in zip(plans[1:], motions[1:], strict=False):
-        if to_plain(motion) != to_plain(motions[0]):
-            raise InputError(
-                f"{plan} has another reference motion or controller than {plans[0]}; identify from responses of one plan."
-            )
-    return motions[0] if len(motions) == len(plans) else None
+    paths = [_plan_in(folder) for folder in dict.fromkeys(file.parent for file in files)]
+    plans = [read_plan_of(path, MultisinePlan) for path in paths if path.is_file()]
+    for path, plan in zip(paths[1:], plans[1:], strict=False):
+        if to_plain(plan) != to_plain(plans[0]):
+            raise InputError(f"{path} is another plan than {paths[0]}; identify from responses of one plan.")
+    return plans[0] if len(plans) == len(paths) else None
 
 
 def _plan_in(folder: Path) -> Path:

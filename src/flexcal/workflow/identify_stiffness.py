@@ -16,7 +16,7 @@ from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
-from flexcal.workflow.experiment_files import read_responses, reference_of
+from flexcal.workflow.experiment_files import plan_of, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 
 Progress = Callable[[str, float], None]
@@ -89,20 +89,20 @@ def identify_robot_stiffness(
         geometric = {n: v for n, v in calibrated.values.items() if n.rpartition(".")[2] in _GEOMETRIC}
         model = model.with_values(geometric)
     inputs, responses = read_responses(files)
-    reference = reference_of(inputs)
+    plan = plan_of(inputs)
     result = identify_stiffness(
         model,
         responses,
         rng=np.random.default_rng([seed, 1]),
         inertias_known=inertias_known,
-        reference=reference,
+        plan=plan,
         progress=tell,
     )
     options = {"inertias_known": inertias_known, "seed": seed}
     origin = provenance([robot, bare.urdf, *inputs], options, source if blocks else None, tuple(blocks))
     estimate = replace(result.estimate, provenance=origin)
     target = source if out is None else out / "estimates.yaml"
-    found = RobotStiffness(result, reference is not None, estimate, target)
+    found = RobotStiffness(result, plan is not None, estimate, target)
     others: dict[Block, Estimate] = {} if target == source else blocks
     for block, other in others.items():
         write_estimates(target, block, other)

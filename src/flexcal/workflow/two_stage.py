@@ -15,7 +15,7 @@ from flexcal.calibration import ErrorStatistics, calibrate, predict, register, v
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, write_truth
 from flexcal.data import MultisinePlan, Recording, provenance, write_estimates, write_plan, write_poses
 from flexcal.design import choose_poses, random_poses
-from flexcal.elasticity import ReferenceMotion, identify_stiffness
+from flexcal.elasticity import identify_stiffness
 from flexcal.estimation import Estimate
 from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses
@@ -99,7 +99,7 @@ def run_two_stage(
             believed,
             responses,
             inertias_known=inertias_known,
-            reference=ReferenceMotion.of(frequency),
+            plan=frequency,
             rng=np.random.default_rng([seed, 1]),
         )
         elastic = believed.with_estimate(stiffness.estimate)

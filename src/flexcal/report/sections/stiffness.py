@@ -104,7 +104,7 @@ def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
         labels, study.responses, result.predicted, result.misfit, strict=True
     ):
         off = np.abs(np.diagonal(response.response / model - 1, axis1=1, axis2=2))
-        angles = ", ".join(f"{q / DEGREE:.1f}" for q in response.q_mean).replace("-", "−")
+        angles = ", ".join(f"{round(q / DEGREE, 1) + 0.0:.1f}" for q in response.q_mean).replace("-", "−")
         payload = study.nominal.payload
         mass = response.payload if response.payload is not None else (payload.mass if payload else 0.0)
         rows.append(

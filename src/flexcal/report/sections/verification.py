@@ -25,6 +25,9 @@ def verification_section(study: TwoStageStudy) -> Section:
         published |= {"paper, 90 %": (paper.elastic.p90, 0.9), "paper, worst": (paper.elastic.max, 1.0)}
     if paper is not None and paper.rigid is not None:
         published["paper, rigid model, worst"] = (paper.rigid.max, 1.0)
+    extra = (
+        "the instrument's noise" if study.truth is None else "the floor" if study.floor else "nothing else"
+    )
     unclear = int(elastic.ambiguous.sum())
     blocks: list[Block] = [
         accuracy_table(study),
@@ -53,9 +56,10 @@ def verification_section(study: TwoStageStudy) -> Section:
         FigureBlock(
             "figure-predicted",
             "Predicted against observed errors",
-            predicted_quantiles(elastic, None if study.truth is not None else study.verification_poses.sigma),
-            "Before anything was verified, the covariance of the parameters predicted how large errors should be. Points on the dashed "
-            "line: the prediction was right. Above it: the robot is worse than promised. Below: better.",
+            predicted_quantiles(elastic, study.unpredicted_noise),
+            f"The covariance of the parameters, with {extra}, predicts how large errors should be. Points on the dashed line: the "
+            "prediction was right. Above it: the robot is worse than promised. Below: better. The poses share one set of parameters, so "
+            "the whole row of points may lie somewhat to one side by chance.",
             "Sorted observed errors against the quantiles predicted from the covariance of the parameters.",
         ),
         Text(_floor_words(study), "What limits the accuracy"),

@@ -1,0 +1,90 @@
+"""What the experiment itself does to the response: reference motion, open gaps, and what is left as model error."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexcal.data import MultisinePlan
+from flexcal.elasticity import ReferenceMotion, Tolerances, reference_shift
+from flexcal.elasticity.gap import multisine_torque, open_share
+from flexcal.elasticity.model_error import LowRank, over_frequency
+from flexcal.model.linearisation import linearise
+from flexcal.model.transfer import transfer_matrix
+
+FREE = np.zeros(3)
+
+
+def plan_of(model, poses, *, amplitude=3.0, reference=0.0):
+    """A plan for a few lines."""
+    lines = np.arange(13, 320, 2)
+    controller = model.controller
+    return MultisinePlan(
+        name="test", poses=poses, joints=(0, 1, 2), base_frequency_hz=0.25, lines=lines,
+        amplitude=np.full((3, len(lines)), amplitude), periods=4, settle_periods=2, realisations=4, signs=True,
+        reference_amplitude=reference, reference_frequency_hz=2.125, kp=controller.kp, kd=controller.kd, rate_hz=4000.0,
+        torque="held", seed=0,
+    )  # fmt: skip
+
+
+def test_very_slow_motion_averages_the_frozen_responses(tx90l, poses):
+    """In the quasi-static limit with free motors the response is the mean of the responses along the motion."""
+    q, frequencies, size = poses["default"][1], np.linspace(5, 60, 23), np.deg2rad(0.5)
+    motion = ReferenceMotion(size, 1e-5, FREE, FREE)
+    shift = reference_shift(tx90l, q, None, frequencies, motion, sidebands=4)
+    still = transfer_matrix(linearise(tx90l, q), frequencies).response
+    frozen = []
+    for angle in 2 * np.pi * np.arange(8) / 8:
+        at = q.copy()
+        at[:3] += size * np.sin(angle)
+        frozen.append(transfer_matrix(linearise(tx90l, at), frequencies).response)
+    expected = np.mean(frozen, axis=0) - still
+    np.testing.assert_allclose(shift, expected, atol=0.05 * np.abs(expected).max())
+
+
+def test_shift_is_quadratic_in_the_amplitude_and_vanishes_at_rest(tx90l, poses):
+    q, frequencies = poses["default"][0], np.linspace(5, 60, 23)
+    kp, kd = np.array(tx90l.controller.kp[:3]), np.array(tx90l.controller.kd[:3])
+    shifts = [
+        reference_shift(tx90l, q, None, frequencies, ReferenceMotion(size, 2.125, kp, kd))
+        for size in (0.0, 1e-3, 2e-3)
+    ]
+    assert not shifts[0].any()
+    np.testing.assert_allclose(shifts[2], 4 * shifts[1], atol=0.02 * np.abs(shifts[2]).max())
+
+
+def test_share_of_time_a_gap_is_open(tx90l, poses, synthesise):
+    """Without gravity on the drive it is 2 b k / (√2π σ); a drive held far from zero torque never opens its gap."""
+    response = synthesise(tx90l, poses["default"][:1], noise=1e-2)[0]
+    plan = plan_of(tx90l, poses["default"][:1])
+    share = open_share(tx90l, response, plan, 1e-5)
+    size = multisine_torque(tx90l, response, plan)
+    assert share[0] == pytest.approx(2e-5 * tx90l.stiffness[0, 2] / (np.sqrt(2 * np.pi) * size[0]), rel=1e-6)
+    assert share[1] < 1e-6
+    moving = open_share(tx90l, response, replace(plan, reference_amplitude=np.deg2rad(3.0)), 1e-5)
+    assert moving[1] > share[1]
+
+
+def test_low_rank_whitening(rng):
+    columns = rng.standard_normal((30, 4))
+    whitening = LowRank.of(columns).whiten(np.eye(30))
+    covariance = np.eye(30) + columns @ columns.T
+    np.testing.assert_allclose(whitening @ covariance @ whitening.T, np.eye(30), atol=1e-12)
+    assert LowRank.of(columns).log_determinant == pytest.approx(np.linalg.slogdet(covariance)[1])
+
+
+def test_knots_add_up_to_the_whole(rng):
+    frequencies = np.linspace(3, 80, 40)
+    change = rng.standard_normal((40, 3, 3, 2)) + 0j
+    spread = over_frequency(change, frequencies, 0.5)
+    half = spread.shape[-1] // 2
+    whole = spread[..., :half].reshape(40, 3, 3, 2, -1).sum(axis=-1)
+    np.testing.assert_allclose(whole, change, atol=1e-12)
+    np.testing.assert_allclose(spread[..., half:], 1j * spread[..., :half])
+
+
+def test_no_tolerances_leave_nothing_out():
+    assert not Tolerances.none().any
+    assert Tolerances().any
