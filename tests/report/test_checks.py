@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from flexcal.calibration import predict
 from flexcal.report import TwoStageStudy
 from flexcal.report.checks import (
+    CHANCE,
     check_claimed_uncertainty,
     check_flanks,
     check_fresh_poses,
@@ -79,4 +81,22 @@ def test_the_floor_counts_against_the_truth(study: TwoStageStudy) -> None:
     assert noise is not None and study.floor is not None
     draws = noise[0] * np.random.default_rng(3).normal(size=(20000, 3))
     np.testing.assert_allclose(np.linalg.norm(draws, axis=1).mean(), study.floor.mean, rtol=0.02)
-    np.testing.assert_array_equal(replace(study, truth=None).unpredicted_noise, study.verification_poses.sigma)
+    np.testing.assert_array_equal(
+        replace(study, truth=None).unpredicted_noise, study.verification_poses.sigma
+    )
+
+
+def test_chance_is_one_in_a_hundred(study: TwoStageStudy, rng: np.random.Generator) -> None:
+    model = study.calibration.model
+    posterior = model.posterior
+    names = [n for n in posterior.parameters.names if not n.endswith(".damping")]
+    numbers = [posterior.parameters.index(n) for n in names]
+    parameters = posterior.parameters.subset(names)
+    slopes = parameters.natural_slope(parameters.coordinates())
+    jacobian = predict(model, study.verification_poses, jacobians=True).jacobian(names) * slopes
+    draws = rng.multivariate_normal(
+        np.zeros(len(names)), posterior.covariance[np.ix_(numbers, numbers)], 3000
+    )
+    errors = draws @ jacobian.reshape(-1, len(names)).T
+    ratios = np.sqrt((errors**2).sum(axis=1) / (study.elastic_verification.std**2).sum())
+    assert abs(np.quantile(ratios, 0.99) - CHANCE) < 0.07

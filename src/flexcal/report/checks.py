@@ -15,10 +15,10 @@ from flexcal.report.page import Check
 BOUND_95 = 1.6140
 """Distance in standard deviations (of the distance) that 95 % of errors stay below when they are alike in three directions."""
 
-CHANCE, MISSING = 1.4, 2.0
-"""Observed over predicted size of errors up to which chance explains it, and from which the model must lack something.
+CHANCE, MISSING = 1.35, 2.0
+"""Observed over predicted size of errors that chance exceeds once in a hundred robots, and from which the model must lack something.
 
-Errors of all poses come from some thirty parameters drawn once: the ratio's square has about the spread of χ²/30, or somewhat more.
+Errors at all poses come from one draw of the parameters, which counts as about two dozen independent numbers however many poses there are.
 """
 
 FEW_POSES = 20
@@ -67,7 +67,7 @@ def check_claimed_uncertainty(
     some = "the poses" if clear.all() else "the poses with a certain flank"
     answer = (
         f"They are {scale:.2f} times the predicted size, and {100 * inside:.0f} % of {some} lie within the bound predicted for 95 % of "
-        f"them. One robot has one set of parameters, so its errors share their luck: up to {CHANCE} times may be chance."
+        f"them. All poses share one set of parameters and so their luck: one robot in a hundred would exceed {CHANCE} times."
     )
     if scale > MISSING:
         return Check(question, f"{answer} This is more: the model lacks something.", "bad")

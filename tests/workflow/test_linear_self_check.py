@@ -1,0 +1,55 @@
+"""The chain from the stepped plant through hold, spectra and response to stage 1, where nothing but arithmetic can go wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from flexcal.cell import CellConfig, FrictionConfig, LoopConfig, SensorConfig, VirtualCell, draw_truth
+from flexcal.data import MultisinePlan, Recording
+from flexcal.elasticity import Tolerances, identify_stiffness
+from flexcal.frequency import frequency_responses
+from flexcal.model import RobotModel
+from flexcal.workflow.frequency_plans import frequency_plan
+
+RATE_HZ = 1000.0
+
+
+@pytest.fixture(scope="module")
+def linear(tx90l: RobotModel, examples: Path) -> tuple[dict[str, float], MultisinePlan, list[Recording]]:
+    """Recordings of a robot with known inertias, 1 kHz control, four plant steps a tick, no noise, friction or backlash."""
+    config = CellConfig(
+        controller=LoopConfig(substeps=4),
+        sensors=SensorConfig(encoder_counts=0, torque_noise=0.0),
+        friction=FrictionConfig(scale=0.0),
+    )
+    drawn = draw_truth(tx90l, config.spread, np.random.default_rng(31))
+    truth = {name: value for name, value in drawn.items() if name.endswith(("stiffness", "damping"))}
+    plan = frequency_plan(tx90l, examples / "tx90l" / "frequency_poses.csv", "default", 5)
+    plan = replace(plan, rate_hz=RATE_HZ, realisations=3, signs=False, reference_amplitude=0.0, poses=plan.poses[[0, 1, 2, 5]])
+    free = tx90l.with_values({f"{joint}.viscous": 0.0 for joint in tx90l.joint_names})
+    return truth, plan, list(VirtualCell(free.with_values(truth), config, 1).record(plan))
+
+
+def late(recordings: list[Recording], samples: int) -> list[Recording]:
+    """Positions logged `samples` ticks after the torque they belong to."""
+    return [replace(r, q=np.roll(r.q, samples, axis=0)) for r in recordings]
+
+
+@pytest.mark.parametrize("samples", [0, 1])
+def test_nine_stiffnesses_and_the_delay(
+    tx90l: RobotModel, linear: tuple[dict[str, float], MultisinePlan, list[Recording]], samples: int
+) -> None:
+    truth, plan, recordings = linear
+    names = tx90l.joint_names[:3]
+    responses = list(frequency_responses(plan, late(recordings, samples), joint_names=names))
+    fit = identify_stiffness(
+        tx90l, responses, inertias_known=True, tolerances=Tolerances.none(), rng=np.random.default_rng(0)
+    ).estimate
+    for name, value in truth.items():
+        if name.endswith("stiffness"):
+            assert abs(fit.values[name] / value - 1) < 0.005, (name, fit.values[name] / value - 1)
+    for joint in names:
+        assert abs(fit.values[f"{joint}.delay"] - samples / RATE_HZ) < 0.01 / RATE_HZ
