@@ -186,3 +186,11 @@ def test_the_fit_without_backlash_is_worse(simulate: Callable, tx90l: RobotModel
     )
     assert with_.estimate.reduced_chi2 < 1.3 < without.estimate.reduced_chi2
     assert abs(with_.estimate.values["joint_2.backlash"] - 3e-4) < 4 * with_.estimate.std("joint_2.backlash")  # type: ignore[operator]
+
+
+def test_a_nominal_robot_can_be_verified(simulate: Callable, tx90l: RobotModel) -> None:
+    """Before any estimate there is no covariance: the flank is judged by the size of the torque alone."""
+    simulated = simulate(1)
+    seen = verify(tx90l, simulated.poses)
+    assert seen.all.mean > 0.2e-3
+    assert not seen.std.any()

@@ -7,18 +7,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from flexcal.data import MultisinePlan
 from flexcal.elasticity import (
     MultiStart,
     PaperWeighting,
     PopulationSearch,
+    ReferenceMotion,
     ResponseModel,
     Tolerances,
     UniformWeighting,
     identify_stiffness,
+    reference_shift,
     spring_names,
 )
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
+
+
+VISCOUS = np.array([1.6, 1.3, 1.8])
+"""As in the synthetic responses."""
 
 
 def perturbed(model, rng, factor=3.0):
@@ -91,6 +98,35 @@ def test_result_describes_the_fit(stiff, poses, synthesise, drawn, rng):
     assert result.misfit.shape == (2, 3, 3)
     assert 0.5 < result.misfit.mean() < 1.5
     assert seen[-1] == ("fitting", 1.0)
+
+
+def test_reference_motion_is_part_of_the_model(stiff, poses, synthesise, rng):
+    """Responses under the reference motion: with the plan the damping is right, without it a bearing's is far too large."""
+    controller = stiff.controller
+    lines = np.arange(13, 320, 8)
+    plan = MultisinePlan(
+        name="test", poses=poses["default"], joints=(0, 1, 2), base_frequency_hz=0.25, lines=lines,
+        amplitude=np.full((3, len(lines)), 3.0), periods=4, settle_periods=2, realisations=4, signs=True,
+        reference_amplitude=np.deg2rad(1.5), reference_frequency_hz=2.125, kp=controller.kp, kd=controller.kd,
+        rate_hz=4000.0, torque="held", seed=0,
+    )  # fmt: skip
+    motion = ReferenceMotion.of(plan)
+    moving = []
+    for k, response in enumerate(synthesise(stiff, poses["default"], noise=3e-3, rng=rng, step=8)):
+        robot = replace(stiff, viscous=stiff.viscous * np.append(VISCOUS, np.ones(3)) * (1 + 0.03 * k))
+        shift = reference_shift(robot, response.q_mean, None, response.frequencies_hz, motion)
+        moving.append(replace(response, response=response.response + shift))
+    name = "joint_2.bearing_y.damping"
+    fits = [
+        identify_stiffness(
+            stiff, moving, rng=rng, inertias_known=True, plan=plan, tolerances=Tolerances.none()
+        ).estimate
+        for plan in (plan, None)
+    ]
+    std = fits[0].std(name)
+    assert std is not None
+    assert abs(fits[0].values[name] - stiff.value(name)) < 3 * std
+    assert abs(fits[1].values[name] - stiff.value(name)) > 3 * std
 
 
 @pytest.mark.parametrize("weighting", [UniformWeighting(), PaperWeighting()])

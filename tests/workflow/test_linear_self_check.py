@@ -28,7 +28,14 @@ def linear(tx90l: RobotModel, examples: Path) -> tuple[dict[str, float], Multisi
     drawn = draw_truth(tx90l, config.spread, np.random.default_rng(31))
     truth = {name: value for name, value in drawn.items() if name.endswith(("stiffness", "damping"))}
     plan = frequency_plan(tx90l, examples / "tx90l" / "frequency_poses.csv", "default", 5)
-    plan = replace(plan, rate_hz=RATE_HZ, realisations=3, signs=False, reference_amplitude=0.0, poses=plan.poses[[0, 1, 2, 5]])
+    plan = replace(
+        plan,
+        rate_hz=RATE_HZ,
+        realisations=3,
+        signs=False,
+        reference_amplitude=0.0,
+        poses=plan.poses[[0, 1, 2, 5]],
+    )
     free = tx90l.with_values({f"{joint}.viscous": 0.0 for joint in tx90l.joint_names})
     return truth, plan, list(VirtualCell(free.with_values(truth), config, 1).record(plan))
 

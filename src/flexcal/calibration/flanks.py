@@ -27,7 +27,7 @@ def ambiguous_poses(prediction: Prediction, prior: ElasticPrior) -> np.ndarray:
     for i in model.backlash_joints:
         torque = np.abs(prediction.rest.torque[:, i])
         margin = np.full(len(torque), RIGID_MARGIN * torque.max(initial=0.0))
-        if (i, 2) in axes and len(prediction.rest.regressor):
+        if (i, 2) in axes and len(prediction.rest.regressor) and len(prior.parameters):
             k = axes.index((i, 2))
             slopes = prior.parameters.natural_slope(prior.parameters.coordinates())
             rows = np.stack(

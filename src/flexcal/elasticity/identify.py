@@ -67,7 +67,8 @@ def identify_stiffness(
     and payload inertias at the model's.
 
     The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
-    neighbouring lines, both inflated by the reduced χ² where it exceeds 1. Raises `FlexcalError` where responses do not fit the robot.
+    neighbouring lines, the first inflated by the reduced χ² where it exceeds 1. The damping of a spring whose stiffness is not
+    identifiable is not either. Raises `FlexcalError` where responses do not fit the robot.
     """
     parameters = stage_one_parameters(model, responses, inertias_known=inertias_known, plan=plan)
     reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
@@ -146,7 +147,7 @@ def _fit(
 
 
 def _widened(fitted: Estimate, robust: Estimate | None) -> Estimate:
-    """The posterior with every standard deviation raised to the sandwich's, and by the reduced χ², where these are larger."""
+    """The posterior with every standard deviation raised to the sandwich's, or by the reduced χ², where these are larger."""
     from flexcal.estimation.solve import LOG_STD_LIMIT
 
     std = np.sqrt(np.diag(fitted.covariance))
@@ -157,8 +158,11 @@ def _widened(fitted: Estimate, robust: Estimate | None) -> Estimate:
         wider = np.sqrt(np.diag(robust.covariance))
         factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
     std *= factor
-    known = tuple(
-        flag and (item.scale != "log" or bool(size <= LOG_STD_LIMIT))
+    small = {
+        item.name: flag and (item.scale != "log" or bool(size <= LOG_STD_LIMIT))
         for flag, item, size in zip(fitted.identifiable, fitted.parameters, std, strict=True)
+    }
+    known = tuple(
+        flag and small.get(name.replace(".damping", ".stiffness"), True) for name, flag in small.items()
     )
     return replace(fitted, covariance=fitted.covariance * np.outer(factor, factor), identifiable=known)

@@ -64,7 +64,8 @@ def analyse(
     Columns are multiplied by `scale` (p,), the size of a change that matters in each parameter; without it each gets unit
     norm. A column is dependent when what the kept ones leave of it is below `tolerance` times the largest. The parameters
     of `prefer` are tried first and in that order, so they are kept whenever they can be; the others by pivoting.
-    A dropped column is J_d = J_k R₁₁⁻¹R₁₂, which names what absorbs it; contributions below 1e-6 of the largest are left out.
+    A dropped column is J_d = J_k R₁₁⁻¹R₁₂, which names what absorbs it; contributions below 1e-6 of the largest, or
+    below `tolerance`, are left out.
     Raises FlexcalError when shapes do not fit, a name is unknown or the Jacobian is not finite.
     """
     names = tuple(names)
@@ -78,7 +79,9 @@ def analyse(
     described: list[Dropped] = []
     if dropped:
         share = _least_squares(scaled[:, kept], scaled[:, dropped])
-        small = np.abs(share) <= 1e-6 * np.max(np.abs(share), axis=0, initial=0.0)
+        weight = np.abs(share) * np.linalg.norm(scaled[:, kept], axis=0)[:, None]
+        limit = tolerance * np.max(np.linalg.norm(scaled, axis=0), initial=0.0)
+        small = weight <= np.maximum(limit, 1e-6 * np.max(weight, axis=0, initial=0.0))
         coefficients = np.where(small, 0.0, share * scale[kept][:, None] / scale[dropped])
         regrouping[:, dropped] = coefficients
         for column, number in enumerate(dropped):

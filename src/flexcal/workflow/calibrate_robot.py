@@ -25,6 +25,7 @@ from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
+from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.results import identifiability_block, quantities, write_results
 
@@ -117,7 +118,7 @@ def calibrate_robot(
 
     The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
     (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. Where the files give no sigma, the
-    scatter about the fit stands for it. With `out`, estimates and results.json go to that folder and nothing beside robot.yaml
+    scatter about the fit stands for it. With `out`, estimates, results.json and report.html go to that folder and nothing beside robot.yaml
     changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
     tell = progress or (lambda stage, share: None)
@@ -170,18 +171,24 @@ def calibrate_robot(
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(with_stations(selected), provenance=origin)
     target = source if out is None else out / "estimates.yaml"
-    result = RobotCalibration(nominal_errors(model, poses), rigid, selection, selected, estimate, target)
+    before = nominal_errors(model, poses)
+    result = RobotCalibration(ErrorStatistics.of(before), rigid, selection, selected, estimate, target)
     _store(target, blocks if target != source else {}, estimate)
     if out is not None:
-        write_results(out, result.document())
+        document = result.document()
+        write_results(out, document)
+        tell("report", 0.0)
+        study = CalibrationStudy(model, before, rigid, selected, selection, origin, results=document)
+        write_calibration_report(out / "report.html", study)
+        tell("report", 1.0)
     return result
 
 
-def nominal_errors(model: RobotModel, poses: PoseSet) -> ErrorStatistics:
-    """How far the uncalibrated, rigid robot is from the points after the best rigid registration."""
+def nominal_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Error vectors (N, 3) m of the uncalibrated, rigid robot after the best rigid registration."""
     bare = replace(model, station=np.zeros_like(model.station))
     placed = register(bare, poses, predict(bare, poses, elastic=False).position)
-    return ErrorStatistics.of(poses.position - predict(placed, poses, elastic=False).position)
+    return poses.position - predict(placed, poses, elastic=False).position
 
 
 def with_stations(calibration: Calibration) -> Estimate:

@@ -70,9 +70,8 @@ def verify_robot(
             raise FlexcalError(
                 f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
             )
-    result = RobotVerification(
-        poses, verify(model, poses), nominal_errors(bare, poses) if _registrable(poses) else None
-    )
+    before = ErrorStatistics.of(nominal_errors(bare, poses)) if _registrable(poses) else None
+    result = RobotVerification(poses, verify(model, poses), before)
     if out is not None:
         write_results(out, result.document())
     return result
