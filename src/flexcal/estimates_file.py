@@ -187,12 +187,14 @@ def provenance(
     estimates: str | Path | None = None,
     blocks: Iterable[Block] = (),
 ) -> dict[str, str]:
-    """Where an estimate comes from: program version, SHA-256 of input files and folders, options, and the SHA-256 of the
-    `blocks` of the file `estimates` that were used."""
+    """Where an estimate comes from: program version, SHA-256 of input files and folders by name (with the path where a name
+    repeats), options, and the SHA-256 of the `blocks` of the file `estimates` that were used."""
     from importlib.metadata import version
 
     found = {"program": f"flexcal {version('flexcal')}"}
-    found |= {f"input.{Path(path).as_posix()}": sha256_of(path) for path in inputs}
+    paths = [Path(path) for path in inputs]
+    names = [path.name for path in paths]
+    found |= {f"input.{p.name if names.count(p.name) == 1 else p.as_posix()}": sha256_of(p) for p in paths}
     found |= {f"option.{name}": str(value) for name, value in (options or {}).items()}
     if estimates is not None:
         found |= {f"block.{block}": block_sha256(estimates, block) for block in blocks}

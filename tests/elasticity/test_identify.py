@@ -23,7 +23,6 @@ from flexcal.elasticity import (
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
 
-
 VISCOUS = np.array([1.6, 1.3, 1.8])
 """As in the synthetic responses."""
 

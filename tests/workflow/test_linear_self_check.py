@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from flexcal.cell import CellConfig, FrictionConfig, LoopConfig, SensorConfig, VirtualCell, draw_truth
 from flexcal.data import MultisinePlan, Recording
 from flexcal.elasticity import Tolerances, identify_stiffness

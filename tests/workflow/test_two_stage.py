@@ -1,0 +1,115 @@
+"""The main job end to end, on a shortened frequency experiment: what it leaves, how accurate it is, what it may look at."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+
+from flexcal.calibration import ErrorStatistics
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.workflow import two_stage
+from flexcal.workflow.frequency_plans import frequency_plan
+
+
+def short_plan(model: RobotModel, poses: Path, kind: str, seed: int):
+    """Four of the six poses, three realisations: a third of the time."""
+    plan = frequency_plan(model, poses, "default", seed)
+    return replace(plan, poses=plan.poses[[0, 1, 2, 5]], realisations=3)
+
+
+@pytest.fixture(scope="module")
+def demo(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+    """A finished run; the truth is hidden as soon as everything has been measured and the estimates are stored."""
+    out = tmp_path_factory.mktemp("demo")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(two_stage, "frequency_plan", short_plan)
+        two_stage.run_two_stage(examples / "tx90l" / "robot.yaml", out, seed=77)
+    yield out
+
+
+def test_results_have_the_fixed_names(demo: Path) -> None:
+    document = json.loads((demo / "results.json").read_text())
+    for kind in ("stiffness", "damping"):
+        for joint in ("joint_1", "joint_2", "joint_3"):
+            for spring in ("drive", "bearing_x", "bearing_y"):
+                quantity = document["stage1"][kind][joint][spring]
+                assert list(quantity) == ["estimate", "std", "low", "high", "truth", "identifiable"]
+                assert (quantity["std"] is None) == (not quantity["identifiable"])
+    assert (document["identifiability"]["rank"], document["identifiability"]["parameters"]) == (29, 47)
+    assert len(document["identifiability"]["dropped"]) == 18
+    for block in ("elastic", "elastic_unambiguous", "rigid", "measured"):
+        assert set(document["verification"][block]) == {"poses", "mean_mm", "p90_mm", "max_mm"}
+    stages = {"dynamics", "frequency", "stage1", "poses", "stage2", "verification", "report", "total"}
+    assert set(document["seconds"]) == stages
+
+
+def test_it_is_accurate(demo: Path) -> None:
+    document = json.loads((demo / "results.json").read_text())
+    assert document["verification"]["elastic"]["p90_mm"] < 0.07
+    assert document["verification"]["elastic"]["mean_mm"] < 0.045
+    assert document["verification"]["elastic"]["max_mm"] < 0.20
+    assert document["verification"]["rigid"]["p90_mm"] > 0.3
+    assert document["calibration_fit"]["wrong_flanks"] == 0
+
+
+def test_the_table_says_what_the_results_say(demo: Path) -> None:
+    table = pl.read_csv(demo / "verification.csv")
+    joints = [f"q{i}" for i in range(1, 7)]
+    kinds = [f"{kind}_{axis}" for kind in ("elastic", "rigid") for axis in "xyz"]
+    assert table.columns == ["pose", *joints, "x", "y", "z", *kinds, "unambiguous"]
+    errors = table.select("x", "y", "z").to_numpy() - table.select(kinds[:3]).to_numpy()
+    document = json.loads((demo / "results.json").read_text())
+    np.testing.assert_allclose(
+        ErrorStatistics.of(errors).p90 * 1e3, document["verification"]["elastic"]["p90_mm"], atol=1e-4
+    )
+
+
+def test_the_stored_estimates_reproduce_the_calibrated_robot(demo: Path, tx90l: RobotModel) -> None:
+    from flexcal.model.stored import apply_estimates
+
+    stored = apply_estimates(tx90l, demo / "estimates.yaml")
+    urdf = (demo / "calibrated.urdf").read_text()
+    assert 'link name="smr"' in urdf
+    import pinocchio as pin
+
+    other = pin.buildModelFromUrdf(str(demo / "calibrated.urdf"))
+    data, frame = other.createData(), other.getFrameId("smr")
+    q = np.random.default_rng(0).uniform(-1, 1, (5, 6))
+    for row, point in zip(q, point_kinematics(stored, q).position, strict=True):
+        pin.framesForwardKinematics(other, data, row)
+        np.testing.assert_allclose(data.oMf[frame].translation, point, atol=1e-9)
+
+
+def test_the_truth_stays_hidden(demo: Path, examples: Path, tmp_path: Path) -> None:
+    """With the truth unreadable once the cell has been built, everything that is identified comes out byte for byte the same."""
+    calls = 0
+    readable = two_stage.read_truth
+
+    def only_for_the_cell(path: Path) -> dict[str, float]:
+        nonlocal calls
+        calls += 1
+        if calls > 1:
+            raise PermissionError(path)
+        return readable(path)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(two_stage, "frequency_plan", short_plan)
+        patch.setattr(two_stage, "read_truth", only_for_the_cell)
+        with pytest.raises(PermissionError):
+            two_stage.run_two_stage(examples / "tx90l" / "robot.yaml", tmp_path, seed=77)
+    for name in ("estimates.yaml", "calibration_poses.csv", "calibrated.urdf"):
+        assert (tmp_path / name).read_bytes() == (demo / name).read_bytes(), name
+    assert not (tmp_path / "results.json").exists()
+
+
+def test_the_report_is_one_file(demo: Path) -> None:
+    page = (demo / "report.html").read_text()
+    assert len(page) < 6.5e6
+    assert "http://" not in page.split("<body")[0]
+    assert page.index("29 of 47") < page.index("Plotly")
