@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.model.equilibrium import elastic_axes
-from flexcal.model.inertia import Inertia, parallel_axis
+from flexcal.model.inertia import Inertia
 from flexcal.model.loading import bearing_frame
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import axis_rotation
@@ -132,21 +132,12 @@ class ElasticArm:
             unit = {"Z": 2, "Y": 1, "X": 0}[self.model.joints[joint].shortname()[-1]]
             axes[k] = placement.rotation[:, unit]
             moments[k] = self.data.mass[joint] * (placement.rotation @ self.data.com[joint])
-        result = np.zeros((d, d, d))
-        supports = [set(self.model.supports[joint]) for joint in ids]
-        for last in range(d):
-            turned = np.cross(axes[last], moments[last])
-            for middle in range(last + 1):
-                twice = np.cross(axes[middle], turned)
-                for before in range(middle + 1):
-                    if ids[before] in supports[middle] and ids[middle] in supports[last]:
-                        value = -self.robot.gravity @ np.cross(axes[before], twice)
-                        for at in {
-                            (before, middle, last), (before, last, middle), (middle, before, last),
-                            (middle, last, before), (last, before, middle), (last, middle, before),
-                        }:  # fmt: skip
-                            result[at] = value
-        return result
+        twice = np.cross(axes[:, None], np.cross(axes, moments))
+        chained = -np.einsum("kx,mlx->kml", np.cross(self.robot.gravity, axes), twice)
+        carries = np.array([[near in set(self.model.supports[far]) for far in ids] for near in ids])
+        chained *= carries[:, :, None] & carries[None]
+        near, middle, far = np.sort(np.indices((d, d, d)), axis=0)
+        return chained[near, middle, far]
 
     def _joint_of(self, velocity: int) -> int:
         return next(i for i in range(1, self.model.njoints) if self.model.joints[i].idx_v == velocity)
@@ -156,6 +147,3 @@ def moved_inertia(link: Inertia, mass: float, com: np.ndarray) -> Inertia:
     """A link with another mass and centre of mass: the inertia about the centre of mass scales with the mass and moves along."""
     scale = mass / link.mass if link.mass > 0 else 1.0
     return Inertia(mass, com, link.inertia * scale)
-
-
-__all__ = ["ElasticArm", "moved_inertia", "parallel_axis"]

@@ -121,6 +121,10 @@ def static_equilibrium(
     slack = -np.sign(load) * model.backlash if flank is None else -flank * model.backlash
     slack = slack - load * model.gravity_compliance + transmission_error(model, q)
     stiffness = np.array([model.stiffness[a] for a in axes])
+    if not (np.isfinite(stiffness) & (stiffness > 0)).all():
+        raise FlexcalError(
+            f"{model.name}: every stiffness must be positive and finite, not {stiffness.min():g} N m/rad."
+        )
     deflection, *derivatives = _solve(model, axes, stiffness, q + slack, masses, sensitivities=sensitivities)
     for i, component in axes:
         if component == 2:

@@ -158,23 +158,21 @@ def _by_inertia(
     step = 0.05 * (robot.value(f"{owner}.mass") if key == "mass" else 1.0)
     step = step if step > 0 else 1.0
     for sign in (1, -1):
-        if owner == "payload":
-            other = ElasticArm(
-                robot.with_values({f"payload.{key}": robot.value(f"payload.{key}") + sign * step}),
-                None if key == "mass" else arm.payload,
-            )
-            if key == "mass":
-                other = ElasticArm(robot, arm.payload + sign * step)
+        if owner == "payload" and key == "mass":
+            other = ElasticArm(robot, arm.payload + sign * step)
+        elif owner == "payload":
+            name = f"payload.{key}"
+            other = ElasticArm(robot.with_values({name: robot.value(name) + sign * step}), arm.payload)
         else:
             i = [joint.link for joint in robot.joints].index(owner)
             link = robot.inertias[i]
             shift = np.zeros(3) if key == "mass" else step * np.eye(3)["xyz".index(key[-1])]
             mass = link.mass + sign * step if key == "mass" else link.mass
             arm.set_inertia(i, moved_inertia(link, mass, link.com + sign * shift))
-            other = arm
-        results.append((other.mass_matrix(at), other.gravity_stiffness(at)))
-        if owner != "payload":
+            results.append((arm.mass_matrix(at), arm.gravity_stiffness(at)))
             arm.set_inertia(i, link)
+            continue
+        results.append((other.mass_matrix(at), other.gravity_stiffness(at)))
     (m_plus, k_plus), (m_minus, k_minus) = results
     return (m_plus - m_minus) / (2 * step), (k_plus - k_minus) / (2 * step)
 
