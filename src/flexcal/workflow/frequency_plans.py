@@ -16,8 +16,8 @@ from flexcal.units import DEGREE
 
 BASE_FREQUENCY_HZ = 0.25
 BAND_HZ = (3.0, 80.0)
-PEAK_TORQUE = 0.12
-"""Peak of the excitation of an axis relative to its drive's effort: below what gravity preloads, where there is backlash."""
+EXCITATION = 0.04
+"""Root mean square of the excitation of an axis in one experiment, relative to its drive's effort."""
 
 
 def frequency_plan(
@@ -35,8 +35,7 @@ def frequency_plan(
     lines = odd_lines(BASE_FREQUENCY_HZ, *BAND_HZ)
     joints = tuple(e.index for e in model.elastic)
     efforts = np.array([model.joints[i].effort for i in joints])
-    crest_of_flat = np.sqrt(len(lines) / 2) * 3.5
-    amplitude = PEAK_TORQUE * efforts / crest_of_flat
+    amplitude = EXCITATION * efforts * np.sqrt(2 * len(joints) / len(lines))
     return MultisinePlan(
         name=kind,
         poses=read_frequency_poses(poses_file, kind, model.n),

@@ -1,0 +1,87 @@
+"""Honesty under a wrong model: with one mismatch of the cell on, either χ² complains or the intervals still cover.
+
+`python -m benchmarks.mismatch --first 2000 --count 4`
+"""
+
+from __future__ import annotations
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core below
+
+import argparse
+import shutil
+import tempfile
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.workflow.two_stage import run_two_stage
+
+EXAMPLE = Path(__file__).parent.parent / "examples" / "tx90l"
+MISMATCHES = {
+    "none": "",
+    "drives 20 % stiffer at 1 mrad": "cubic_stiffness: 0.2",
+    "hysteresis of 0.02 mrad": "hysteresis: 2.0e-5",
+    "wrist of 50 kN m/rad": "elastic_wrist: 5.0e+4",
+    "repeatability 35 µm": "repeatability: 35.0e-6",
+    "drift of 0.1 mm": "temperature_drift: 1.0e-4",
+}
+
+
+def one(label: str, seed: int) -> tuple[float, float, float, list[float], list[float]]:
+    """χ² per degree of freedom of both stages, its 3σ limit for stage 2, normalised errors of springs and of geometry."""
+    with tempfile.TemporaryDirectory() as folder:
+        robot = Path(folder) / "robot"
+        shutil.copytree(EXAMPLE, robot)
+        lines = [
+            line
+            for line in (robot / "cell.yaml").read_text().splitlines()
+            if not line.startswith("mismatch:")
+        ]
+        (robot / "cell.yaml").write_text("\n".join([*lines, f"mismatch: {{{MISMATCHES[label]}}}", ""]))
+        study = run_two_stage(robot / "robot.yaml", Path(folder) / "out", seed=seed, report=False)
+    springs, geometry, truth = study.stiffness.estimate, study.calibration.estimate, study.truth or {}
+    z = []
+    for name in study.stiffness.springs:
+        k = springs.parameters.index(name)
+        if springs.identifiable[k]:
+            z.append(float(np.log(springs.values[name] / truth[name]) / np.sqrt(springs.covariance[k, k])))
+    expected = geometry.regrouped(truth)
+    kept = study.calibration.identifiability.kept_names
+    w = [(geometry.values[n] - expected[n]) / (geometry.std(n) or np.inf) for n in kept]
+    limit = 1 + 3 * np.sqrt(2 / geometry.degrees_of_freedom)
+    return springs.reduced_chi2, geometry.reduced_chi2, limit, z, w
+
+
+def run() -> list[tuple[str, float, str]]:
+    """Share of intervals that contain the truth over the promised 0.95, with the χ² beside it."""
+    return collect(range(2000, 2002))
+
+
+def collect(seeds: range) -> list[tuple[str, float, str]]:
+    """All mismatches on all seeds, one process a core."""
+    results = []
+    with ProcessPoolExecutor(os.cpu_count()) as pool:
+        waiting = {label: [pool.submit(one, label, seed) for seed in seeds] for label in MISMATCHES}
+        for label, futures in waiting.items():
+            rows = [future.result() for future in futures]
+            springs = np.abs([z for row in rows for z in row[3]])
+            geometry = np.abs([w for row in rows for w in row[4]])
+            note = (
+                f"χ² stage 1 {np.mean([row[0] for row in rows]):.2f}, stage 2 {np.mean([row[1] for row in rows]):.2f} "
+                f"(flag above {rows[0][2]:.2f}: {sum(row[1] > row[2] for row in rows)}/{len(rows)}); "
+                f"inside: springs {100 * np.mean(springs < 1.96):.0f} %, geometry {100 * np.mean(geometry < 1.96):.0f} %"
+            )
+            results.append((label, float(np.mean(np.concatenate([springs, geometry]) < 1.96)) / 0.95, note))
+    return results
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--first", type=int, default=2000)
+    parser.add_argument("--count", type=int, default=4)
+    given = parser.parse_args()
+    for label, ratio, note in collect(range(given.first, given.first + given.count)):
+        print(f"{label:32s} {ratio:6.2f}   {note}")
