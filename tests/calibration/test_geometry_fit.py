@@ -97,6 +97,8 @@ def test_any_orientation_of_the_tracker(simulate: Callable, tx90l: RobotModel) -
     turned = replace(simulated.poses, position=simulated.poses.position @ turn.T + shift)
     straight, moved = calibrate(tx90l, simulated.poses), calibrate(tx90l, turned)
     np.testing.assert_allclose(moved.errors.mean, straight.errors.mean, rtol=5e-3)
+    again = predict(tx90l.with_estimate(moved.estimate), turned).position
+    np.testing.assert_allclose(again, predict(moved.model, turned).position, atol=1e-9)
 
 
 def test_a_second_station_gets_its_own_frame(simulate: Callable, tx90l: RobotModel) -> None:

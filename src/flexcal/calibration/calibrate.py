@@ -16,7 +16,17 @@ from flexcal.calibration.registration import register
 from flexcal.calibration.terms import geometric_parameters, tolerances
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.estimation import Dropped, Estimate, Identifiability, Loss, Parameters, Problem, analyse, solve
+from flexcal.estimation import (
+    Dropped,
+    Estimate,
+    Identifiability,
+    Loss,
+    Parameter,
+    Parameters,
+    Problem,
+    analyse,
+    solve,
+)
 from flexcal.model import RobotModel
 
 _FLANK_PASSES = 4
@@ -93,7 +103,7 @@ def calibrate(
         flank = after.rest.flank
         if "backlash" in terms:
             require_both_flanks(model, flank)
-    full = _with_dropped(estimate, geometric, found.dropped)
+    full = _with_held(estimate, _held(geometric, found.dropped, fitted, poses), found.dropped)
     return Calibration(
         model=fitted.with_estimate(full),
         estimate=full,
@@ -195,9 +205,17 @@ def _problem(
     return Problem(parameters, linearise, residual, covariance, groups)
 
 
-def _with_dropped(estimate: Estimate, geometric: Parameters, dropped: tuple[Dropped, ...]) -> Estimate:
-    """The estimate with the dropped parameters put back, at their start and not identifiable."""
-    held = Parameters(geometric[d.name] for d in dropped)
+def _held(
+    geometric: Parameters, dropped: tuple[Dropped, ...], fitted: RobotModel, poses: PoseSet
+) -> Parameters:
+    """What the fit does not move but a robot needs: dropped parameters, and the rotation of the first station."""
+    turns = [f"station.{station}.{key}" for station in poses.stations for key in ("rx", "ry", "rz")]
+    rest = Parameters(Parameter(n, "rad", fitted.value(n)) for n in turns if n not in geometric)
+    return Parameters(geometric[d.name] for d in dropped) + rest
+
+
+def _with_held(estimate: Estimate, held: Parameters, dropped: tuple[Dropped, ...]) -> Estimate:
+    """The estimate with parameters added that stay at their values, not identifiable."""
     size = len(estimate.parameters)
     covariance = np.zeros((size + len(held), size + len(held)))
     covariance[:size, :size] = estimate.covariance

@@ -22,7 +22,7 @@ from flexcal.calibration import (
 from flexcal.data import PoseSet, provenance, read_estimates, read_poses, write_estimates
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimates_file import Block
-from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
@@ -169,7 +169,7 @@ def calibrate_robot(
         "elasticity": elasticity,
     }
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
-    estimate = replace(with_stations(selected), provenance=origin)
+    estimate = replace(selected.estimate, provenance=origin)
     target = source if out is None else out / "estimates.yaml"
     before = nominal_errors(model, poses)
     result = RobotCalibration(ErrorStatistics.of(before), rigid, selection, selected, estimate, target)
@@ -189,26 +189,6 @@ def nominal_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
     bare = replace(model, station=np.zeros_like(model.station))
     placed = register(bare, poses, predict(bare, poses, elastic=False).position)
     return poses.position - predict(placed, poses, elastic=False).position
-
-
-def with_stations(calibration: Calibration) -> Estimate:
-    """The estimate with the rotation of the first station, which is held where registration put it, so that it can be stored."""
-    estimate, model = calibration.estimate, calibration.model
-    names = [
-        f"station.{station}.{key}" for station in calibration.poses.stations for key in ("rx", "ry", "rz")
-    ]
-    held = Parameters(
-        Parameter(name, "rad", model.value(name)) for name in names if name not in estimate.parameters
-    )
-    size = len(estimate.parameters)
-    covariance = np.zeros((size + len(held), size + len(held)))
-    covariance[:size, :size] = estimate.covariance
-    return replace(
-        estimate,
-        parameters=estimate.parameters + held,
-        covariance=covariance,
-        identifiable=estimate.identifiable + (False,) * len(held),
-    )
 
 
 def _with_scatter(found: Calibration, loss: LossName) -> PoseSet:

@@ -23,7 +23,6 @@ from flexcal.model import RobotModel
 from flexcal.report.publication import TX90L_PAPER
 from flexcal.report.study import TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
-from flexcal.workflow.calibrate_robot import with_stations
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.results import write_results
 from flexcal.workflow.two_stage_results import two_stage_document, write_verification
@@ -126,7 +125,7 @@ def run_two_stage(
         rigid = tuple(calibrate(believed, cell.measure(p), elastic=False) for p in for_rigid)
         tell("stage2", 1.0)
     write_poses(out / "calibration_poses.csv", measured)
-    _store(out, robot, stiffness.estimate, with_stations(calibration))
+    _store(out, robot, stiffness.estimate, calibration.estimate)
     exported = write_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):
         tell("verification", 0.0)
