@@ -11,22 +11,29 @@ import importlib
 import pkgutil
 from pathlib import Path
 
+from benchmarks.peers import PeerAbsentError
+
 SLOW = ("mismatch", "two_stage_seeds")
 """Asked for by name only: they run the demonstration on many hidden truths."""
 
 
-def main(names: list[str]) -> None:
-    """Run and print."""
-    found = sorted(
-        m.name
-        for m in pkgutil.iter_modules([str(Path(__file__).parent)])
-        if not m.name.startswith("_") and not m.ispkg
-    )
+def main(names: list[str]) -> int:
+    """Run and print; a benchmark whose peer cannot be installed is skipped with the reason. Returns the exit status."""
+    modules = pkgutil.iter_modules([str(Path(__file__).parent)])
+    found = sorted(m.name for m in modules if not m.name.startswith("_") and not m.ispkg)
+    unknown = [name for name in names if name not in found]
+    if unknown:
+        print(f"there is no benchmark '{unknown[0]}'; there are {', '.join(found)}.", file=sys.stderr)
+        return 2
+    print(f"{'benchmark':24s} {'what':60s} {'ratio':>10s}   measured")
     for name in names or [n for n in found if n not in SLOW]:
-        module = importlib.import_module(f"benchmarks.{name}")
-        for label, ratio, note in module.run():
-            print(f"{name:24s} {label:60s} {ratio:10.1f}   {note}", flush=True)
+        try:
+            for label, ratio, note in importlib.import_module(f"benchmarks.{name}").run():
+                print(f"{name:24s} {label:60s} {ratio:10.1f}   {note}", flush=True)
+        except PeerAbsentError as problem:
+            print(f"{name:24s} skipped: {problem}", flush=True)
+    return 0
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    sys.exit(main(sys.argv[1:]))

@@ -153,10 +153,14 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
                     if (!outside && !inside) continue;
                     const Frames& f = frames[i];
                     const Vector3 turns[3] = {f.axis, f.misalignment_1, f.misalignment_2};
-                    const Vector3 moved = moment[i] - mass[i] * f.origin;
+                    const bool slides = tree.joints[i].prismatic;
+                    // a misalignment turns about the joint's place before the prismatic motion
+                    const double slid = slides ? q[s * n + i] + prepared[i].offset + deflection[3 * i + 2] : 0.0;
+                    const Vector3 moved = moment[i] - mass[i] * (f.origin - slid * f.axis);
                     for (int g = 0; g < 3; ++g)
                         row[geometry_size * i + g] = inside ? -dot(gravity, cross(turns[g], own))
                                                             : -dot(gravity, cross(axis[k], cross(turns[g], moved)));
+                    if (slides) row[geometry_size * i] = inside ? 0.0 : -mass[i] * dot(gravity, cross(axis[k], f.axis));
                     if (!beyond[joint * n + i]) continue;
                     const double carried = mass[i] - masses.mass[i] - (i == masses.payload_joint ? masses.payload[s] : 0.0);
                     const Vector3 lengths[3] = {f.link.x, f.link.y, f.link.z};

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from flexcal.atomic import atomic_path, write_bytes, write_text
+from flexcal.atomic import atomic_path, atomic_paths, write_text
 from flexcal.errors import InputError
 
 
@@ -13,7 +13,7 @@ def test_writes_and_replaces(tmp_path: Path) -> None:
     path = tmp_path / "new" / "a.txt"
     write_text(path, "é\n")
     assert path.read_bytes() == "é\n".encode()
-    write_bytes(path, b"\x00\r\n")
+    write_text(path, "\0\r\n")
     assert path.read_bytes() == b"\x00\r\n"
     assert os.listdir(path.parent) == ["a.txt"]
 
@@ -26,6 +26,28 @@ def test_keeps_the_old_file_when_it_fails(tmp_path: Path) -> None:
         raise RuntimeError
     assert path.read_text() == "old"
     assert os.listdir(tmp_path) == ["a.txt"]
+
+
+def test_files_that_belong_together_appear_together(tmp_path: Path) -> None:
+    a, b = tmp_path / "a.npz", tmp_path / "b.yaml"
+    write_text(a, "old")
+    with pytest.raises(KeyboardInterrupt), atomic_paths(a, b) as (first, second):
+        first.write_text("new")
+        second.write_text("half")
+        raise KeyboardInterrupt
+    assert a.read_text() == "old" and os.listdir(tmp_path) == ["a.npz"]
+    with atomic_paths(a, b) as (first, second):
+        first.write_text("new")
+        assert not b.exists() and a.read_text() == "old"
+        second.write_text("new")
+    assert a.read_text() == b.read_text() == "new" and sorted(os.listdir(tmp_path)) == ["a.npz", "b.yaml"]
+    (tmp_path / "c.yaml").mkdir()
+    with (
+        pytest.raises(InputError, match="is a folder"),
+        atomic_paths(tmp_path / "c.npz", tmp_path / "c.yaml"),
+    ):
+        pass
+    assert not (tmp_path / "c.npz").exists()
 
 
 def test_permissions_are_those_of_a_plain_file(tmp_path: Path) -> None:

@@ -14,10 +14,8 @@ from flexcal.estimates_file import (
     block_sha256,
     provenance,
     read_estimates,
-    read_values,
     sha256_of,
     write_estimates,
-    write_values,
 )
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
 
@@ -65,7 +63,6 @@ def test_round_trip(tmp_path: Path) -> None:
     write_estimates(path, "stiffness", estimate)
     same(read_estimates(path)["stiffness"], estimate)
     assert sorted(os.listdir(tmp_path)) == ["estimates.npz", "estimates.yaml"]
-    assert read_values(path) == estimate.values
     text = path.read_text()
     assert "joint_1.drive.stiffness: {estimate: 47900.0, unit: N m/rad, std: " in text
 
@@ -81,6 +78,16 @@ def test_a_block_replaces_only_itself(tmp_path: Path) -> None:
     same(read["stiffness"], two)
     same(read["calibration"], three)
     assert list(read_estimates(path, without="calibration")) == ["stiffness"]
+
+
+def test_an_interrupt_leaves_no_half_of_the_pair(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "write_text", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        write_estimates(tmp_path / "estimates.yaml", "stiffness", make_estimate())
+    assert os.listdir(tmp_path) == []
 
 
 def test_the_same_estimates_are_the_same_bytes(tmp_path: Path) -> None:
@@ -177,15 +184,11 @@ def test_names_of_files_and_blocks(tmp_path: Path) -> None:
         write_estimates(tmp_path / "estimates.txt", "stiffness", make_estimate())
     with pytest.raises(FlexcalError, match="no block 'geometry'"):
         write_estimates(tmp_path / "estimates.yaml", "geometry", make_estimate())  # type: ignore[arg-type]
-    with pytest.raises(FlexcalError, match="no block 'truth'"):
-        write_values(tmp_path / "truth.yaml", {"truth": {}})  # type: ignore[dict-item]
 
 
-def test_values_only(tmp_path: Path) -> None:
+def test_values_only_are_no_estimate(tmp_path: Path) -> None:
     path = tmp_path / "truth.yaml"
-    values = {"link_1.mass": 12.3, "joint_1.offset": 1 / 3}
-    write_values(path, {"dynamics": values, "calibration": {"joint_2.backlash": 3e-5}}, {"link_1.mass": "kg"})
-    assert read_values(path) == {**values, "joint_2.backlash": 3e-5}
+    path.write_text("dynamics: {values: {link_1.mass: {estimate: 12.3, unit: kg}}}\n")
     with pytest.raises(InputError, match="the block 'dynamics' has values only"):
         read_estimates(path)
 

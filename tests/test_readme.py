@@ -45,6 +45,12 @@ def test_verb_exists(verb: str, tmp_path: Path) -> None:
     run([str(BIN / "flexcal"), *verb.split(), "--help"], tmp_path, dict(os.environ))
 
 
+def test_every_verb_is_listed() -> None:
+    from flexcal.cli.verbs import VERBS as KNOWN
+
+    assert sorted(verb.name for verb in KNOWN) == VERBS
+
+
 @pytest.mark.parametrize("script", [text for text in SCRIPTS if "flexcal demo" not in text])
 def test_command_lines_run(script: str, tmp_path: Path, root: Path) -> None:
     run(["bash", "-euc", script], tmp_path, workplace(tmp_path, root))

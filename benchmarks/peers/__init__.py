@@ -13,13 +13,20 @@ HERE = Path(__file__).parent
 ENVIRONMENTS = HERE.parent.parent / "build" / "peers"
 
 
+class PeerAbsentError(Exception):
+    """A peer cannot be installed here; the message says why."""
+
+
 def run_peer(script: str, requirements: tuple[str, ...], payload: dict[str, Any]) -> dict[str, Any]:
-    """Run `script` (in this folder) with `payload` on standard input in an environment holding `requirements`, single-threaded."""
+    """Run `script` (in this folder) with `payload` on standard input in an environment holding `requirements`, single-threaded.
+
+    Raises `PeerAbsentError` where the environment cannot be made.
+    """
     home = ENVIRONMENTS / script.removesuffix(".py")
     python = home / "bin" / "python"
     if not (home / ".installed").exists():
-        subprocess.run([sys.executable, "-m", "venv", str(home)], check=True)
-        subprocess.run([str(python), "-m", "pip", "install", "--quiet", *requirements], check=True)
+        _install([sys.executable, "-m", "venv", str(home)], script)
+        _install([str(python), "-m", "pip", "install", "--quiet", *requirements], " ".join(requirements))
         (home / ".installed").touch()
     threads = {name: "1" for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")}
     done = subprocess.run(
@@ -31,3 +38,12 @@ def run_peer(script: str, requirements: tuple[str, ...], payload: dict[str, Any]
         env={**os.environ, **threads},
     )
     return json.loads(done.stdout.splitlines()[-1])
+
+
+def _install(command: list[str], what: str) -> None:
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    if done.returncode:
+        reason = (done.stderr or done.stdout).strip().splitlines()
+        raise PeerAbsentError(
+            f"{what} cannot be installed ({reason[-1] if reason else 'no reason is given'})."
+        )

@@ -1,7 +1,6 @@
 """flexcal makes industrial robots accurate: the public names, each imported when it is first asked for."""
 
 from importlib import import_module
-from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
@@ -13,6 +12,8 @@ if TYPE_CHECKING:
     from flexcal.estimation import Estimate
     from flexcal.frequency import FrequencyResponse, frequency_response
     from flexcal.model import RobotModel, point_kinematics, static_equilibrium
+
+    __version__: str
 
 _PLACES = {
     "Calibration": "calibration",
@@ -32,8 +33,6 @@ _PLACES = {
     "static_equilibrium": "model",
     "verify": "calibration",
 }
-
-__version__ = version("flexcal")
 
 __all__ = [
     "Calibration",
@@ -56,6 +55,10 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("flexcal")
     if name not in _PLACES:
         raise AttributeError(f"module 'flexcal' has no attribute '{name}'")
     return getattr(import_module(f"flexcal.{_PLACES[name]}"), name)

@@ -15,7 +15,41 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
     Raises `InputError` where the folder does not exist and cannot be made, or cannot be written to.
     """
-    path = Path(path)
+    with atomic_paths(path) as (temporary,):
+        yield temporary
+
+
+@contextmanager
+def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
+    """`atomic_path` for files that belong together: all of them are whole before the first takes its place."""
+    places = [Path(path) for path in paths]
+    temporaries: list[Path] = []
+    try:
+        for place in places:
+            temporaries.append(_temporary(place))
+        yield tuple(temporaries)
+        for place, temporary in zip(places, temporaries, strict=True):
+            temporary.chmod(_mode_of(place))
+            with temporary.open("rb") as stream:
+                os.fsync(stream.fileno())
+        for place, temporary in zip(places, temporaries, strict=True):
+            temporary.replace(place)
+    except OSError as problem:
+        named = " and ".join(str(place) for place in places)
+        raise InputError(f"{named} could not be written ({_reason(problem)}).") from problem
+    finally:
+        for temporary in temporaries:
+            temporary.unlink(missing_ok=True)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write UTF-8 text with newlines as given, atomically."""
+    with atomic_path(path) as temporary:
+        temporary.write_bytes(text.encode("utf-8"))
+
+
+def _temporary(path: Path) -> Path:
+    """An empty file beside `path`, in a folder that is made where it is not there."""
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         if path.is_dir():
@@ -26,28 +60,7 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
             f"{path} cannot be written ({_reason(problem)}); choose a folder that can."
         ) from problem
     os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        temporary.chmod(_mode_of(path))
-        with temporary.open("rb") as stream:
-            os.fsync(stream.fileno())
-        temporary.replace(path)
-    except OSError as problem:
-        raise InputError(f"{path} could not be written ({_reason(problem)}).") from problem
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def write_text(path: str | Path, text: str) -> None:
-    """Write UTF-8 text with newlines as given, atomically."""
-    write_bytes(path, text.encode("utf-8"))
-
-
-def write_bytes(path: str | Path, content: bytes) -> None:
-    """Write bytes atomically."""
-    with atomic_path(path) as temporary:
-        temporary.write_bytes(content)
+    return Path(name)
 
 
 def _mode_of(path: Path) -> int:

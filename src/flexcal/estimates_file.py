@@ -2,13 +2,12 @@
 
 The YAML has for every block the named values with unit, standard deviation and 95 % interval, what could not be told
 apart, the fit and the provenance; the npz has `<block>.names` (p,) and `<block>.covariance` (p, p), in estimation
-coordinates (of a value whose scale is `log`: its natural logarithm). A file of values only (a truth) has the same form.
+coordinates (of a value whose scale is `log`: its natural logarithm).
 """
 
 from __future__ import annotations
 
 import hashlib
-import io
 import json
 import math
 import zipfile
@@ -19,11 +18,11 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from flexcal.atomic import write_bytes
+from flexcal.atomic import atomic_paths
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
 from flexcal.yaml_reader import YamlFile, read_yaml_file
-from flexcal.yaml_writer import to_plain, write_yaml
+from flexcal.yaml_writer import to_plain, yaml_text
 
 Block = Literal["dynamics", "stiffness", "calibration"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
@@ -112,7 +111,7 @@ def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Bl
 def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
     """Put an estimate into its block of the file, made where it is not there; the other blocks stay as they are.
 
-    Each of the two files appears whole or not at all; the YAML is last and carries the SHA-256 of its covariance.
+    The two files appear whole and together; the YAML carries the SHA-256 of its covariance.
     Raises `InputError` where another block of the file cannot be read, and `FlexcalError` where the estimate holds a
     number that is not finite.
     """
@@ -141,44 +140,16 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
         )
     arrays[block] = (estimate.parameters.names, covariance)
     stored = replace(stored, **{block: _stored(estimate, covariance)})
-    to_plain(stored)  # refuses what cannot be written, before anything is
-    content = io.BytesIO()
+    text = yaml_text(stored)
     named: dict[str, np.ndarray] = {}
     for name in BLOCKS:
         if name in arrays:
             named[f"{name}.names"] = np.array(arrays[name][0], dtype=str)
             named[f"{name}.covariance"] = arrays[name][1]
-    np.savez(content, allow_pickle=False, **named)
-    write_bytes(path.with_suffix(".npz"), content.getvalue())
-    write_yaml(path, stored)
-
-
-def read_values(path: str | Path) -> dict[str, float]:
-    """Only the values of an estimates or truth file, by name; later blocks of `BLOCKS` win. Needs no npz."""
-    stored = read_yaml_file(path).structure(StoredEstimates)
-    blocks = [stored.block(name) for name in BLOCKS]
-    return {
-        name: value.estimate for block in blocks if block is not None for name, value in block.values.items()
-    }
-
-
-def write_values(
-    path: str | Path, values: Mapping[Block, Mapping[str, float]], units: Mapping[str, str] | None = None
-) -> None:
-    """Write a file of values only, such as a truth, atomically."""
-    units = units or {}
-    blocks = {
-        block: StoredBlock(
-            {name: StoredValue(float(value), units.get(name, "")) for name, value in named.items()}
-        )
-        for block, named in values.items()
-    }
-    unknown = [block for block in blocks if block not in BLOCKS]
-    if unknown:
-        raise FlexcalError(
-            f"there is no block '{unknown[0]}' in a file of values; there are {', '.join(BLOCKS)}."
-        )
-    write_yaml(path, StoredEstimates(**blocks))
+    with atomic_paths(path.with_suffix(".npz"), path) as (binary, plain):
+        with binary.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **named)
+        plain.write_text(text, encoding="utf-8", newline="")
 
 
 def provenance(

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Keys = tuple[str | int, ...]
+_QUOTED = 40
+"""Letters of a value that a message quotes."""
 
 
 class MisfitError(FlexcalError):
@@ -326,7 +328,10 @@ def _describe(value: Any) -> str:
         return "a mapping"
     if isinstance(value, list):
         return f"a list of {len(value)}"
-    return f"the text '{value}'" if isinstance(value, str) else str(value)
+    if isinstance(value, str):
+        text = " ".join(value.split())
+        return f"the text '{text if len(text) <= _QUOTED else text[: _QUOTED - 1] + '…'}'"
+    return str(value)
 
 
 def _failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None]:

@@ -2,12 +2,15 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from flexcal.calibration import ElasticPrior, ErrorStatistics, calibrate, predict, verify
+from flexcal.calibration import ElasticPrior, ErrorStatistics, calibrate, moved_far, predict, verify
+from flexcal.data import read_poses
 from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.model.rotations import vector_rotation
 
@@ -41,15 +44,71 @@ def test_noiseless_recovery(simulate: Callable, tx90l: RobotModel) -> None:
 
 
 def test_reestimated_and_marginalised_elasticity_agree(simulate: Callable, tx90l: RobotModel) -> None:
-    """R + J Σ Jᵀ in the residual covariance, or the same parameters re-estimated with Σ as prior: equal to first order."""
-    simulated = simulate(4, 50)
+    """R + J Σ Jᵀ in the residual covariance, or the same parameters re-estimated with Σ as prior: one estimate of all of them."""
+    simulated, fresh = simulate(4, 50), simulate(41, 100, truth=simulate(4, 50).truth, noise=False)
     joint = calibrate(tx90l, simulated.poses)
     marginal = calibrate(tx90l, simulated.poses, elasticity="marginalised")
-    for name in joint.identifiability.kept_names:
-        a, b = joint.estimate.std(name), marginal.estimate.std(name)
-        assert a is not None and b is not None
-        np.testing.assert_allclose(a, b, rtol=0.05)
-        assert abs(joint.estimate.values[name] - marginal.estimate.values[name]) < 0.3 * a, name
+    one, other = joint.estimate, marginal.estimate
+    assert one.parameters.names == other.parameters.names and one.identifiable == other.identifiable
+    assert (one.rank, one.degrees_of_freedom) == (other.rank, other.degrees_of_freedom)
+    std = np.sqrt(np.diag(one.covariance))
+    shift = np.abs(one.parameters.coordinates() - other.parameters.coordinates())
+    assert (shift <= 1e-3 * std + 1e-12).all()
+    scale = np.outer(std, std) + 1e-30
+    np.testing.assert_allclose(one.covariance / scale, other.covariance / scale, atol=1e-3)
+    assert other.chi2 == pytest.approx(one.chi2, rel=1e-5) and other.cost == pytest.approx(one.cost, rel=1e-5)
+    moved = one.parameters["joint_2.drive.stiffness"].value / tx90l.value("joint_2.drive.stiffness")
+    assert abs(moved - 1) > 0.05  # the springs have left their prior, or the agreement says nothing
+    seen, again = verify(joint.model, fresh.poses), verify(marginal.model, fresh.poses)
+    np.testing.assert_allclose(seen.position, again.position, atol=1e-7)
+    np.testing.assert_allclose(seen.parameter_rms, again.parameter_rms, rtol=1e-3)
+    np.testing.assert_allclose(marginal.residuals, joint.residuals, atol=1e-7)
+
+
+def test_a_robust_loss_cannot_weigh_poses_tied_by_marginalised_springs(
+    simulate: Callable, tx90l: RobotModel
+) -> None:
+    with pytest.raises(FlexcalError, match="re-estimate it instead"):
+        calibrate(tx90l, simulate(1).poses, elasticity="marginalised", loss="cauchy")
+
+
+def stage_one(model: RobotModel, std: float, correlation: float = 0.0) -> Estimate:
+    """An identification that found every spring where `model` has it, to a relative `std`, the springs correlated alike."""
+    names = [n for n in model.values if n.endswith("stiffness")]
+    parameters = Parameters(Parameter(n, "N m/rad", model.value(n), scale="log") for n in names)
+    covariance = std**2 * ((1 - correlation) * np.eye(len(names)) + correlation)
+    good = (True,) * len(names)
+    return Estimate(parameters, covariance, len(names), (), good, 0.0, 0.0, 0, "converged", "", 0)
+
+
+def test_the_posterior_of_the_model_is_the_prior_of_the_springs(
+    simulate: Callable, tx90l: RobotModel
+) -> None:
+    """Identifications compose through the model: what stage 1 left there, covariances included, is where stage 2 starts from."""
+    poses = simulate(4, 50).poses
+    informed = tx90l.with_estimate(stage_one(tx90l, 0.01, correlation=0.5))
+    bare, known = ElasticPrior.of(tx90l, poses), ElasticPrior.of(informed, poses)
+    assert known.parameters.names == bare.parameters.names
+    springs = [k for k, n in enumerate(known.parameters.names) if n.endswith("stiffness")]
+    block = known.covariance[np.ix_(springs, springs)]
+    np.testing.assert_allclose(block, 0.01**2 * (0.5 * np.eye(9) + 0.5))
+    others = np.setdiff1d(np.arange(len(bare.parameters)), springs)
+    np.testing.assert_allclose(known.covariance[others, others], bare.covariance[others, others])
+    loose, tight = calibrate(tx90l, poses), calibrate(tx90l.with_estimate(stage_one(tx90l, 1e-4)), poses)
+    name = "joint_2.drive.stiffness"
+    assert tight.estimate.values[name] == pytest.approx(tx90l.value(name), rel=1e-3)
+    assert abs(loose.estimate.values[name] / tx90l.value(name) - 1) > 0.05
+
+
+def test_without_sigma_the_scatter_stands_for_it(simulate: Callable, tx90l: RobotModel) -> None:
+    """The same points with and without a stated sigma: the same intervals, for the noise can be seen."""
+    simulated = simulate(13, 80)
+    silent = replace(simulated.poses, sigma=np.full_like(simulated.poses.sigma, 1e-4), sigma_given=False)
+    stated, found = calibrate(tx90l, simulated.poses), calibrate(tx90l, silent)
+    assert found.poses.sigma[0, 0] == pytest.approx(3e-5, rel=0.15)
+    assert found.estimate.reduced_chi2 == pytest.approx(1, abs=0.1)
+    for name in stated.identifiability.kept_names:
+        assert found.estimate.std(name) == pytest.approx(stated.estimate.std(name), rel=0.2), name
 
 
 def coverage(simulate: Callable, tx90l: RobotModel, seeds: range) -> tuple[float, float, float]:
@@ -87,8 +146,16 @@ def test_verification_beats_the_rigid_fit(simulate: Callable, tx90l: RobotModel)
     elastic, rigid = calibrate(tx90l, simulated.poses), calibrate(tx90l, simulated.poses, elastic=False)
     seen, bare = verify(elastic.model, fresh.poses), verify(rigid.model, fresh.poses, elastic=False)
     assert seen.all.p90 < 0.07e-3 < 0.5e-3 < bare.all.p90
-    standard = np.linalg.norm(seen.errors, axis=1) / seen.std
+    standard = np.linalg.norm(seen.errors, axis=1) / seen.parameter_rms
     assert 0.5 < np.sqrt(np.mean(standard[~seen.ambiguous] ** 2)) < 1.5
+    noise = np.full_like(fresh.poses.position, 2e-4)
+    rng = np.random.default_rng(0)
+    noisy = verify(
+        elastic.model,
+        replace(fresh.poses, position=fresh.poses.position + noise * rng.normal(size=noise.shape)),
+    )
+    standard = np.linalg.norm(noisy.errors, axis=1) / noisy.expected_rms(noise)
+    assert np.sqrt(np.mean(standard[~seen.ambiguous] ** 2)) == pytest.approx(1, abs=0.1)
 
 
 def test_any_orientation_of_the_tracker(simulate: Callable, tx90l: RobotModel) -> None:
@@ -130,8 +197,8 @@ def test_outliers_are_found_and_listed(simulate: Callable, tx90l: RobotModel) ->
 
 def test_the_secant_scale_widens_the_drives_alone(simulate: Callable, tx90l: RobotModel) -> None:
     poses = simulate(1).poses
-    tight = ElasticPrior.of(tx90l, poses, None)
-    wide = ElasticPrior.of(tx90l, poses, None, secant_scale=0.1)
+    tight = ElasticPrior.of(tx90l, poses)
+    wide = ElasticPrior.of(tx90l, poses, secant_scale=0.1)
     changed = np.flatnonzero(np.diag(wide.covariance) - np.diag(tight.covariance))
     assert [tight.parameters.names[k] for k in changed] == [f"joint_{i}.drive.stiffness" for i in (1, 2, 3)]
 
@@ -146,15 +213,9 @@ def test_a_stiffer_secant_is_found(simulate: Callable, tx90l: RobotModel) -> Non
     start = tx90l.with_values(tangent)
     precise = replace(start.config, prior=replace(start.config.prior, mass=1e-3, com=1e-4))
     known = replace(start, config=precise)
-    from flexcal.estimation import Estimate, Parameter, Parameters
-
-    names = [n for n in truth if n.endswith("stiffness")]
-    parameters = Parameters(Parameter(n, "N m/rad", start.value(n), scale="log") for n in names)
-    stage_one = Estimate(
-        parameters, np.diag([0.01**2] * 9), 9, (), (True,) * 9, 0.0, 0.0, 0, "converged", "", 0
-    )
-    scaled = calibrate(known, simulated.poses, stiffness=stage_one, secant_scale=0.1)
-    plain = calibrate(known, simulated.poses, stiffness=stage_one)
+    stiff = known.with_estimate(stage_one(known, 0.01))
+    scaled = calibrate(stiff, simulated.poses, secant_scale=0.1)
+    plain = calibrate(stiff, simulated.poses)
     assert plain.estimate.cost > scaled.estimate.cost + 15
     assert 0.8 < scaled.estimate.reduced_chi2 < 1.2
     for name in drives[1:]:
@@ -195,4 +256,40 @@ def test_a_nominal_robot_can_be_verified(simulate: Callable, tx90l: RobotModel) 
     simulated = simulate(1)
     seen = verify(tx90l, simulated.poses)
     assert seen.all.mean > 0.2e-3
-    assert not seen.std.any()
+    assert not seen.parameter_rms.any()
+
+
+def test_stations_and_measurements_that_are_not_known_are_named(
+    simulate: Callable, tx90l: RobotModel
+) -> None:
+    poses = simulate(1).poses
+    elsewhere = replace(poses, station=np.full(len(poses), "window"))
+    for call in (calibrate, verify):
+        with pytest.raises(FlexcalError, match=r"no station 'window'.*which has tracker"):
+            call(tx90l, elsewhere)
+        with pytest.raises(FlexcalError, match="orientations cannot be used"):
+            call(tx90l, replace(poses, quaternion_wxyz=np.tile([1.0, 0, 0, 0], (len(poses), 1))))
+        with pytest.raises(FlexcalError, match="lengths of a wire"):
+            call(tx90l, replace(poses, length=np.ones(len(poses))))
+
+
+def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: Path) -> None:
+    """A column with the wrong sign can be fitted perfectly, by an axis that points the other way."""
+    poses = read_poses(examples / "ur5_tracker" / "grid.csv", ur5).subset(slice(0, None, 8))
+    assert not moved_far(calibrate(ur5, poses, terms=("kinematic",)))
+    wrong = poses.q * np.array([1, 1, 1, -1, 1, 1])
+    found = calibrate(ur5, replace(poses, q=wrong), terms=("kinematic",))
+    assert found.errors.max < 0.3e-3
+    assert moved_far(found)[0].name.startswith("wrist_1_joint.misalignment")
+    assert abs(abs(moved_far(found)[0].value) - np.pi) < 0.02
+
+
+def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, tx90l: RobotModel) -> None:
+    simulated, name = simulate(4, 60), "joint_2.drive.stiffness"
+    elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith("stiffness")}
+    sure = replace(tx90l.config, prior=replace(tx90l.config.prior, mass=1e-3, com=1e-4))
+    known = replace(tx90l, config=sure).with_values(elastic)
+    stiffer = known.with_values({name: 1.5 * known.value(name)})
+    assert not moved_far(calibrate(known.with_estimate(stage_one(known, 0.02)), simulated.poses))
+    far = moved_far(calibrate(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses))
+    assert far[0].name == name and far[0].start > 1.2 * far[0].value

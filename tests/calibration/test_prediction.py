@@ -1,6 +1,7 @@
 """The Jacobian of what the instrument reads, against central differences of the whole prediction."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,8 @@ import pytest
 from flexcal.calibration import predict
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
+from flexcal.model.loading import kinematic_tree
+from flexcal.model.names import GEOMETRY
 
 
 def slope(model: RobotModel, poses, name: str, step: float, flank: np.ndarray) -> np.ndarray:
@@ -24,7 +27,7 @@ def slope(model: RobotModel, poses, name: str, step: float, flank: np.ndarray) -
         (
             ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z", "backlash"),
             1e-5,
-            5e-3,
+            1e-6,
         ),
         (("tracker.x", "tracker.y", "tracker.z", "tracker.rx", "tracker.ry", "tracker.rz"), 1e-5, 1e-7),
         (("transmission_2_sin", "transmission_3_cos", "gravity_compliance"), 1e-7, 1e-4),
@@ -57,3 +60,58 @@ def test_a_parameter_without_effect_on_points_is_refused(simulate: Callable) -> 
     simulated = simulate(1, 5)
     with pytest.raises(FlexcalError, match=r"does not depend on 'joint_1.delay'"):
         predict(simulated.robot, simulated.poses, jacobians=True).jacobian(["joint_1.delay"])
+
+
+def with_slide(model: RobotModel, joint: int) -> RobotModel:
+    """The robot with one joint sliding along its axis in place of turning about it, and no spring there."""
+    joints = tuple(replace(j, kind="prismatic") if i == joint else j for i, j in enumerate(model.joints))
+    frames = {i: frame for i, frame in model.bearing_frames.items() if i != joint}
+    return replace(model, joints=joints, bearing_frames=frames, tree=kinematic_tree(joints, frames))
+
+
+@pytest.mark.parametrize("joint", range(6))
+def test_every_geometric_column_with_a_slide_anywhere(
+    simulate: Callable, tx90l: RobotModel, joint: int
+) -> None:
+    """A slide before, among or beyond the springs carries the masses beyond it to where their load is another."""
+    simulated = simulate(3, 15)
+    robot = with_slide(simulated.robot, joint)
+    at = predict(robot, simulated.poses, jacobians=True)
+    names = [f"{owner}.{key}" for owner in (*robot.joint_names, "tool") for key in GEOMETRY]
+    jacobian = at.jacobian(names)
+    for k, name in enumerate(names):
+        expected = slope(robot, simulated.poses, name, 1e-5, at.rest.flank)
+        np.testing.assert_allclose(jacobian[:, :, k], expected, atol=2e-9, rtol=0, err_msg=name)
+
+
+def held(model: RobotModel, mass: float) -> RobotModel:
+    """The robot with another declared payload mass."""
+    assert model.nominal_payload is not None
+    other = replace(model.nominal_payload, mass=mass, mass_std=0.0)
+    return replace(model, nominal_payload=other, payload_mass=np.array([mass]))
+
+
+def test_the_payload_column_is_in_kilograms_whatever_is_declared(
+    simulate: Callable, tx90l: RobotModel
+) -> None:
+    """Also where robot.yaml declares the place of a payload and no mass: the column is not a share of it."""
+    poses = replace(simulate(1, 8).poses, payload=np.array([0.0, 3.0] * 4))
+    light, heavy = predict(held(tx90l, 0.0), poses, jacobians=True), predict(held(tx90l, 6.0), poses)
+    np.testing.assert_allclose(light.position, heavy.position, atol=1e-14)
+    empty = predict(held(tx90l, 0.0), replace(poses, payload=None))
+    apart = np.linalg.norm(light.position - empty.position, axis=1)
+    assert apart[::2].max() < 1e-14 < 1e-5 < apart[1::2].min()
+    expected = slope(light.model, poses, "payload.com_x", 1e-4, light.rest.flank)
+    np.testing.assert_allclose(
+        light.jacobian(["payload.com_x"])[:, :, 0], expected, atol=1e-6 * np.abs(expected).max()
+    )
+
+
+def test_a_payload_found_heavier_makes_all_of_the_column_heavier(
+    simulate: Callable, tx90l: RobotModel
+) -> None:
+    poses = replace(simulate(1, 8).poses, payload=np.full(8, 3.0))
+    found = predict(tx90l.with_values({"payload.mass": 6.6}), poses).position
+    np.testing.assert_allclose(
+        found, predict(tx90l, replace(poses, payload=np.full(8, 3.3))).position, atol=1e-14
+    )

@@ -43,6 +43,7 @@ ROBOT = [
     ("backlash: [joint_2, joint_3]", "backlash: [joint_2, joint_9]", ["robot.yaml line", "joint_9", "joint_3"]),
     ("robot: tx90l.urdf", "robot: tx90.urdf", ["tx90.urdf"]),
     ("rotor_inertia: [6.4, 9.8,", "rotor_inertia: [9.8,", ["robot.yaml line", "rotor_inertia", "6 joints"]),
+    ("mass: 6.0, com", "mass: 0.0, com", ["robot.yaml line LINE", "0 kg", "mass_std"]),
     ("gravity: [0, 0, -9.81]", "gravity: [0, 0, -9.81", ["robot.yaml line", "YAML"]),
 ]  # fmt: skip
 
@@ -161,6 +162,30 @@ def test_draw_wire_lengths_are_refused_by_name(run, ur5_folder: Path) -> None:
     assert "wire" in refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
 
 
+def test_orientations_are_refused_by_name(run, ur5_folder: Path) -> None:
+    header, rows = read_csv(ur5_folder / "random.csv")
+    turned = np.hstack([rows, np.tile([1.0, 0.0, 0.0, 0.0], (len(rows), 1))])
+    file = write_csv(ur5_folder / "turned.csv", [*header, "qw", "qx", "qy", "qz"], turned)
+    sentence = refused(run, ur5_folder, "calibrate", ur5_folder / "robot.yaml", file)
+    assert "turned.csv" in sentence and "take out the columns qw" in sentence
+
+
+def test_calibrate_from_a_station_that_robot_yaml_does_not_have(run, ur5_folder: Path) -> None:
+    lines = (ur5_folder / "random.csv").read_text().splitlines()
+    moved = [f"{lines[0]},station", *(f"{line},elsewhere" for line in lines[1:])]
+    (ur5_folder / "moved.csv").write_text("\n".join(moved) + "\n")
+    arguments = (ur5_folder / "robot.yaml", ur5_folder / "moved.csv")
+    assert "no station 'elsewhere'" in refused(run, ur5_folder, "calibrate", *arguments)
+
+
+def test_sigma_in_some_files_only(run, ur5_folder: Path) -> None:
+    header, rows = read_csv(ur5_folder / "random.csv")
+    stated = np.hstack([rows, np.full((len(rows), 1), 5e-5)])
+    file = write_csv(ur5_folder / "stated.csv", [*header, "sigma"], stated)
+    arguments = (ur5_folder / "robot.yaml", ur5_folder / "random.csv", file)
+    assert "only 1 of 2 pose sets have sigma" in refused(run, ur5_folder, "calibrate", *arguments)
+
+
 def test_one_flank_of_a_backlash_only(run, tx90l_folder: Path, rng: np.random.Generator) -> None:
     model = RobotModel.from_yaml(tx90l_folder / "robot.yaml")
     q = rng.uniform(-1.2, 1.2, (400, model.n))
@@ -204,6 +229,30 @@ def test_numbers_out_of_range(
 def test_negative_secant_scale(run, ur5_folder: Path) -> None:
     arguments = (ur5_folder / "robot.yaml", ur5_folder / "random.csv", "--secant-scale", "-0.1")
     assert "--secant-scale" in refused(run, ur5_folder, "calibrate", *arguments)
+
+
+# ---- arguments in each other's place ------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verb", ["calibrate", "verify", "identify stiffness"])
+def test_swapped_arguments(run, ur5_folder: Path, verb: str) -> None:
+    sentence = refused(run, ur5_folder, *verb.split(), ur5_folder / "grid.csv", ur5_folder / "robot.yaml")
+    assert "did you mean" in sentence and "robot.yaml first" in sentence and len(sentence) < 400
+
+
+def test_folder_in_the_place_of_the_robot(run, ur5_folder: Path) -> None:
+    sentence = refused(run, ur5_folder, "identify", "response", ur5_folder, ur5_folder / "robot.yaml")
+    assert "did you mean" in sentence
+    assert "no robot.yaml" in refused(
+        run, ur5_folder, "calibrate", ur5_folder / "ur5.urdf", ur5_folder / "grid.csv"
+    )
+
+
+def test_a_whole_file_is_not_quoted(run, ur5_folder: Path) -> None:
+    robot = ur5_folder / "robot.yaml"
+    robot.write_bytes((ur5_folder / "grid.csv").read_bytes())
+    sentence = refused(run, ur5_folder, "calibrate", robot, ur5_folder / "grid.csv")
+    assert "robot.yaml line 1" in sentence and len(sentence) < 400
 
 
 # ---- order of work ----------------------------------------------------------------------------------------------------------------

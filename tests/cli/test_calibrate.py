@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from cli_files import FLEXCAL, read_csv, snapshot, write_csv
 
-from flexcal.data import read_estimates
+from flexcal.data import PoseSet, read_estimates, write_estimates, write_poses
+from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.model import RobotModel, point_kinematics, static_equilibrium
 
 
 @pytest.fixture
@@ -78,6 +80,7 @@ def test_out_leaves_the_robots_folder_alone(run, ur5_folder: Path, some: Path, t
     found = run("calibrate", robot, some, "--terms", "kinematic", "--out", out, "--json")
     assert snapshot(ur5_folder) == before
     assert sorted(p.name for p in out.iterdir()) == [
+        ".flexcal",
         "estimates.npz",
         "estimates.yaml",
         "report.html",
@@ -168,3 +171,93 @@ def test_several_files_are_one_set(run, ur5_folder: Path, some: Path) -> None:
     halves = [write_csv(ur5_folder / f"half{k}.csv", header, rows[k::2]) for k in (0, 1)]
     found = run("calibrate", ur5_folder / "robot.yaml", *halves, "--terms", "kinematic", "--json").document
     assert found["calibration"]["rigid"]["poses"] == len(rows)
+
+
+def test_verifying_on_the_calibration_file_is_remarked(run, ur5_folder: Path, some: Path) -> None:
+    robot = ur5_folder / "robot.yaml"
+    run("calibrate", robot, some, "--terms", "kinematic")
+    copied = ur5_folder / "renamed.csv"
+    copied.write_bytes(some.read_bytes())
+    assert "fitted to renamed.csv" in " ".join(run("verify", robot, copied, "--json").document["remarks"])
+    fresh = run("verify", robot, ur5_folder / "random.csv", "--json").document
+    assert fresh["remarks"] == [] and fresh["rms_mm"]["expected"] is None
+    assert fresh["rms_mm"]["parameters"] < fresh["rms_mm"]["measured"] < 0.2
+
+
+def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: Path) -> None:
+    """The fit may look perfect; an axis that turned round does not."""
+    robot, arguments = ur5_folder / "robot.yaml", ("--terms", "kinematic", "--json")
+    assert len(run("calibrate", robot, some, *arguments).document["remarks"]) == 1  # that there is no sigma
+    header, rows = read_csv(some)
+    rows[:, header.index("q4")] *= -1
+    write_csv(some, header, rows)
+    remarks = " ".join(run("calibrate", robot, some, *arguments).document["remarks"])
+    assert "implausibly far" in remarks and "wrist_1_joint.misalignment_" in remarks
+    assert remarks.count("look for a column with a wrong sign") == 1
+
+
+def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some: Path) -> None:
+    header, rows = read_csv(some)
+    at = [header.index(key) for key in ("q2", "q3")]
+    rows[:, at] = rows[:, at[::-1]]
+    write_csv(some, header, rows)
+    arguments = ("calibrate", ur5_folder / "robot.yaml", some, "--terms", "kinematic")
+    page = run(*arguments)
+    assert "too much to be noise" in page.out and page.out.count("look for a column") == 1
+    write_csv(some, [*header, "sigma"], np.hstack([rows, np.full((len(rows), 1), 5e-5)]))
+    page = run(*arguments)
+    assert "times what sigma explains" in page.out and page.out.count("look for a column") == 1
+
+
+@pytest.fixture
+def elastic_poses(tx90l_folder: Path, rng: np.random.Generator) -> Path:
+    """60 points of the nominal TX90L, deflected, with torques and temperature."""
+    model = RobotModel.from_yaml(tx90l_folder / "robot.yaml")
+    q = rng.uniform(-1.5, 1.5, (60, model.n))
+    rest = static_equilibrium(model, q)
+    point = point_kinematics(model, q, rest.deflection, jacobians=False).position
+    poses = PoseSet(
+        q=q, position=point + 3e-5 * rng.standard_normal(point.shape), sigma=np.full((60, 3), 3e-5), torque=rest.torque,
+        payload=None, temperature=np.full(60, 21.0), target=np.full(60, "smr"), station=np.full(60, "tracker"), pose=np.arange(60),
+    )  # fmt: skip
+    write_poses(tx90l_folder / "poses.csv", poses)
+    return tx90l_folder / "poses.csv"
+
+
+def test_what_is_read_and_not_used_is_said(run, tx90l_folder: Path, elastic_poses: Path) -> None:
+    robot = tx90l_folder / "robot.yaml"
+    for verb in ("calibrate", "verify"):
+        page = run(verb, robot, elastic_poses)
+        assert page.status == 0
+        assert "torques tau1… in the files are not used" in page.out
+        assert "temperature in the files is not used" in page.out
+    rms = run("verify", robot, elastic_poses, "--json").document["rms_mm"]
+    assert rms["parameters"] < rms["expected"] == pytest.approx(0.06, abs=0.01)
+
+
+def test_nominal_springs_are_said_to_be_nominal(run, tx90l_folder: Path, elastic_poses: Path) -> None:
+    robot, estimates = tx90l_folder / "robot.yaml", tx90l_folder / "estimates.yaml"
+    remark = "the stiffness was not identified: the nominal one of robot.yaml is taken to be right to 30%"
+    assert remark in run("calibrate", robot, elastic_poses).out
+    model = RobotModel.from_yaml(robot, estimates=False)
+    springs = [n for n in model.values if n.endswith("stiffness")]
+    parameters = Parameters(Parameter(n, "N m/rad", model.value(n), scale="log") for n in springs)
+    found = Estimate(parameters, 1e-4 * np.eye(9), 9, (), (True,) * 9, 0.0, 0.0, 0, "converged", "", 0)
+    estimates.unlink()
+    write_estimates(estimates, "stiffness", found)
+    assert "nominal one of robot.yaml" not in run("calibrate", robot, elastic_poses).out
+
+
+def test_marginalised_and_reestimated_springs_are_stored_alike(
+    run, tx90l_folder: Path, elastic_poses: Path
+) -> None:
+    stored = []
+    for way in ("reestimated", "marginalised"):
+        assert run("calibrate", tx90l_folder / "robot.yaml", elastic_poses, "--elasticity", way).status == 0
+        stored.append(read_estimates(tx90l_folder / "estimates.yaml")["calibration"])
+    one, other = stored
+    assert one.parameters.names == other.parameters.names
+    std = np.sqrt(np.diag(one.covariance))
+    shift = np.abs(one.parameters.coordinates() - other.parameters.coordinates())
+    assert (shift <= 1e-3 * std + 1e-12).all()
+    np.testing.assert_allclose(np.diag(other.covariance), std**2, rtol=1e-3, atol=1e-30)

@@ -33,7 +33,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     def run_two_stage(robot: Path, out: Path, **options: Any) -> None:
         made.append({"robot": robot, "out": out, **options})
         options["progress"]("frequency", 0.5)
-        out.mkdir(parents=True)
+        assert out.is_dir()
         (out / "results.json").write_text(json.dumps(DOCUMENT))
 
     monkeypatch.setitem(

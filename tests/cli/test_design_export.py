@@ -16,14 +16,16 @@ from flexcal.model import RobotModel, point_kinematics
 def measured(run, tx90l_folder: Path) -> Path:
     """The TX90L's folder with 45 designed poses, measured in the virtual cell, and 30 random ones."""
     robot = tx90l_folder / "robot.yaml"
-    for name, options in (
-        ("chosen", ("--count", 45, "--candidates", 600)),
-        ("random", ("--count", 30, "--random")),
+    for name, options, verb in (
+        ("chosen", ("--count", 45, "--candidates", 600), "calibrate"),
+        ("random", ("--count", 30, "--random"), "verify"),
     ):
         plan = tx90l_folder / f"{name}.yaml"
         assert run("design", "poses", robot, *options, "--out", plan).status == 0
         outcome = run("measure", plan, "--cell", "virtual", "--seed", 3, "--out", tx90l_folder / name)
-        assert outcome.status == 0 and "flexcal calibrate" in outcome.out
+        poses = tx90l_folder / name / "poses.csv"
+        assert outcome.status == 0
+        assert outcome.out.splitlines()[-1] == f"next: flexcal {verb} {robot} {poses}"
     return tx90l_folder
 
 
@@ -117,4 +119,4 @@ def test_exported_urdf_is_the_calibrated_robot(run, ur5_folder: Path) -> None:
 def test_export_says_what_is_lost_in_millimetres(run, tx90l_folder: Path) -> None:
     page = run("export", "urdf", tx90l_folder / "robot.yaml", "--out", tx90l_folder / "new.urdf")
     assert page.status == 0 and "elastic deflection" in page.out and " mm on average" in page.out
-    assert "nominal robot" in page.out
+    assert "nominal robot" in page.out and page.out.splitlines()[-1].startswith("next: flexcal calibrate")

@@ -1,5 +1,6 @@
 """Finding verbs, help, exit statuses."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -53,8 +54,10 @@ def test_every_verb_explains_itself(run, verb) -> None:
 
 
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.name)
-def test_every_example_parses(verb, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_every_example_parses(verb, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     import importlib
+
+    monkeypatch.chdir(tmp_path)
 
     command = getattr(importlib.import_module(f"flexcal.cli.{verb.module}"), verb.command)
     carried_out: list[object] = []
@@ -137,6 +140,23 @@ def test_known_error_is_one_line_without_traceback(tmp_path: Path) -> None:
     )
     assert done.returncode == 2 and done.stdout == ""
     assert done.stderr.startswith("flexcal: ") and done.stderr.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["calibrate", "--help"], "Relative 1sigma by which"),
+        (["export", "urdf", "robot.yaml", "--out", "köln.urdf"], "wrote koln.urdf"),
+        (["design", "frequency", "robot.yaml", "--out", "köln.yaml", "--json"], r'"plan": "k\u00f6ln.yaml"'),
+        (["verify", "köln.csv", "o.csv"], "koln.csv is no robot.yaml"),
+    ],
+)
+def test_terminal_with_ascii_only(arguments: list[str], words: str, tx90l_folder: Path) -> None:
+    environment = {**os.environ, "PYTHONIOENCODING": "ascii", "LANG": "C", "PYTHONUTF8": "0"}
+    done = subprocess.run([FLEXCAL, *arguments], cwd=tx90l_folder, env=environment, capture_output=True)
+    shown = (done.stdout + done.stderr).decode("ascii")
+    assert "Traceback" not in shown and "Error" not in shown
+    assert words in " ".join(shown.split())
 
 
 def test_reader_that_goes_away_is_no_error() -> None:

@@ -18,7 +18,6 @@ from flexcal.data import (
     Recording,
     RecordingLabel,
     labels,
-    recording_name,
     write_measured_poses,
     write_plan,
     write_recordings,
@@ -70,7 +69,7 @@ def make_poses(q: np.ndarray) -> PoseSet:
 
 
 def test_names_and_order() -> None:
-    assert recording_name(RecordingLabel(0, 3, 1, -1)) == "pose_1_realisation_4_experiment_2_minus"
+    assert RecordingLabel(0, 3, 1, -1).name == "pose_1_realisation_4_experiment_2_minus"
     order = list(labels(make_plan()))
     assert len(order) == 2 * 2 * 2 * 2
     assert order[:3] == [RecordingLabel(0, 0, 0, 1), RecordingLabel(0, 0, 0, -1), RecordingLabel(0, 0, 1, 1)]
@@ -147,6 +146,6 @@ def test_poses_of_another_plan(tmp_path: Path, robot: Any, fault: Callable[..., 
     write_measured_poses(tmp_path, plan, make_poses(plan.q[:1]))
     assert "1 poses, but the plan has 2" in fault(FolderCell(tmp_path, robot).measure)
     write_measured_poses(tmp_path, plan, make_poses(plan.q[::-1]))
-    assert "column q1: measured pose 1 lies 0.4 from the planned one" in fault(
+    assert "column q1: measured pose 0 lies 0.4 from the planned one" in fault(
         FolderCell(tmp_path, robot).measure
     )

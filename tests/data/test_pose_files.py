@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexcal.data import PoseSet, concatenate, read_poses, write_poses
+from flexcal.data import PoseSet, concatenate, read_pose_pool, read_poses, write_poses
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
@@ -262,3 +262,41 @@ def test_not_finite_is_not_written(tmp_path: Path, fault: Callable[..., str]) ->
     poses = make_poses(3, position=np.full((3, 3), np.nan))
     assert "xyz of row 1 is not finite" in fault(write_poses, tmp_path / "poses.csv", poses)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_a_pool_takes_every_pose_once(tmp_path: Path, robot: Any, ending: str) -> None:
+    poses = make_poses(6, pose=np.array([4, 4, 9, 2, 2, 2]), payload=np.full(6, 2.5))
+    poses.q[:] = poses.q[[0, 0, 2, 3, 3, 3]]
+    write_poses(tmp_path / f"poses.{ending}", poses)
+    pool = read_pose_pool(tmp_path / f"poses.{ending}", robot)
+    assert pool.pose.tolist() == [4, 9, 2]
+    np.testing.assert_array_equal(pool.q, poses.q[[0, 2, 3]])
+    assert pool.payload == 2.5
+
+
+def test_a_pool_needs_no_measurements(tmp_path: Path, robot: Any) -> None:
+    pool = read_pose_pool(file(tmp_path / "taught.csv", ["1,0.1,0.2", "2,3,-3"], "pose,q1,q2"), robot)
+    assert (pool.pose.tolist(), pool.q.tolist(), pool.payload) == ([1, 2], [[0.1, 0.2], [3, -3]], None)
+
+
+@pytest.mark.parametrize(
+    ("header", "lines", "words"),
+    [
+        ("pose,q1", GOOD, ["line 1", "robot has 2 joints"]),
+        ("q1,q2", GOOD, ["line 1", "'pose'"]),
+        ("pose,q1,q2,colour", GOOD, ["line 1", "'colour' is not known"]),
+        ("pose,q1,q2", ["1,0,0", "7,0.1,-3.2"], ["line 3, column q2: pose 7", "-3.2 rad", "limits of elbow (-3 to 3"]),
+        ("pose,q1,q2", ["1,0,0", "1,0.1,0.2"], ["line 3, column q1", "own number"]),
+        ("pose,q1,q2", ["1,0,0", "2,10,-90"], ["line 3, column q1", "degrees"]),
+        ("pose,q1,q2,payload", ["1,0,0,2", "2,0,1,3"], ["line 3, column payload", "3 kg follow 2 kg"]),
+        ("pose,q1,q2,payload", ["1,0,0,-2"], ["line 2, column payload", "not negative"]),
+    ],
+)  # fmt: skip
+def test_pools_that_do_not_fit(
+    tmp_path: Path, robot: Any, fault: Callable[..., str], header: str, lines: list[str], words: list[str]
+) -> None:
+    message = fault(read_pose_pool, file(tmp_path / "pool.csv", lines, header), robot)
+    assert message.startswith(str(tmp_path / "pool.csv"))
+    for word in words:
+        assert word in message, message

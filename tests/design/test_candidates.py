@@ -1,7 +1,16 @@
 import numpy as np
 import pytest
 
-from flexcal.design import Acceptance, CollisionChecker, joint_ranges, preloaded, random_candidates, visible
+from flexcal.design import (
+    Acceptance,
+    CollisionChecker,
+    MeasuringSetup,
+    joint_ranges,
+    preloaded,
+    random_candidates,
+    visible,
+)
+from flexcal.design.joint_space import LIMIT_MARGIN
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
 from flexcal.units import DEGREE
@@ -20,11 +29,11 @@ def test_every_candidate_passes_every_check(tx90l, rng):
 
 
 def test_ranges_keep_off_the_limits(tx90l):
-    lower, upper = joint_ranges(tx90l, margin=0.05)
+    lower, upper = joint_ranges(tx90l)
     low = np.array([j.lower for j in tx90l.joints])
     high = np.array([j.upper for j in tx90l.joints])
-    np.testing.assert_allclose(lower - low, 0.05 * (high - low))
-    np.testing.assert_allclose(high - upper, 0.05 * (high - low))
+    np.testing.assert_allclose(lower - low, LIMIT_MARGIN * (high - low))
+    np.testing.assert_allclose(high - upper, LIMIT_MARGIN * (high - low))
 
 
 def test_the_same_seed_gives_the_same_poses(tx90l):
@@ -35,5 +44,6 @@ def test_the_same_seed_gives_the_same_poses(tx90l):
 
 def test_an_impossible_wish_says_what_threw_the_poses_out(tx90l, rng):
     checker = CollisionChecker(tx90l)
+    narrow = Acceptance(np.array([1.0, 0, 0]), 0.001 * DEGREE)
     with pytest.raises(FlexcalError, match=r"only 0 of the wanted 20 .* visibility threw out"):
-        random_candidates(checker, 20, rng, acceptance=Acceptance(np.array([1.0, 0, 0]), 0.001 * DEGREE))
+        random_candidates(checker, 20, rng, MeasuringSetup(acceptance=narrow))

@@ -2,6 +2,7 @@ import numpy as np
 import pytest
 
 from flexcal.design import (
+    MeasuringSetup,
     Tolerances,
     TraceOptimal,
     TrackerNoise,
@@ -65,7 +66,7 @@ def test_one_flank_hides_both_backlashes(tx90l, rng):
 
 def test_noise_and_scale(tx90l, ur5, rng):
     q = rng.uniform(-2, 2, (5, 6))
-    full = pose_sensitivity(tx90l, q, noise=TrackerNoise(20e-6, 0.0))
+    full = pose_sensitivity(tx90l, q, MeasuringSetup(noise=TrackerNoise(20e-6, 0.0)))
     np.testing.assert_allclose(full.jacobian[:, 0, 0], 1 / 20e-6)
     distance = np.linalg.norm(point_kinematics(tx90l, q).position - [2.5, 0, 1], axis=1)
     np.testing.assert_allclose(pose_sensitivity(tx90l, q).jacobian[:, 0, 0], 1 / (15e-6 + 6e-6 * distance))

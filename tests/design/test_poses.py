@@ -3,13 +3,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data import PosePlan
+from flexcal.data import PosePlan, PosePool
 from flexcal.design import (
     CollisionChecker,
     DOptimal,
+    MeasuringSetup,
     SpectralCriterion,
     base_sensitivity,
-    choose_poses,
     design_poses,
     exchange,
     joint_ranges,
@@ -100,7 +100,7 @@ def test_d_and_sigma_min_within_two_percent_of_fifty_restarts(pool, rng):
 def test_every_criterion_is_best_at_what_it_is_for(tx90l, design, name):
     rng = np.random.default_rng(3)
     other = design_poses(tx90l, 40, rng=rng, candidates=800, criterion=name)
-    np.testing.assert_array_equal(other.candidates, design.candidates)
+    np.testing.assert_array_equal(other.candidates.q, design.candidates.q)
     rows = design.base.sensitivity.jacobian[design.selection.chosen].reshape(-1, 29)
     prior = design.base.sensitivity.prior_information if other.criterion.uses_prior else 0.0
     assert other.selection.merit > other.criterion.merit(rows.T @ rows + prior)
@@ -109,12 +109,15 @@ def test_every_criterion_is_best_at_what_it_is_for(tx90l, design, name):
 
 def test_the_seed_decides_and_payload_is_kept(tx90l):
     one, two = (
-        choose_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150, payload=3.0) for _ in range(2)
+        design_poses(
+            tx90l, 12, rng=np.random.default_rng(1), candidates=150, setup=MeasuringSetup(payload=3.0)
+        ).plan
+        for _ in range(2)
     )
     np.testing.assert_array_equal(one.q, two.q)
     assert one.seed == two.seed
     np.testing.assert_array_equal(one.payload, np.full(12, 3.0))
-    assert choose_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150).payload is None
+    assert design_poses(tx90l, 12, rng=np.random.default_rng(1), candidates=150).plan.payload is None
 
 
 def test_measure_where_you_will_work(tx90l, rng):
@@ -152,13 +155,62 @@ def test_how_many_poses_are_enough(design):
         pose_curve(design, rng=np.random.default_rng(0), counts=[2000])
 
 
+def test_criteria_against_their_definitions(design):
+    rows = design.base.sensitivity.jacobian[design.selection.chosen].reshape(-1, 29)
+    singular = np.linalg.svd(rows, compute_uv=False)
+    with_prior = rows.T @ rows + design.base.sensitivity.prior_information
+    expected = {
+        "c": np.sqrt(np.trace(design.tool_weight @ np.linalg.inv(with_prior))),
+        "A": np.trace(np.linalg.inv(with_prior)),
+        "D": np.mean(np.log(np.linalg.eigvalsh(with_prior))),
+        "E": singular[-1] ** 2,
+        "O1": np.exp(np.mean(np.log(singular))) / np.sqrt(40),
+        "O2": singular[-1] / singular[0],
+        "O3": singular[-1],
+        "O4": singular[-1] ** 2 / singular[0],
+        "O5": 1 / np.sum(1 / singular),
+    }
+    assert design.criteria == pytest.approx(expected, rel=1e-6)
+
+
+def test_chosen_from_a_pool_of_given_poses(tx90l):
+    q = np.loadtxt(POOL, delimiter=",")
+    given = PosePool(q, np.arange(100, 100 + len(q)))
+    found = design_poses(tx90l, 40, rng=np.random.default_rng(0), criterion="E", candidates=given)
+    np.testing.assert_array_equal(found.plan.q, q[found.numbers - 100])
+    sure = preloaded(tx90l, q)
+    np.testing.assert_array_equal(found.candidates.pose, given.pose[sure])
+    assert found.criteria["E"] == pytest.approx(
+        observability(found.base.sensitivity, found.selection.chosen).sigma_min
+    )
+    again = exchange(found.base.sensitivity, 40, SpectralCriterion("E"))
+    np.testing.assert_array_equal(found.selection.chosen, again.chosen)
+
+
+def test_the_payload_of_a_pool_counts_unless_another_is_given(tx90l):
+    q = np.loadtxt(POOL, delimiter=",")[:300]
+    given = PosePool(q, np.arange(300), payload=0.0)
+    for setup, mass in ((MeasuringSetup(), 0.0), (MeasuringSetup(payload=6.0), 6.0)):
+        found = design_poses(tx90l, 12, rng=np.random.default_rng(0), candidates=given, setup=setup)
+        np.testing.assert_array_equal(found.plan.payload, np.full(12, mass))
+        assert len(found.candidates) == preloaded(tx90l, q, mass).sum()
+
+
+def test_a_pool_in_which_few_flanks_are_sure(tx90l, rng):
+    q = rng.uniform(-2, 2, (200, 6))
+    sure = preloaded(tx90l, q)
+    q = np.concatenate([q[sure][:11], q[~sure]])
+    with pytest.raises(FlexcalError, match=rf"holds {len(q)} poses, .* in 11 of them; 12 cannot"):
+        design_poses(tx90l, 12, rng=rng, candidates=PosePool(q, np.arange(len(q))))
+
+
 def test_bad_input(tx90l, rng):
     with pytest.raises(FlexcalError, match=r"9 poses cannot determine 29 .* at least 10"):
-        choose_poses(tx90l, 9, rng=rng, candidates=100)
+        design_poses(tx90l, 9, rng=rng, candidates=100)
     with pytest.raises(FlexcalError, match="no criterion 'F'"):
-        choose_poses(tx90l, 30, rng=rng, criterion="F", candidates=100)  # type: ignore[arg-type]
+        design_poses(tx90l, 30, rng=rng, criterion="F", candidates=100)  # type: ignore[arg-type]
     with pytest.raises(FlexcalError, match="cannot choose 200 of 100"):
-        choose_poses(tx90l, 200, rng=rng, candidates=100)
+        design_poses(tx90l, 200, rng=rng, candidates=100)
 
 
 def test_one_flank_only_is_said_by_name(tx90l, rng):
@@ -167,4 +219,4 @@ def test_one_flank_only_is_said_by_name(tx90l, rng):
     forward = tuple(replace(j, lower=0.4, upper=1.2) if j.name == "joint_2" else j for j in tx90l.joints)
     forward = tuple(replace(j, lower=0.0, upper=0.3) if j.name == "joint_3" else j for j in forward)
     with pytest.raises(FlexcalError, match="joint_2 onto the same flank in all 200 usable poses"):
-        choose_poses(replace(tx90l, joints=forward), 30, rng=rng, candidates=200)
+        design_poses(replace(tx90l, joints=forward), 30, rng=rng, candidates=200)

@@ -3,7 +3,14 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from flexcal.design import Acceptance, CollisionChecker, link_frames, random_candidates, visible
+from flexcal.design import (
+    Acceptance,
+    CollisionChecker,
+    MeasuringSetup,
+    link_frames,
+    random_candidates,
+    visible,
+)
 from flexcal.design.visibility import blocked, station_position
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
@@ -63,7 +70,9 @@ def test_acceptance_is_an_angle_about_the_axis(tx90l, rng):
     checker = CollisionChecker(tx90l)
     q = rng.uniform(-2, 2, (400, 6))
     free = visible(checker, q)
-    narrow = visible(checker, q, acceptance=Acceptance(np.array([0.0, 0.0, 2.0]), 40 * DEGREE))
+    narrow = visible(
+        checker, q, MeasuringSetup(acceptance=Acceptance(np.array([0.0, 0.0, 2.0]), 40 * DEGREE))
+    )
     motion = point_kinematics(tx90l, q, jacobians=False)
     towards = np.array([2.5, 0, 1]) - motion.position
     angle = np.arccos(np.sum(motion.orientation[:, :, 2] * towards, axis=1) / np.linalg.norm(towards, axis=1))

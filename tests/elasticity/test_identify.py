@@ -96,7 +96,9 @@ def test_result_describes_the_fit(stiff, poses, synthesise, drawn, rng):
     assert result.predicted[0].shape == responses[0].response.shape
     assert result.misfit.shape == (2, 3, 3)
     assert 0.5 < result.misfit.mean() < 1.5
-    assert seen[-1] == ("fitting", 1.0)
+    for stage in ("searching", "fitting"):
+        shares = [share for what, share in seen if what == stage]
+        assert shares[0] == 0.0 and shares[-1] == 1.0 and shares == sorted(shares)
 
 
 def test_reference_motion_is_part_of_the_model(stiff, poses, synthesise, rng):

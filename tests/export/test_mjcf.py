@@ -1,5 +1,6 @@
 """The MJCF export: loads in MuJoCo, stands where the model stands, swings as the model swings."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -88,3 +89,13 @@ def test_what_cannot_be_built_is_refused(tx90l: RobotModel, ur5: RobotModel) -> 
         mjcf_spec(tx90l, free=(0,))
     with pytest.raises(FlexcalError, match="declares none"):
         carried_inertias(ur5, 2.0)
+
+
+def test_warnings_of_mujoco_leave_no_log_file(
+    tx90l: RobotModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    weightless = replace(tx90l, rotor_inertia=np.zeros(tx90l.n))
+    with pytest.warns(UserWarning, match="Inertia matrix"):
+        mjcf_spec(weightless).compile()
+    assert list(tmp_path.iterdir()) == []

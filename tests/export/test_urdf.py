@@ -1,5 +1,6 @@
 """The calibrated URDF against the model it came from, read back by Pinocchio and by ourselves."""
 
+import xml.etree.ElementTree as ET
 from pathlib import Path
 
 import numpy as np
@@ -44,3 +45,14 @@ def test_a_point_named_like_a_link_is_refused(tx90l: RobotModel, tmp_path: Path)
     with pytest.raises(FlexcalError, match="rename it"):
         write_urdf(replace(tx90l, points={"tool0": replace(point, name="tool0")}), tmp_path / "x.urdf")
     assert not (tmp_path / "x.urdf").exists()
+
+
+def test_origins_without_an_error_stay_as_they_were_written(tx90l: RobotModel, tmp_path: Path) -> None:
+    """Number for number: only joint_3 and, by its length, joint_4 are moved."""
+    moved = tx90l.with_values({"joint_3.offset": 1e-3, "joint_3.length_x": 1e-3})
+    ours = ET.parse(write_urdf(moved, tmp_path / "calibrated.urdf").path).getroot()
+    before, after = (
+        {j.get("name"): o.attrib for j in root.findall("joint") if (o := j.find("origin")) is not None}
+        for root in (ET.parse(tx90l.urdf).getroot(), ours)
+    )
+    assert {name for name in before if before[name] != after[name]} == {"joint_3", "joint_4"}

@@ -1,12 +1,13 @@
 """Ĝ against the true transfer matrix, and what the reader of a frequency response can rely on."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.frequency import FrequencyResponse, frequency_response, frequency_responses
+from flexcal.frequency import FrequencyResponse, frequency_response, frequency_responses, multisine
 
 
 def relative_error(response, mechanism):
@@ -83,7 +84,10 @@ def test_poses_are_streamed_in_one_pass(make_plan, linear_cell, rng):
     np.testing.assert_allclose(found[1].q_mean, plan.poses[1], atol=1e-6)
     shuffled = [recordings[i] for i in rng.permutation(len(recordings))]
     np.testing.assert_allclose(frequency_response(plan, 1, shuffled).response, found[1].response, rtol=1e-12)
-    with pytest.raises(FlexcalError, match="1 of 16 recordings of pose 1 are missing"):
+    with pytest.raises(
+        FlexcalError,
+        match="1 of 16 recordings of pose 2 are missing, the first is pose_2_realisation_4_experiment_2_minus",
+    ):
         list(frequency_responses(plan, recordings[:-1]))
 
 
@@ -96,18 +100,51 @@ def test_bad_recordings_are_refused(make_plan, linear_cell, rng):
         with pytest.raises(FlexcalError, match=sentence):
             frequency_response(plan, 0, recordings, **options)
 
-    refused(good[:-1], "realisation 3, experiment 1, sign -1; record")
-    refused([*good, first], "is there twice")
+    refused(good[:-1], "pose_1_realisation_4_experiment_2_minus; record")
+    refused([*good, first], "pose_1_realisation_1_experiment_1_plus is there twice")
     refused([], "16 of 16 recordings")
-    refused([replace(first, label=None)], "no label")
-    refused([replace(first, label=replace(first.label, realisation=7))], "is not in the plan")
-    refused([replace(first, q=first.q[:-1], torque=first.torque[:-1])], "record the whole experiment")
-    refused([*good[:-1], replace(good[-1], time_step=0.01)], "sample times")
+    refused([replace(first, label=None)], "a recording without a label cannot")
+    refused(
+        [replace(first, label=replace(first.label, realisation=7))],
+        "pose_1_realisation_8_experiment_1_plus is not in the plan",
+    )
+    refused(
+        [replace(first, q=first.q[:-1], torque=first.torque[:-1])],
+        "experiment_1_plus: the log has 1599 samples, fewer than the 1600",
+    )
+    refused([*good[:-1], replace(good[-1], time_step=0.01)], "experiment_2_minus: its sample time is 0.01 s")
     torque = first.torque.copy()
     torque[-3] = np.nan
-    refused([replace(first, torque=torque)], "NaN")
+    refused([replace(first, torque=torque, file=Path("a/log.csv"))], "a/log.csv holds a NaN")
+    refused([replace(one, time_step=0.01) for one in good], "1_plus: the log has a step of 0.01 s")
     refused([replace(one, torque=0.0 * one.torque) for one in good], "singular")
     refused(good, "joint names", joint_names=("a",))
     refused(good, "no average", average="median")
     few = replace(plan, realisations=1)
-    refused([one for one in good if one.label.realisation == 0], "local_polynomial_response", few)
+    refused([one for one in good if one.label.realisation == 0], "local polynomial method", few)
+
+
+def test_lines_left_out_show_the_odd_distortion(make_plan, linear_cell, rng):
+    """A cubic in the position, with noise: what is found is what the spectrum of the cubic itself has there, axis by axis."""
+    plan = multisine.leave_out_detection_lines(make_plan(realisations=4))
+    gain = np.array([8e3, 2e3])
+
+    def cubic(position):
+        return gain * position**3
+
+    noise = 2e-7
+    found = frequency_response(plan, 0, linear_cell(even=cubic, position_noise=noise).record(plan, rng))
+    bent, straight = [], []
+    for recording in linear_cell().record(plan, rng):
+        moved = recording.q[-400:, [0, 2]] - recording.q[-400:, [0, 2]].mean(0)
+        for kept, lines, signal in (
+            (bent, plan.detection_lines, cubic(moved)),
+            (straight, plan.lines, moved),
+        ):
+            kept.append(np.fft.rfft(signal, axis=0)[lines] * lines[:, None] ** 2)
+    expected = np.sqrt(np.mean(np.abs(bent) ** 2, axis=(0, 1)) / np.mean(np.abs(straight) ** 2, axis=(0, 1)))
+    assert expected.min() > 1e-3
+    np.testing.assert_allclose(found.odd_distortion, expected, rtol=0.2)
+    linear = frequency_response(plan, 0, linear_cell(position_noise=noise).record(plan, rng))
+    assert (linear.odd_distortion < 0.2 * expected).all()
+    assert frequency_response(make_plan(), 0, linear_cell().record(make_plan(), rng)).odd_distortion is None

@@ -72,8 +72,3 @@ def test_mean_factor_undoes_the_mean_over_the_step(make_plan):
     np.testing.assert_array_equal(
         torque_hold(make_plan(torque="instantaneous"), np.array([omega]), step), 1.0
     )
-
-
-def test_a_log_slower_than_the_hold_is_refused(make_plan):
-    with pytest.raises(FlexcalError, match="log at the control rate"):
-        torque_hold(make_plan(rate_hz=400.0), np.array([10.0]), 1.0 / 200.0)

@@ -92,6 +92,28 @@ def test_the_arm_hangs_to_the_far_side_of_its_backlash(tx90l: RobotModel) -> Non
     assert not loose.flank[:, 0].any()
 
 
+@pytest.mark.parametrize(("crossing", "hanging"), [(-0.38, False), (2.76, True)])
+def test_the_flank_is_the_sign_of_the_torque_at_rest(
+    tx90l: RobotModel, crossing: float, hanging: bool
+) -> None:
+    """Deflected, the upper arm passes upright (or straight down) at another angle than undeflected: that one counts."""
+    gap = 4e-5
+    loose = tx90l.with_values({"joint_2.backlash": gap, "joint_3.backlash": gap})
+    q = np.zeros((4001, 6))
+    q[:, 1], q[:, 2] = crossing + np.linspace(-4e-3, 4e-3, 4001), np.pi / 2 - 0.2
+    rest = static_equilibrium(loose, q)
+    torque, flank = rest.torque[:, 1], rest.flank[:, 1]
+    assert {*np.sign(torque)} == {-1, 1}
+    assert (np.sign(torque) != np.sign(gravity_torque(loose, q)[:, 1])).sum() > 30
+    expected = -torque / loose.value("joint_2.drive.stiffness") - gap * flank
+    np.testing.assert_allclose(rest.deflection[:, 1, 2], expected, atol=1e-12)
+    across = flank != np.sign(torque)
+    if not hanging:
+        assert not across.any()
+    else:  # within the gap the torque is nothing, and the arm can rest on neither side
+        assert np.ptp(q[across, 1]) < 2.2 * gap and np.abs(torque[across]).max() < 0.03
+
+
 def test_springs_too_weak_for_gravity_are_refused(tx90l: RobotModel) -> None:
     weak = tx90l.with_values({"joint_2.drive.stiffness": 1.0})
     with pytest.raises(FlexcalError, match="springs cannot carry the arm"):

@@ -1,5 +1,7 @@
 """M, D, K and G: published modes of the bare TX90L, and every derivative against central differences."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.linalg import eigh
@@ -46,6 +48,22 @@ def test_every_derivative_of_the_transfer_matrix(tx90l: RobotModel) -> None:
         step = 1e-4 if ".com" in name else 1e-4 * tx90l.value(name)
         richardson = (4 * slope(name, step / 2) - slope(name, step)) / 3
         assert np.abs(richardson - exact[name]).max() < 1e-6 * np.abs(exact[name]).max(), name
+
+
+def test_the_payloads_inertia_grows_with_its_mass(tx90l: RobotModel) -> None:
+    """In the value and in the derivative alike, as that of a link does."""
+    q, held = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2]), tx90l.nominal_payload
+    assert held is not None
+    bulky = replace(tx90l, nominal_payload=replace(held, inertia=np.diag([0.3, 0.2, 0.1])))
+    heavier = bulky.with_values({"payload.mass": 9.0}).payload
+    assert heavier is not None
+    np.testing.assert_allclose(heavier.inertia, 1.5 * np.diag([0.3, 0.2, 0.1]))
+    np.testing.assert_allclose(
+        heavier.carried(3.0).inertia, held.rotation @ np.diag([0.15, 0.1, 0.05]) @ held.rotation.T
+    )
+    exact = linearise(bulky, q, derivatives=["payload.mass"]).derivatives["payload.mass"][0]
+    ends = [linearise(bulky.with_values({"payload.mass": 6.0 + s}), q).mass for s in (1e-3, -1e-3)]
+    np.testing.assert_allclose(exact, (ends[0] - ends[1]) / 2e-3, atol=1e-6 * np.abs(exact).max())
 
 
 def test_free_rotors_show_poles_and_zeros(tx90l: RobotModel) -> None:

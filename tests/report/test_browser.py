@@ -26,6 +26,10 @@ const look = setInterval(function () {{
   document.body.dataset.width = page.scrollWidth;
   document.body.dataset.drawn = plots.filter(p => p.classList.contains("js-plotly-plot")).length;
   document.body.dataset.wide = plots.filter(p => p.getBoundingClientRect().right > {width} + 1).length;
+  document.body.dataset.covered = plots.filter(function (p) {{
+    const legend = p.querySelector("g.legend"), panel = p.querySelector(".cartesianlayer .bglayer, .cartesianlayer .plot");
+    return legend && panel && legend.getBoundingClientRect().bottom > panel.getBoundingClientRect().top;
+  }}).map(p => p.id).join();
   const choice = frame.contentDocument.querySelector('select[data-figure="figure-7"]');
   choice.value = "Pose 2";
   choice.dispatchEvent(new Event("change"));
@@ -51,9 +55,10 @@ def test_figures_are_drawn_and_fit(report: Path, tmp_path: Path, width: int) -> 
     (tmp_path / "report.html").write_bytes(report.read_bytes())
     (tmp_path / "frame.html").write_text(FRAME.format(width=width), "utf-8")
     dom = browse(tmp_path / "frame.html", tmp_path / "profile", "--window-size=1600,1000")
-    found = dict(re.findall(r'data-(width|drawn|wide|pose)="([^"]*)"', dom[dom.index("<body") :]))
+    found = dict(re.findall(r'data-(width|drawn|wide|pose|covered)="([^"]*)"', dom[dom.index("<body") :]))
     figures = len(Outline(report.read_text("utf-8")).figures())
     assert int(found["drawn"]) == figures
     assert int(found["width"]) <= width
     assert int(found["wide"]) == 0
+    assert found["covered"] == ""
     assert found["pose"] == "Pose 2"

@@ -44,9 +44,15 @@ def test_without_noise_nothing_is_claimed(study: TwoStageStudy) -> None:
 
 def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None:
     v = study.elastic_verification
-    few = replace(v, errors=v.errors[:9], std=v.std[:9], ambiguous=v.ambiguous[:9], position=v.position[:9])
-    assert check_fresh_poses(study.calibration, few).status == "care"
-    assert check_fresh_poses(study.calibration, replace(v, errors=9 * v.errors)).status == "care"
+    few = replace(
+        v,
+        errors=v.errors[:9],
+        parameter_rms=v.parameter_rms[:9],
+        ambiguous=v.ambiguous[:9],
+        position=v.position[:9],
+    )
+    assert check_fresh_poses(study.calibration.errors, few.all).status == "care"
+    assert check_fresh_poses(study.calibration.errors, replace(v, errors=9 * v.errors).all).status == "care"
 
 
 def test_chi2_is_judged(study: TwoStageStudy) -> None:
@@ -62,8 +68,8 @@ def test_chi2_is_judged(study: TwoStageStudy) -> None:
 
 def test_a_blurred_gap_is_flagged(study: TwoStageStudy) -> None:
     found = study.calibration.identifiability
-    assert check_rank(found).status == "good"
-    assert check_rank(replace(found, gap=1.2)).status == "care"
+    assert check_rank(len(found.names), found.rank, found.gap).status == "good"
+    assert check_rank(len(found.names), found.rank, 1.2).status == "care"
 
 
 def test_many_uncertain_flanks_are_flagged(study: TwoStageStudy) -> None:
@@ -98,5 +104,5 @@ def test_chance_is_one_in_a_hundred(study: TwoStageStudy, rng: np.random.Generat
         np.zeros(len(names)), posterior.covariance[np.ix_(numbers, numbers)], 3000
     )
     errors = draws @ jacobian.reshape(-1, len(names)).T
-    ratios = np.sqrt((errors**2).sum(axis=1) / (study.elastic_verification.std**2).sum())
+    ratios = np.sqrt((errors**2).sum(axis=1) / (study.elastic_verification.parameter_rms**2).sum())
     assert abs(np.quantile(ratios, 0.99) - CHANCE) < 0.07

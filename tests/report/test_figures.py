@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.stats import chi2
@@ -18,6 +20,7 @@ from flexcal.report.figures.response_fit import response_fit
 from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.figures.spring_intervals import spring_intervals
+from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
 from flexcal.report.sections.geometry import exaggeration
 
 
@@ -81,6 +84,24 @@ def test_components_share_one_scale(study: TwoStageStudy) -> None:
     ranges = {tuple(axis.range) for axis in figure.select_yaxes()}
     assert len(ranges) == 1
     assert max(ranges)[1] >= 1e3 * np.abs(study.calibration.residuals).max()
+
+
+def test_the_instruments_noise_stays_within_the_axes(study: TwoStageStudy) -> None:
+    sigma = study.calibration.poses.sigma.copy()
+    sigma[3, 1] = 5e-4
+    figure = error_components(replace(study.calibration.poses, sigma=sigma), study.calibration.residuals)
+    assert max(axis.range[1] for axis in figure.select_yaxes()) >= 1.0
+
+
+def test_published_errors_are_named_in_the_legend(study: TwoStageStudy) -> None:
+    assert study.paper is not None and study.paper.elastic is not None
+    series = [ErrorSeries("elastic", "blue", study.elastic_verification.errors)]
+    figure = verification_errors(
+        study.verification_poses, series, study.elastic_verification, study.paper.elastic
+    )
+    heights = {trace.name: trace.y[0] for trace in figure.data if trace.mode == "lines"}
+    assert heights == pytest.approx({"paper, 90 %": 0.23, "paper, worst": 0.32}, rel=1e-6)
+    assert not figure.layout.annotations
 
 
 def test_rank_is_marked_where_it_is(study: TwoStageStudy) -> None:

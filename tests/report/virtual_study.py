@@ -159,7 +159,7 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
     )  # fmt: skip
     started = time.perf_counter()
     q = random_poses(nominal, 100, rng)
-    calibrated = calibrate(softer, measured(robot, q[:40], rng), stiffness=estimate)
+    calibrated = calibrate(softer, measured(robot, q[:40], rng))
     rigid = tuple(calibrate(nominal, measured(robot, q[:size], rng), elastic=False) for size in (40, 100))
     q_verify = random_poses(nominal, 150, rng)
     exact = measured(robot, q_verify, None)

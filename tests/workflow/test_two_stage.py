@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from fnmatch import fnmatch
 from pathlib import Path
 
 import numpy as np
@@ -12,9 +13,14 @@ import polars as pl
 import pytest
 
 from flexcal.calibration import ErrorStatistics
+from flexcal.data import read_estimates, sha256_of
+from flexcal.estimates_file import block_sha256
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.workflow import two_stage
 from flexcal.workflow.frequency_plans import frequency_plan
+
+TOLD: list[tuple[str, float]] = []
+"""Progress of the run."""
 
 
 def short_plan(model: RobotModel, poses: Path, kind: str, seed: int):
@@ -29,8 +35,19 @@ def demo(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
     out = tmp_path_factory.mktemp("demo")
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(two_stage, "frequency_plan", short_plan)
-        two_stage.run_two_stage(examples / "tx90l" / "robot.yaml", out, seed=77)
+        two_stage.run_two_stage(
+            examples / "tx90l" / "robot.yaml", out, seed=77, progress=lambda *call: TOLD.append(call)
+        )
     yield out
+
+
+def test_every_stage_tells_how_far_it_is(demo: Path) -> None:
+    assert list(dict.fromkeys(stage for stage, _ in TOLD)) == list(two_stage.STAGES[1:])
+    for stage in two_stage.STAGES[1:]:
+        shares = [share for told, share in TOLD if told == stage]
+        assert shares[0] < 0.02 and shares[-1] == 1.0 and shares == sorted(shares), stage
+    for stage in ("frequency", "stage1", "poses"):
+        assert sum(told == stage and 0 < share < 1 for told, share in TOLD) >= 2, stage
 
 
 def test_results_have_the_fixed_names(demo: Path) -> None:
@@ -86,6 +103,22 @@ def test_the_stored_estimates_reproduce_the_calibrated_robot(demo: Path, tx90l: 
         np.testing.assert_allclose(data.oMf[frame].translation, point, atol=1e-9)
 
 
+def test_every_block_says_where_it_came_from(demo: Path) -> None:
+    blocks = read_estimates(demo / "estimates.yaml")
+    origin = blocks["stiffness"].provenance
+    inputs = {key.removeprefix("input.") for key in origin if key.startswith("input.")}
+    responses = {f"response_pose_{k}.npz" for k in (1, 2, 3, 4)}
+    assert inputs == {"robot.yaml", "tx90l.urdf", "frequency_plan.yaml"} | responses
+    assert origin["input.response_pose_2.npz"] == sha256_of(demo / "response_pose_2.npz")
+    assert (origin["option.seed"], origin["option.plan"]) == ("77", "default")
+    assert origin["program"].startswith("flexcal ")
+    origin = blocks["calibration"].provenance
+    assert origin["input.calibration_poses.csv"] == sha256_of(demo / "calibration_poses.csv")
+    assert origin["block.stiffness"] == block_sha256(demo / "estimates.yaml", "stiffness")
+    assert {"input.tx90l.urdf", "option.seed", "option.plan"} <= set(origin)
+    assert origin["input.tx90l.urdf"] in (demo / "report.html").read_text()
+
+
 def test_the_truth_stays_hidden(demo: Path, examples: Path, tmp_path: Path) -> None:
     """With the truth unreadable once the cell has been built, everything that is identified comes out byte for byte the same."""
     calls = 0
@@ -106,6 +139,17 @@ def test_the_truth_stays_hidden(demo: Path, examples: Path, tmp_path: Path) -> N
     for name in ("estimates.yaml", "calibration_poses.csv", "calibrated.urdf"):
         assert (tmp_path / name).read_bytes() == (demo / name).read_bytes(), name
     assert not (tmp_path / "results.json").exists()
+
+
+def test_the_command_line_knows_every_file_that_is_left(demo: Path) -> None:
+    from flexcal.cli.verbs import find_verb
+
+    verb = find_verb(["demo"])
+    assert verb is not None
+    for pattern in verb.leaves:
+        assert list(demo.glob(pattern)), pattern
+    unknown = [p.name for p in demo.iterdir() if not any(fnmatch(p.name, known) for known in verb.leaves)]
+    assert unknown == []
 
 
 def test_the_report_is_one_file(demo: Path) -> None:

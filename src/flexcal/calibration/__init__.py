@@ -3,6 +3,8 @@
 from flexcal.calibration.calibrate import Calibration, calibrate
 from flexcal.calibration.elastic_prior import ElasticPrior
 from flexcal.calibration.error_statistics import ErrorStatistics
+from flexcal.calibration.measured_points import require_points
+from flexcal.calibration.plausibility import Moved, moved_far
 from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.registration import register, rigid_motion
 from flexcal.calibration.term_selection import TermSelection, select_terms
@@ -13,13 +15,16 @@ __all__ = [
     "Calibration",
     "ElasticPrior",
     "ErrorStatistics",
+    "Moved",
     "Prediction",
     "TermSelection",
     "Verification",
     "calibrate",
     "geometric_parameters",
+    "moved_far",
     "predict",
     "register",
+    "require_points",
     "rigid_motion",
     "select_terms",
     "verify",

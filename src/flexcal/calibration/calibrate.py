@@ -8,9 +8,12 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.elastic_prior import ElasticPrior
+from flexcal.calibration.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses, require_both_flanks
+from flexcal.calibration.geometry_fit import GeometryFit, LossName
+from flexcal.calibration.marginal_fit import marginalised
+from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.prediction import predict
 from flexcal.calibration.registration import register
 from flexcal.calibration.terms import geometric_parameters, tolerances
@@ -23,27 +26,35 @@ from flexcal.estimation import (
     Loss,
     Parameter,
     Parameters,
-    Problem,
+    Squares,
     analyse,
-    solve,
 )
+from flexcal.estimation.loss import loss_named
 from flexcal.model import RobotModel
 
 _FLANK_PASSES = 4
+_SCATTER_PASSES = 5
 _STRUCTURAL_POSES = 100
+
+_NORMAL_MEDIAN = 1.4826
+"""Standard deviation over median size of a Gaussian."""
+
+_SMALLEST_SCATTER = 1e-9
+"""Points without any noise still need a sigma (m)."""
 
 
 @dataclass(frozen=True, eq=False)
 class Calibration:
     """A fitted geometry.
 
-    `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped ones at their start, not identifiable) and,
-    re-estimated with their prior, stiffness and inertia; `identifiability` is that of the kinematic Jacobian; `residuals` (N, 3) m,
-    measured minus predicted; `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted.
+    `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped ones at their start, not identifiable) and
+    stiffness and inertia as `prior` and points together have them; `identifiability` is that of the kinematic Jacobian; `residuals`
+    (N, 3) m, measured minus predicted; `flank` (N, n); `ambiguous` (N,) poses whose flank is not certain; `terms` those fitted.
     """
 
     model: RobotModel
     estimate: Estimate
+    prior: ElasticPrior
     identifiability: Identifiability
     poses: PoseSet
     residuals: np.ndarray
@@ -61,41 +72,70 @@ def calibrate(
     model: RobotModel,
     poses: PoseSet,
     *,
-    stiffness: Estimate | None = None,
     terms: Sequence[str] = ("kinematic", "backlash"),
     elastic: bool = True,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     secant_scale: float = 0.0,
-    loss: Loss | Literal["squares", "huber", "cauchy"] = "squares",
+    loss: Loss | LossName = "squares",
     progress: Callable[[int, float], None] | None = None,
 ) -> Calibration:
     """Fit the geometry of `model` to measured points, Levenberg-Marquardt on the vector error (28) with the Jacobian (29).
 
-    Rank and dropped parameters come from the kinematic Jacobian at zero deflection. `stiffness` is the estimate of stage 1: its
-    posterior enters either by re-estimating those parameters with it as a prior, or, marginalised, through the residual covariance
-    R + J Σ Jᵀ; the two agree to first order. `secant_scale` lets each drive's stiffness under gravity differ from the tangent one.
-    Without `elastic` the arm is fitted as rigid. `loss` "cauchy" finds outliers.
+    Rank and dropped parameters come from the kinematic Jacobian at zero deflection. What the model's posterior holds of stiffness and
+    inertia (stage 1) is their prior, so give the model without an earlier calibration on the same poses. It enters by re-estimating those
+    parameters, or, marginalised, through the residual covariance R + J Σ Jᵀ; both give the same estimate. `secant_scale` lets each
+    drive's stiffness under gravity differ from the tangent one. Without `elastic` the arm is fitted as rigid. `loss` "cauchy" finds
+    outliers. Where the poses give no sigma, the scatter about a first fit stands for it (`poses.sigma` of the result).
 
-    Raises `FlexcalError` for fewer rows than identifiable parameters, poses that are all equal, joints that do not move and a backlash
-    seen from one flank only.
+    Raises `FlexcalError` for measured lengths and orientations, fewer rows than identifiable parameters, poses that are all equal,
+    joints that do not move, a backlash seen from one flank only, stations that robot.yaml does not know, and a robust loss with
+    marginalised elasticity.
     """
+
+    def estimated(task: GeometryFit) -> Estimate:
+        if elasticity == "marginalised" and len(task.prior.parameters):
+            return marginalised(task, progress=progress)
+        return task.reestimated(loss=loss, progress=progress)
+
+    def fit(measured: PoseSet) -> Calibration:
+        prior = ElasticPrior.of(model, measured, secant_scale=secant_scale) if elastic else NOTHING_ELASTIC
+        return _fit(model, measured, tuple(terms), prior, elastic, estimated)
+
+    robust = not isinstance(loss_named(loss), Squares)
+    if elasticity == "marginalised" and robust:
+        raise FlexcalError(
+            "a robust loss weighs poses one by one, but marginalised elasticity ties them together; re-estimate it instead."
+        )
+    require_points(poses)
     _check_variety(model, poses)
+    found = fit(poses)
+    for _ in range(0 if poses.sigma_given else _SCATTER_PASSES):
+        before, poses = poses, _with_scatter(found, robust)
+        found = fit(poses)
+        if np.allclose(poses.sigma, before.sigma, rtol=0.01, atol=0.0):
+            break
+    return found
+
+
+def _fit(
+    model: RobotModel,
+    poses: PoseSet,
+    terms: tuple[str, ...],
+    prior: ElasticPrior,
+    elastic: bool,
+    estimated: Callable[[GeometryFit], Estimate],
+) -> Calibration:
+    """One fit to poses with a sigma, repeated until the flanks are those of the robot that it finds."""
     start = register(model, poses, predict(_with_identity_stations(model), poses, elastic=elastic).position)
+    flank = predict(start, poses, elastic=elastic).rest.flank
     if "backlash" in terms:
-        require_both_flanks(model, predict(start, poses, elastic=elastic).rest.flank)
+        require_both_flanks(model, flank)
     geometric = geometric_parameters(start, poses, terms)
     found = _kinematic_identifiability(start, poses, geometric)
     _require_enough(start, poses, geometric, found)
     kept = geometric.subset(found.kept_names)
-    prior = (
-        ElasticPrior.of(start, poses, stiffness, secant_scale=secant_scale)
-        if elastic
-        else ElasticPrior(Parameters(), np.zeros((0, 0)))
-    )
-    flank = predict(start, poses, elastic=elastic).rest.flank
     for _ in range(_FLANK_PASSES):
-        problem = _problem(start, poses, kept, prior, flank, elastic, elasticity)
-        estimate = solve(problem, loss=loss, progress=progress)
+        estimate = estimated(GeometryFit(start, poses, kept, prior, flank, elastic))
         fitted = start.with_values(estimate.values)
         after = predict(fitted, poses, elastic=elastic, jacobians=True)
         if (after.rest.flank == flank).all():
@@ -104,16 +144,29 @@ def calibrate(
         if "backlash" in terms:
             require_both_flanks(model, flank)
     full = _with_held(estimate, _held(geometric, found.dropped, fitted, poses), found.dropped)
+    calibrated = fitted.with_estimate(full)
     return Calibration(
-        model=fitted.with_estimate(full),
+        model=calibrated,
         estimate=full,
+        prior=prior,
         identifiability=found,
         poses=poses,
         residuals=poses.position - after.position,
         flank=flank,
-        ambiguous=ambiguous_poses(after, _posterior(estimate, prior)),
-        terms=tuple(terms),
+        ambiguous=ambiguous_poses(calibrated, after),
+        terms=terms,
     )
+
+
+def _with_scatter(found: Calibration, robust: bool) -> PoseSet:
+    """The poses with sigma taken from the scatter about a fit; with a robust loss from its median."""
+    rows, freedom = found.residuals.size, max(found.estimate.degrees_of_freedom, 1)
+    if not robust:
+        scatter = float(np.sqrt(np.sum(found.residuals**2) / freedom))
+    else:
+        freedom = max(rows - found.identifiability.rank, 1)
+        scatter = _NORMAL_MEDIAN * float(np.median(np.abs(found.residuals))) * np.sqrt(rows / freedom)
+    return replace(found.poses, sigma=np.full_like(found.poses.sigma, max(scatter, _SMALLEST_SCATTER)))
 
 
 def _check_variety(model: RobotModel, poses: PoseSet) -> None:
@@ -160,51 +213,6 @@ def _require_enough(
     )
 
 
-def _problem(
-    start: RobotModel,
-    poses: PoseSet,
-    kept: Parameters,
-    prior: ElasticPrior,
-    flank: np.ndarray,
-    elastic: bool,
-    elasticity: str,
-) -> Problem:
-    joint = elasticity == "reestimated"
-    parameters = kept + prior.parameters if joint else kept
-    groups = np.repeat(np.arange(len(poses.q)), 3)
-    whitener = None
-    if not joint and len(prior.parameters):
-        at = predict(start, poses, flank=flank, elastic=elastic, jacobians=True)
-        slopes = prior.parameters.natural_slope(prior.parameters.coordinates())
-        columns = at.jacobian(prior.parameters.names).reshape(-1, len(prior.parameters)) * slopes
-        covariance = np.diag(poses.sigma.ravel() ** 2) + columns @ prior.covariance @ columns.T
-        whitener = np.linalg.cholesky(covariance)
-
-    def whitened(rows: np.ndarray) -> np.ndarray:
-        if whitener is None:
-            return rows / (poses.sigma.ravel() if rows.ndim == 1 else poses.sigma.ravel()[:, None])
-        from scipy.linalg import solve_triangular
-
-        return solve_triangular(whitener, rows, lower=True)
-
-    def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        values = dict(zip(parameters.names, parameters.natural(x), strict=True))
-        at = predict(start.with_values(values), poses, flank=flank, elastic=elastic, jacobians=True)
-        columns = at.jacobian(parameters.names).reshape(-1, len(parameters)) * parameters.natural_slope(x)
-        return whitened((poses.position - at.position).ravel()), -whitened(columns)
-
-    def residual(x: np.ndarray) -> np.ndarray:
-        values = dict(zip(parameters.names, parameters.natural(x), strict=True))
-        at = predict(start.with_values(values), poses, flank=flank, elastic=elastic)
-        return whitened((poses.position - at.position).ravel())
-
-    covariance = None
-    if joint and len(prior.parameters):
-        covariance = np.diag(np.full(len(parameters), np.inf))
-        covariance[len(kept) :, len(kept) :] = prior.covariance
-    return Problem(parameters, linearise, residual, covariance, groups)
-
-
 def _held(
     geometric: Parameters, dropped: tuple[Dropped, ...], fitted: RobotModel, poses: PoseSet
 ) -> Parameters:
@@ -226,10 +234,3 @@ def _with_held(estimate: Estimate, held: Parameters, dropped: tuple[Dropped, ...
         dropped=estimate.dropped + dropped,
         identifiable=estimate.identifiable + (False,) * len(held),
     )
-
-
-def _posterior(estimate: Estimate, prior: ElasticPrior) -> ElasticPrior:
-    names = [name for name in prior.parameters.names if name in estimate.parameters]
-    if len(names) < len(prior.parameters):
-        return prior
-    return ElasticPrior(estimate.parameters.subset(names), estimate.marginal(names)[1])

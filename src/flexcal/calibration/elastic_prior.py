@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import PoseSet
-from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.model.names import SPRINGS, unit_of
 
@@ -23,10 +23,8 @@ class ElasticPrior:
     covariance: np.ndarray
 
     @classmethod
-    def of(
-        cls, model: RobotModel, poses: PoseSet, stiffness: Estimate | None, *, secant_scale: float = 0.0
-    ) -> ElasticPrior:
-        """The posterior of the stiffness identification, and the declared priors of what it does not hold.
+    def of(cls, model: RobotModel, poses: PoseSet, *, secant_scale: float = 0.0) -> ElasticPrior:
+        """What the model's posterior holds of these parameters, and the declared priors of the others.
 
         `secant_scale` is the relative 1σ by which a drive's stiffness under gravity may differ from the tangent one of a frequency
         response: it widens the drive stiffnesses by one scale each.
@@ -34,19 +32,19 @@ class ElasticPrior:
         names = _names(model, poses)
         items = [_declared(model, name) for name in names]
         covariance = np.diag([item.prior_std**2 for item in items])
-        if stiffness is not None:
-            known = [k for k, name in enumerate(names) if name in stiffness.parameters]
-            block = stiffness.marginal([names[k] for k in known])[1]
-            free = np.diag(block) > 0
-            known = [k for k, determined in zip(known, free, strict=True) if determined]
-            for k in known:
-                found = stiffness.parameters[names[k]]
-                items[k] = replace(found, prior_mean=found.value, prior_std=np.inf)
-            covariance[np.ix_(known, known)] = block[np.ix_(free, free)]
+        held = model.posterior
+        known = [k for k, name in enumerate(names) if held.determines(name)]
+        covariance[np.ix_(known, known)] = held.marginal([names[k] for k in known])
+        for k in known:
+            value = model.value(names[k])
+            items[k] = replace(held.parameters[names[k]], value=value, prior_mean=value, prior_std=np.inf)
         for k, name in enumerate(names):
             if name.endswith("drive.stiffness"):
                 covariance[k, k] += secant_scale**2
         return cls(Parameters(items), covariance)
+
+
+NOTHING_ELASTIC = ElasticPrior(Parameters(), np.zeros((0, 0)))
 
 
 def _names(model: RobotModel, poses: PoseSet) -> list[str]:
@@ -55,8 +53,10 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
     names = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
     carried = {i for i in range(model.n) if _carried(model, i)}
     for i in sorted(carried):
+        keys = ["mass"] if model.prior.mass > 0 else []
+        keys += ["com_x", "com_y", "com_z"] if model.prior.com > 0 else []
         if model.mass[i] > 0:
-            names += [f"{model.joints[i].link}.{key}" for key in ("mass", "com_x", "com_y", "com_z")]
+            names += [f"{model.joints[i].link}.{key}" for key in keys]
     held = model.nominal_payload
     if held is not None and held.mass_std > 0 and (poses.payload is None or poses.payload.any()):
         names.append("payload.mass")

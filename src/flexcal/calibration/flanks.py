@@ -4,44 +4,20 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.elastic_prior import ElasticPrior
-from flexcal.calibration.prediction import Prediction
+from flexcal.calibration.prediction import Prediction, payload_masses
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
-
-CERTAIN = 3.0
-"""Standard deviations that the drive torque must be away from zero."""
-
-RIGID_MARGIN = 0.05
-"""Without a covariance of the inertias: the share of the largest torque that must be exceeded."""
+from flexcal.model.flank import certain_flank
 
 
-def ambiguous_poses(prediction: Prediction, prior: ElasticPrior) -> np.ndarray:
+def ambiguous_poses(model: RobotModel, prediction: Prediction) -> np.ndarray:
     """Poses (N,) at which a joint with backlash carries too little torque for its sign to be certain.
 
-    The torque is that of the identified model at rest; its standard deviation comes from the covariance of masses and centres of mass.
+    The torque is that of the `prediction` at rest; its standard deviation comes from what `model` knows of masses and centres of mass.
     """
-    model = prediction.model
-    axes = [tuple(a) for a in prediction.rest.axes]
-    result = np.zeros(len(prediction.position), dtype=bool)
-    for i in model.backlash_joints:
-        torque = np.abs(prediction.rest.torque[:, i])
-        margin = np.full(len(torque), RIGID_MARGIN * torque.max(initial=0.0))
-        if (i, 2) in axes and len(prediction.rest.regressor) and len(prior.parameters):
-            k = axes.index((i, 2))
-            slopes = prior.parameters.natural_slope(prior.parameters.coordinates())
-            rows = np.stack(
-                [
-                    np.zeros(len(torque))
-                    if name.endswith("stiffness")
-                    else prediction.load(name)[:, k] * slope
-                    for name, slope in zip(prior.parameters.names, slopes, strict=True)
-                ],
-                axis=1,
-            )
-            margin = CERTAIN * np.sqrt(np.einsum("np,pq,nq->n", rows, prior.covariance, rows))
-        result |= torque < margin
-    return result
+    payload = payload_masses(model, prediction.poses)
+    certain = certain_flank(model, prediction.poses.q, prediction.rest.torque, payload)
+    return np.any(~certain[:, list(model.backlash_joints)], axis=1)
 
 
 def require_both_flanks(model: RobotModel, flank: np.ndarray) -> None:

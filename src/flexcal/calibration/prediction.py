@@ -96,10 +96,11 @@ class Prediction:
                 held = self.model.payload
                 assert held is not None
                 block = self.rest.regressor[:, :, 4 * held.joint : 4 * held.joint + 4]
-                share = payload_share(self.model, self.poses)[:, None]
+                masses = payload_masses(self.model, self.poses)[:, None]
                 if key == "mass":
+                    share = masses / held.mass if held.mass > 0 else 1.0
                     return share * (block[:, :, 0] + block[:, :, 1:] @ held.com_in_link)
-                return share * held.mass * (block[:, :, 1:] @ held.rotation[:, "xyz".index(key[-1])])
+                return masses * (block[:, :, 1:] @ held.rotation[:, "xyz".index(key[-1])])
             i = [joint.link for joint in self.model.joints].index(owner)
             block = self.rest.regressor[:, :, 4 * i : 4 * i + 4]
             if key == "mass":
@@ -119,12 +120,15 @@ def _left_jacobian(vector: np.ndarray) -> np.ndarray:
     )
 
 
-def payload_share(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Payload held at each pose (N,), relative to the declared payload."""
-    nominal = model.nominal_payload
-    if poses.payload is None or nominal is None or nominal.mass == 0:
-        return np.ones(len(poses.q)) if poses.payload is None else np.zeros(len(poses.q))
-    return poses.payload / nominal.mass
+def payload_masses(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Payload held at each pose (N,), kg: what the poses say, or the declared one where they say nothing.
+
+    Where the payload was found to weigh more or less than declared, the values of the poses are as much off.
+    """
+    nominal, found = model.nominal_payload, float(model.payload_mass[0])
+    if poses.payload is None:
+        return np.full(len(poses), found)
+    return poses.payload * (found / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
 
 
 def predict(
@@ -138,20 +142,19 @@ def predict(
     """Where the instrument should see the target of every pose: the deflected, calibrated robot.
 
     `flank` (N, n) fixes the side of the backlash; without, the drive torque at rest decides. Without `elastic` the arm is rigid.
-    Raises `FlexcalError` for unknown targets and payloads without a declaration.
+    Raises `FlexcalError` for unknown targets and stations, and payloads without a declaration.
     """
     if poses.payload is not None and poses.payload.any() and model.nominal_payload is None:
         raise FlexcalError(
             f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass."
         )
-    payload = payload_share(model, poses) * model.payload_mass[0]
+    payload = payload_masses(model, poses)
     rest = static_equilibrium(model, poses.q, payload, flank=flank, elastic=elastic, sensitivities=jacobians)
     kinematics = _points(model, poses, rest.deflection, jacobians)
-    turns = {
-        s: vector_rotation(model.station[model.stations.index(s), 3:]) for s in dict.fromkeys(poses.station)
-    }
-    at = np.array([model.station[model.stations.index(s), :3] for s in poses.station])
-    base = np.array([turns[s] for s in poses.station])
+    places = {name: model.station[model.station_index(name)] for name in poses.stations}
+    turns = {name: vector_rotation(place[3:]) for name, place in places.items()}
+    at = np.array([places[name][:3] for name in poses.station]).reshape(-1, 3)
+    base = np.array([turns[name] for name in poses.station]).reshape(-1, 3, 3)
     position = np.matmul(base, kinematics.position[:, :, None])[:, :, 0] + at
     return Prediction(model, poses, position, base, rest, kinematics)
 

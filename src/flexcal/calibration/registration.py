@@ -21,11 +21,8 @@ def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotM
     robot.yaml does not know, or with fewer than three poses that do not lie on a line.
     """
     values: dict[str, float] = {}
-    for station in dict.fromkeys(poses.station):
-        if station not in model.stations:
-            raise FlexcalError(
-                f"the poses name the station '{station}' but {model.path} has {', '.join(model.stations)}; add it under `stations:`."
-            )
+    for station in poses.stations:
+        model.station_index(station)
         own = poses.station == station
         measured, expected = poses.position[own], predicted[own]
         if np.median(np.linalg.norm(measured - expected, axis=1)) < ALREADY_ALIGNED:

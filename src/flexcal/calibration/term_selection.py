@@ -12,7 +12,6 @@ from flexcal.calibration.folds import order_folds, workspace_folds
 from flexcal.calibration.prediction import predict
 from flexcal.calibration.terms import geometric_parameters, tolerances
 from flexcal.data import PoseSet
-from flexcal.estimation import Estimate
 from flexcal.model import RobotModel, gravity_torque
 from flexcal.units import MILLIMETRE
 
@@ -37,7 +36,7 @@ class TermSelection:
         return "; ".join(rows)
 
 
-def select_terms(model: RobotModel, poses: PoseSet, *, stiffness: Estimate | None = None) -> TermSelection:
+def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     """Forward selection of gravity compliance, backlash and transmission harmonics on top of the rigid fit.
 
     A term is added where it lowers the mean error on poses left out, by more than one standard error of the paired difference, both for
@@ -52,7 +51,7 @@ def select_terms(model: RobotModel, poses: PoseSet, *, stiffness: Estimate | Non
     options = [] if elastic else ["gravity_compliance"]
     options += ["backlash"] if wider.backlash_joints and not model.backlash_joints else []
     options += [f"transmission_{order}" for order in model.harmonics]
-    rigid = calibrate(model, poses, stiffness=stiffness, terms=base, elastic=elastic)
+    rigid = calibrate(model, poses, terms=base, elastic=elastic)
     folds = [order_folds(len(poses.q), FOLDS), workspace_folds(poses.position, FOLDS)]
     columns = _columns(wider, rigid, base + options)
     chosen, scores = tuple(base), _left_out(columns, rigid.residuals, base, folds)

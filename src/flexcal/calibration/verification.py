@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.elastic_prior import ElasticPrior
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
+from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.prediction import predict
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
@@ -18,14 +18,21 @@ from flexcal.model import RobotModel
 class Verification:
     """Predicted and measured points of a set of poses.
 
-    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted; `std` (N,) predicted 1σ of the distance error from the
-    parameters' covariance; `ambiguous` (N,) poses at which the flank of a backlash is not certain.
+    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted; `parameter_rms` (N,) m, the root mean square distance
+    error that the parameters' covariance alone predicts: noise of instrument and encoders comes on top; `ambiguous` (N,) poses at which
+    the flank of a backlash is not certain.
     """
 
     position: np.ndarray
     errors: np.ndarray
-    std: np.ndarray
+    parameter_rms: np.ndarray
     ambiguous: np.ndarray
+
+    def expected_rms(self, noise: np.ndarray | None = None) -> np.ndarray:
+        """Root mean square distance error (N,) m that is predicted, with 1σ `noise` (N, 3) m of the measured coordinates where given."""
+        return (
+            self.parameter_rms if noise is None else np.sqrt(self.parameter_rms**2 + (noise**2).sum(axis=1))
+        )
 
     @property
     def all(self) -> ErrorStatistics:
@@ -41,22 +48,19 @@ class Verification:
 def verify(model: RobotModel, poses: PoseSet, *, elastic: bool = True) -> Verification:
     """Compare a calibrated robot with points; `poses` should be none of those it was fitted to.
 
-    The instrument must stand where it stood during calibration: `model` holds its place. Raises `FlexcalError` as `predict` does.
+    The instrument must stand where it stood during calibration: `model` holds its place. Raises `FlexcalError` for measured lengths and
+    orientations, and as `predict` does.
     """
+    require_points(poses)
     at = predict(model, poses, elastic=elastic, jacobians=True)
     parameters = model.posterior.parameters
     used = [n for n in parameters.names if _moves_points(n) and (elastic or not _is_elastic(n))]
-    numbers = [parameters.index(name) for name in used]
-    covariance = model.posterior.covariance[np.ix_(numbers, numbers)]
+    covariance = model.posterior.marginal(used)
     slopes = parameters.subset(used).natural_slope(parameters.subset(used).coordinates())
     columns = at.jacobian(used) * slopes
     variance = np.einsum("nip,pq,niq->n", columns, covariance, columns)
-    elastic_names = [name for name in used if _is_elastic(name)]
-    keep = [used.index(name) for name in elastic_names]
-    prior = ElasticPrior(parameters.subset(elastic_names), covariance[np.ix_(keep, keep)])
-    return Verification(
-        at.position, poses.position - at.position, np.sqrt(variance), ambiguous_poses(at, prior)
-    )
+    ambiguous = ambiguous_poses(model, at)
+    return Verification(at.position, poses.position - at.position, np.sqrt(variance), ambiguous)
 
 
 def _is_elastic(name: str) -> bool:

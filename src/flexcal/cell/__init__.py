@@ -8,7 +8,7 @@ from flexcal.cell.config import (
     SensorConfig,
     SpreadConfig,
 )
-from flexcal.cell.truth import draw_truth, read_truth, write_truth
+from flexcal.cell.truth import draw_truth, read_truth, read_truth_of, write_truth
 from flexcal.cell.virtual_cell import VirtualCell
 
 __all__ = [
@@ -21,5 +21,6 @@ __all__ = [
     "VirtualCell",
     "draw_truth",
     "read_truth",
+    "read_truth_of",
     "write_truth",
 ]

@@ -20,21 +20,17 @@ def _not_negative(config: DataclassInstance) -> None:
 
 @dataclass(frozen=True)
 class LoopConfig:
-    """The joint controller: soft PD gains referred to the joint (N m/rad, N m s/rad), its rate, least plant steps per control tick.
+    """The joint controller beyond what a plan says of it (gains and rate): least plant steps per control tick.
 
-    `kp`, `kd`, `rate_hz` are what a plan gets that does not say otherwise; a `MultisinePlan` carries its own. `rate_filter_hz` is the
-    corner of the low-pass on the differentiated encoder. The feed-forward is that of the controller's own model.
+    `rate_filter_hz` is the corner of the low-pass on the differentiated encoder. The feed-forward is that of the controller's own model.
     """
 
-    kp: tuple[float, ...] | None = None
-    kd: tuple[float, ...] | None = None
-    rate_hz: float = 4000.0
     substeps: int = 1
     rate_filter_hz: float = 200.0
 
     def __post_init__(self) -> None:
-        if not (self.rate_hz > 0 and self.rate_filter_hz > 0):
-            raise FlexcalError("the controller's rate_hz and rate_filter_hz must be positive.")
+        if not self.rate_filter_hz > 0:
+            raise FlexcalError("the controller's rate_filter_hz must be positive.")
         if self.substeps < 1:
             raise FlexcalError(f"the controller needs at least one plant step per tick, not {self.substeps}.")
 

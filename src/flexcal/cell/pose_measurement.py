@@ -49,7 +49,7 @@ def true_poses(
 
 
 def in_instrument(truth: RobotModel, point: np.ndarray) -> np.ndarray:
-    """Points (N, 3) m from the robot's base frame into the first station's."""
+    """Points (N, 3) or (3,), m, from the robot's base frame into the first station's."""
     station = truth.station[0]
     return station[:3] + point @ vector_rotation(station[3:]).T
 
@@ -70,12 +70,16 @@ def measured_poses(
         temperature = mismatch.temperature_rise * share
         point = point + share[:, None] * mismatch.temperature_drift * direction / np.linalg.norm(direction)
     station = truth.config.stations.get(truth.stations[0])
-    distance = np.linalg.norm(point - (np.zeros(3) if station is None else np.array(station.xyz)), axis=1)
-    sigma = np.repeat(tracker_sigma(sensors, distance)[:, None], 3, axis=1)
+    seen = in_instrument(truth, point)
+    stand = in_instrument(truth, np.zeros(3) if station is None else np.array(station.xyz))
+    noise = tracker_sigma(sensors, np.linalg.norm(seen - stand, axis=1))
+    position = seen + noise[:, None] * rng.standard_normal(point.shape)
+    # what the tracker says of its noise is by the distance that it measured
+    sigma = tracker_sigma(sensors, np.linalg.norm(position - stand, axis=1))
     return PoseSet(
         q=read_encoder(sensors, true.q),
-        position=in_instrument(truth, point) + sigma * rng.standard_normal(point.shape),
-        sigma=sigma,
+        position=position,
+        sigma=np.repeat(sigma[:, None], 3, axis=1),
         torque=torque,
         payload=true.payload,
         target=np.full(size, truth.point().name),

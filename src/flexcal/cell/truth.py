@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
 
 from flexcal.cell.config import SpreadConfig
+from flexcal.estimates_file import BLOCKS, Block
 from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY, unit_of
-from flexcal.yaml_reader import read_yaml_file
+from flexcal.model.names import GEOMETRY, STATION, unit_of
+from flexcal.model.stored import NUISANCE
+from flexcal.structuring import Keys, suggestion
+from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import write_yaml
+
+_POSITIVE = (".mass", ".rotor_inertia", ".stiffness")
+_NOT_NEGATIVE = (".damping", ".backlash", ".viscous", ".coulomb")
 
 
 def draw_truth(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) -> dict[str, float]:
@@ -51,31 +58,89 @@ def _draws(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) ->
 
 
 def write_truth(path: str | Path, values: Mapping[str, float]) -> None:
-    """Write true values, atomically, in the form of estimates.yaml: one block `truth` with its `values`; floats come back bit by bit."""
-    write_yaml(path, {"truth": {"values": dict(values), "units": {name: unit_of(name) for name in values}}})
+    """Write true values, atomically, as values with units in the blocks of an estimates.yaml; floats come back bit by bit."""
+    blocks: dict[Block, dict[str, dict[str, object]]] = {}
+    for block in BLOCKS:
+        named = {name: value for name, value in values.items() if _block(name) == block}
+        entries: dict[str, object] = {
+            name: {"estimate": float(value), "unit": unit_of(name)} for name, value in named.items()
+        }
+        if entries:
+            blocks[block] = {"values": entries}
+    write_yaml(path, blocks)
+
+
+def _block(name: str) -> Block:
+    """The identification that finds a parameter."""
+    last = name.rpartition(".")[2]
+    if last in ("stiffness", "damping"):
+        return "stiffness"
+    return "calibration" if last in (*GEOMETRY, *STATION, "backlash") else "dynamics"
 
 
 def read_truth(path: str | Path) -> dict[str, float]:
-    """Read true values: of every block of a file in the form of estimates.yaml, or a plain `name: value` table.
+    """The values of all blocks of a file in the form of estimates.yaml; a value may also be a plain number, and the blocks be left out.
 
-    Raises `InputError` with file and line for anything else.
+    Of a name in several blocks the last counts; names of one pose of an experiment (`.pose_1`) are left out. Raises `InputError` with
+    file and line for anything else.
+    """
+    return {name: value for name, (value, _) in _entries(read_yaml_file(path)).items()}
+
+
+def read_truth_of(path: str | Path, model: RobotModel) -> dict[str, float]:
+    """`read_truth` of a file from outside, for a robot: what the file lacks of its parameters is as in `model`, and the log says so.
+
+    Raises `InputError` with file and line for a name that the robot does not have and a value that it cannot have.
     """
     file = read_yaml_file(path)
+    entries = _entries(file)
+    for name, (value, keys) in entries.items():
+        if name not in model.values:
+            hint = suggestion(name, list(model.values)) or "; give the truth of this robot."
+            raise file.error(keys, f"{model.path} has no parameter '{name}'{hint}")
+        if value <= 0 if name.endswith(_POSITIVE) else value < 0 and name.endswith(_NOT_NEGATIVE):
+            raise file.error(
+                keys, f"the true value of '{name}' is {value:g}, which no robot has; correct it."
+            )
+    found = {name: value for name, (value, _) in entries.items()}
+    drawn = draw_truth(model, SpreadConfig(), np.random.default_rng(0))
+    lacking = [name for name in drawn if name not in found]
+    if lacking:
+        more = f" and {len(lacking) - 1} others" if len(lacking) > 1 else ""
+        logging.getLogger("flexcal.cell").warning(
+            f"{path}: '{lacking[0]}'{more} are missing and taken as in {model.path}"
+        )
+    return {name: model.value(name) for name in lacking} | found
+
+
+def _entries(file: YamlFile) -> dict[str, tuple[float, Keys]]:
+    """Value and place of every name."""
     if not isinstance(file.data, Mapping) or not file.data:
         raise file.error((), "a truth file holds parameter names and values; this one does not.")
-    flat = not any(isinstance(block, Mapping) for block in file.data.values())
-    tables: list[tuple[str, ...]] = [()] if flat else [(name, "values") for name in file.data]
-    result: dict[str, float] = {}
-    for keys in tables:
-        table = file.data
-        for key in keys:
-            table = table.get(key) if isinstance(table, Mapping) else None
+    found: dict[str, tuple[float, Keys]] = {}
+    for key, item in file.data.items():
+        if not _is_block(item):
+            found[key] = (_value(file, (key,), item), (key,))
+            continue
+        table = item.get("values")
         if not isinstance(table, Mapping):
             raise file.error(
-                keys[:1], f"the block '{keys[0]}' has no `values:` table; add one of names and numbers."
+                (key,), f"the block '{key}' has no `values:` table; add one of names and numbers."
             )
-        for name, value in table.items():
-            if isinstance(value, bool) or not isinstance(value, int | float):
-                raise file.error((*keys, name), f"the true value of '{name}' is not a number.")
-            result[name] = float(value)
-    return result
+        for name, entry in table.items():
+            keys = (key, "values", name)
+            found[name] = (_value(file, keys, entry), keys)
+    return {name: entry for name, entry in found.items() if not NUISANCE.fullmatch(name)}
+
+
+def _is_block(item: object) -> bool:
+    return isinstance(item, Mapping) and "estimate" not in item
+
+
+def _value(file: YamlFile, keys: Keys, entry: object) -> float:
+    value = entry.get("estimate") if isinstance(entry, Mapping) else entry
+    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+        raise file.error(
+            keys, f"the true value of '{keys[-1]}' is not a number; write one, or `{{estimate: 1.0}}`."
+        )
+    return float(value)

@@ -44,9 +44,10 @@ class VirtualCell:
 
         `q` (N, n) are encoder readings and `torque` (N, n) the torque held until the next sample, with sensor noise; joints that are
         not excited are braked at the pose and read a torque of zero. Raises `FlexcalError` for a joint count that does not fit,
-        a step that does not resolve the robot, or a loop that diverges.
+        an excited drive without rotor inertia, a step that does not resolve the robot, or a loop that diverges.
         """
         self._check_width(plan.poses)
+        self._check_rotors(plan)
         return recordings(self.truth, self.controller_model, self.config, plan, self.seed, self.threads)
 
     def measure(self, plan: PosePlan) -> PoseSet:
@@ -63,6 +64,14 @@ class VirtualCell:
         """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
         self._check_width(plan.q)
         return in_instrument(self.truth, true_poses(self.truth, self.config, plan).point)
+
+    def _check_rotors(self, plan: MultisinePlan) -> None:
+        for spring in self.truth.elastic:
+            if spring.index in plan.joints and not self.truth.rotor_inertia[spring.index] > 0:
+                raise FlexcalError(
+                    f"{self.truth.path} gives {spring.name} no positive rotor inertia, and a motor before a drive spring cannot move "
+                    "without one; add `drives: {rotor_inertia: […]}` in kg m² at the joint."
+                )
 
     def _check_width(self, q: np.ndarray) -> None:
         if q.shape[1] != self.truth.n:

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, PoseFiles, Robot, require_at_least, require_files
+from flexcal.cli.options import Json, PoseFiles, Robot, require_at_least, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -33,7 +33,7 @@ class Calibrate:
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
     """How the uncertainty of stiffness and inertia enters; both give the same geometry to first order."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for estimates.yaml and results.json, in place of estimates.yaml beside robot.yaml."""
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 
     def run(self) -> None:
@@ -41,6 +41,7 @@ class Calibrate:
         from flexcal.cli.tables import dropped_table, error_table, weak_table
         from flexcal.workflow.calibrate_robot import calibrate_robot
 
+        require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
         require_at_least(0, secant_scale=self.secant_scale)
         console = Console(self.json)
@@ -73,28 +74,10 @@ class Calibrate:
         console.show(
             error_table("distance to the measured points", {labels[key]: errors[key] for key in labels})
         )
-        self._remark(console, document)
+        for remark in document["remarks"]:
+            console.say(remark)
         where = "" if self.out is None else f" --estimates {self.out}"
         console.say(f"wrote {found.estimates}")
         console.finish(
             document, f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw"
         )
-
-    def _remark(self, console: Console, document: dict) -> None:
-        fit, outliers = document["fit"], document["outliers"]
-        if not fit["sigma_given"]:
-            console.say(
-                f"no sigma in the files: the scatter of {fit['sigma_mm']:.3f} mm a coordinate stands for it"
-            )
-        elif fit["reduced_chi2"] is not None and fit["reduced_chi2"] > 2:
-            console.say(
-                f"chi-square is {fit['reduced_chi2']:.1f} times what sigma explains: the model lacks something or sigma is too small, "
-                "and the intervals are too narrow"
-            )
-        if fit["status"] != "converged":
-            console.say(f"the fit has not converged ({fit['status']}); do not trust it")
-        if fit["ambiguous_poses"]:
-            console.say(f"{fit['ambiguous_poses']} poses do not surely rest on one flank of a backlash")
-        if outliers:
-            listed = ", ".join(f"pose {o['pose']} ({o['error_mm']:.2f} mm)" for o in outliers)
-            console.say(f"{len(outliers)} outliers: {listed}")

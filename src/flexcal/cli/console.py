@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
+
+from flexcal.progress import Progress
 
 if TYPE_CHECKING:
     from rich.console import Console as RichConsole
@@ -14,8 +16,6 @@ if TYPE_CHECKING:
 
 _WIDTH = 120
 """Columns where the output is no terminal."""
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,9 @@ class Console:
         """A line of text beside the results; to standard error with `json`."""
         print(text, file=sys.stderr if self.json else sys.stdout)
 
-    def finish(self, document: Mapping[str, Any], following: str = "") -> None:
-        """End a verb: the JSON document with `json`, and what to do next."""
-        if following:
-            self.say(f"next: {following}")
+    def finish(self, document: Mapping[str, Any], following: str) -> None:
+        """End a verb: what to do next, and the JSON document with `json`."""
+        self.say(f"next: {following}")
         if self.json:
             from flexcal.workflow.results import json_text
 
@@ -53,14 +52,8 @@ class Console:
         if not rich.is_terminal:
             yield _stage_lines()
             return
-        from rich.progress import (
-            BarColumn,
-            Progress,
-            TaskID,
-            TextColumn,
-            TimeElapsedColumn,
-            TimeRemainingColumn,
-        )
+        from rich.progress import BarColumn, TaskID, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+        from rich.progress import Progress as Bars
 
         tasks: dict[str, TaskID] = {}
         columns = (
@@ -69,7 +62,7 @@ class Console:
             TimeElapsedColumn(),
             TimeRemainingColumn(),
         )
-        with Progress(*columns, console=rich) as bars:
+        with Bars(*columns, console=rich) as bars:
 
             def advance(stage: str, share: float) -> None:
                 if stage not in tasks:

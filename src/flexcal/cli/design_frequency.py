@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_at_least
+from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 
 
 @dataclass(frozen=True)
@@ -26,6 +26,10 @@ class DesignFrequency:
         arg(metavar="FILE", help_behavior_hint="(default: frequency_poses.csv beside robot.yaml)"),
     ] = None
     """Where to excite: CSV with plan, pose, q1_deg, q2_deg and so on."""
+    crest: Literal["random", "optimised"] = "random"
+    """Phases as drawn, or shifted from there so that the torque's peaks are small."""
+    detection_lines: bool = False
+    """Leave out one line in four; what is seen there is the robot's odd nonlinear distortion."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the random phases."""
     json: Json = False
@@ -34,10 +38,17 @@ class DesignFrequency:
         """Plan, and print how long it takes."""
         from flexcal.workflow.design_frequency import plan_frequency_experiments
 
+        require_robot(self.robot)
         require_at_least(0, seed=self.seed)
         console = Console(self.json)
         document = plan_frequency_experiments(
-            self.robot, self.out, kind=self.plan, poses=self.poses, seed=self.seed
+            self.robot,
+            self.out,
+            kind=self.plan,
+            poses=self.poses,
+            crest=self.crest,
+            detection_lines=self.detection_lines,
+            seed=self.seed,
         ).document()
         console.say(
             f"wrote {self.out}: {document['poses']} poses, {document['lines']} lines from {document['lowest_hz']:g} to "

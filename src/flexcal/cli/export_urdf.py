@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot
+from flexcal.cli.options import Json, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,12 @@ class ExportUrdf:
         """Export, and say what is lost."""
         from flexcal.workflow.export_robot import export_urdf
 
+        require_robot(self.robot)
         console = Console(self.json)
         found = export_urdf(self.robot, self.out, estimates=self.estimates)
         console.say(f"wrote {found.export}")
+        following = f"load {self.out} wherever the nominal URDF was loaded"
         if not found.calibrated:
-            console.say(
-                f"there are no estimates: this is the nominal robot; run 'flexcal calibrate {self.robot} POSES…' first"
-            )
-        console.finish(found.document())
+            console.say("there are no estimates: this is the nominal robot")
+            following = f"flexcal calibrate {self.robot} POSES…, and export again"
+        console.finish(found.document(), following)

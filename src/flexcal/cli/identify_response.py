@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, cast
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot
+from flexcal.cli.options import Json, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -22,8 +22,16 @@ class IdentifyResponse:
     ]
     out: Annotated[Path, arg(metavar="DIR")] = Path("responses")
     """Folder for the responses."""
-    average: Literal["arithmetic", "logarithmic", "harmonic", "h1", "joint_input_output"] = "arithmetic"
-    """How the realisations are averaged."""
+    method: Literal[
+        "arithmetic",
+        "logarithmic",
+        "harmonic",
+        "h1",
+        "joint-input-output",
+        "errors-in-variables",
+        "local-polynomial",
+    ] = "arithmetic"
+    """How the realisations are averaged; or the local polynomial method, for one realisation or records without a steady state."""
     json: Json = False
 
     def run(self) -> None:
@@ -31,11 +39,11 @@ class IdentifyResponse:
         from flexcal.cli.tables import response_table
         from flexcal.workflow.identify_response import identify_response
 
+        require_robot(self.robot, self.folder)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_response(
-                self.robot, self.folder, self.out, average=self.average, progress=progress
-            )
+            method = cast(Any, self.method.replace("-", "_"))
+            found = identify_response(self.robot, self.folder, self.out, method=method, progress=progress)
         document = found.document()
         console.show(response_table(document["responses"]))
         console.finish(document, f"flexcal identify stiffness {self.robot} {self.out}")

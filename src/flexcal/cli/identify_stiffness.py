@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_at_least, require_files
+from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -31,10 +31,14 @@ class IdentifyStiffness:
     ]
     inertias_known: bool = False
     """Take link inertias as exact."""
+    weighting: Literal["covariance", "paper", "uniform"] = "covariance"
+    """covariance: that of the measured responses, for true intervals; paper: emphasis near poles and zeros; uniform: all alike."""
+    search: Literal["multi-start", "population"] = "multi-start"
+    """For a start: exact derivatives from several starts, or a population over wide bounds, in place of the paper's genetic algorithm."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the search for a start."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for estimates.yaml and results.json, in place of estimates.yaml beside robot.yaml."""
+    """Folder for results.json and estimates.yaml (then not beside robot.yaml); 'flexcal report' makes a page of it."""
     json: Json = False
 
     def run(self) -> None:
@@ -42,6 +46,7 @@ class IdentifyStiffness:
         from flexcal.cli.tables import quantity_table
         from flexcal.workflow.identify_stiffness import identify_robot_stiffness
 
+        require_robot(self.robot, *self.responses)
         require_files(self.responses, "RESPONSES")
         require_at_least(0, seed=self.seed)
         console = Console(self.json)
@@ -50,6 +55,8 @@ class IdentifyStiffness:
                 self.robot,
                 self.responses,
                 inertias_known=self.inertias_known,
+                weighting=self.weighting,
+                search=self.search,
                 seed=self.seed,
                 out=self.out,
                 progress=progress,

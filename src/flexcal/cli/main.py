@@ -9,6 +9,7 @@ import textwrap
 from collections.abc import Sequence
 from importlib import import_module
 
+from flexcal.cli.letters import show_near_letters
 from flexcal.cli.verbs import Verb, find_verb, overview, unknown_verb
 from flexcal.errors import FlexcalError
 
@@ -24,6 +25,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     given = list(sys.argv[1:] if arguments is None else arguments)
     # matrices here are small: threads of the linear algebra library cost more than they give
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    show_near_letters()
     try:
         status = _run(given)
         sys.stdout.flush()
@@ -35,6 +37,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         # whoever read standard output has gone; nothing more can be said there, not even at exit
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
+    except OSError as problem:
+        where = f"{problem.filename}: " if problem.filename else ""
+        print(f"flexcal: {where}{problem.strerror or problem}.", file=sys.stderr)
+        return FAILED
     except BaseException as problem:
         if not _was_interrupted(problem):
             raise
@@ -70,6 +76,8 @@ def _was_interrupted(problem: BaseException | None) -> bool:
 def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
+    from flexcal.cli.outputs import outputs
+
     command = getattr(import_module(f"flexcal.cli.{verb.module}"), verb.command)
     try:
         parsed = tyro.cli(
@@ -81,7 +89,8 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         )
     except SystemExit as stop:  # --help, or arguments that do not parse: tyro has said so
         return stop.code if isinstance(stop.code, int) else FAILED
-    parsed.run()
+    with outputs(parsed.out, verb.leaves):
+        parsed.run()
     return 0
 
 

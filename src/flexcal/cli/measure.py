@@ -62,5 +62,6 @@ class Measure:
             following = f"flexcal identify response {robot} {self.out} --out responses"
         else:
             console.say(f"wrote {found.poses} measured points to {self.out / 'poses.csv'}")
-            following = f"flexcal calibrate {robot} {self.out / 'poses.csv'}"
+            verb = "verify" if found.for_verification else "calibrate"
+            following = f"flexcal {verb} {robot} {self.out / 'poses.csv'}"
         console.finish(found.document(), following)

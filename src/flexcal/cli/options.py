@@ -25,6 +25,21 @@ Json = Annotated[
 ]
 
 
+_NO_ROBOT = (".csv", ".parquet", ".npz", ".urdf", ".xml")
+
+
+def require_robot(robot: Path, *others: Path) -> None:
+    """Raise `InputError` where ROBOT is evidently something else, most likely because it was swapped with one of `others`."""
+    if robot.suffix not in _NO_ROBOT and not robot.is_dir():
+        return
+    swapped = [path for path in others if path.suffix in (".yaml", ".yml")]
+    if swapped:
+        raise InputError(
+            f"{robot} stands where robot.yaml is expected; did you mean {swapped[0]} first, then {robot}?"
+        )
+    raise InputError(f"{robot} is no robot.yaml; name the YAML file that describes the robot first.")
+
+
 def require_files(files: tuple[Path, ...], name: str) -> None:
     """Raise `InputError` where no file was given."""
     if not files:

@@ -9,13 +9,17 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Verb:
-    """A verb: its words, the module and class that carry it out, what it does in a line, and a command line to copy."""
+    """A verb: its words, the module and class that carry it out, what it does in a line, and a command line to copy.
+
+    `leaves` are the files (glob patterns) that it leaves in the folder of --out; none where --out is the file itself.
+    """
 
     words: tuple[str, ...]
     module: str
     command: str
     summary: str
     example: str
+    leaves: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -40,6 +44,19 @@ STEPS = (
                 "Demo",
                 "everything below on a virtual robot with a hidden truth, with a report",
                 "flexcal demo --seed 1 --out demo",
+                (
+                    "truth.yaml",
+                    "frequency_plan.yaml",
+                    "response_pose_*.npz",
+                    "calibration_poses.csv",
+                    "verification_poses.csv",
+                    "verification.csv",
+                    "estimates.yaml",
+                    "estimates.npz",
+                    "calibrated.urdf",
+                    "results.json",
+                    "report.html",
+                ),
             ),
         ),
     ),
@@ -59,6 +76,7 @@ STEPS = (
                 "Measure",
                 "carry out a plan, in the virtual cell or from a folder of recorded files",
                 "flexcal measure frequency.yaml --cell virtual --out frequency",
+                ("plan.yaml", "pose_*_realisation_*", "poses.csv", "truth.yaml", "results.json"),
             ),
             Verb(
                 ("identify", "response"),
@@ -66,6 +84,7 @@ STEPS = (
                 "IdentifyResponse",
                 "recordings to frequency responses with their covariance",
                 "flexcal identify response robot.yaml frequency --out responses",
+                ("plan.yaml", "response_pose_*.npz", "results.json"),
             ),
             Verb(
                 ("identify", "stiffness"),
@@ -73,6 +92,7 @@ STEPS = (
                 "IdentifyStiffness",
                 "frequency responses to stiffness and damping",
                 "flexcal identify stiffness robot.yaml responses",
+                ("results.json",),
             ),
         ),
     ),
@@ -92,6 +112,7 @@ STEPS = (
                 "Calibrate",
                 "measured positions to geometry; says what could not be told apart",
                 "flexcal calibrate robot.yaml poses.csv",
+                ("results.json", "report.html"),
             ),
         ),
     ),
@@ -104,6 +125,14 @@ STEPS = (
                 "Verify",
                 "accuracy on poses that the calibration never saw",
                 "flexcal verify robot.yaml others.csv",
+                ("results.json", "report.html"),
+            ),
+            Verb(
+                ("report",),
+                "report",
+                "Report",
+                "the report of a folder that one of these verbs left with --out, from its stored numbers",
+                "flexcal report results",
             ),
             Verb(
                 ("export", "urdf"),

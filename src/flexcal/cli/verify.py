@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, PoseFiles, Robot, require_files
+from flexcal.cli.options import Json, PoseFiles, Robot, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Verify:
     ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
-    """Folder to leave results.json in."""
+    """Folder for report.html and results.json; without it there is no report."""
     json: Json = False
 
     def run(self) -> None:
@@ -31,6 +31,7 @@ class Verify:
         from flexcal.cli.tables import error_table
         from flexcal.workflow.verify_robot import verify_robot
 
+        require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
         console = Console(self.json)
         found = verify_robot(self.robot, self.poses, estimates=self.estimates, out=self.out)
@@ -41,6 +42,12 @@ class Verify:
             labels["measured_unambiguous"] = "calibrated, flank certain"
         rows = {label: blocks[key] for key, label in labels.items() if key in blocks}
         console.show(error_table("distance to the measured points", rows))
-        console.say(f"the parameters' uncertainty alone makes {document['predicted_std_mm']:.3f} mm (1σ)")
+        rms = document["rms_mm"]
+        noise = "" if rms["expected"] is None else f", {rms['expected']:.3f} mm with the instrument's sigma"
+        console.say(
+            f"root mean square: {rms['measured']:.3f} mm; the parameters' uncertainty predicts {rms['parameters']:.3f} mm{noise}"
+        )
+        for remark in document["remarks"]:
+            console.say(remark)
         where = "" if self.estimates is None else f" --estimates {self.estimates}"
         console.finish(document, f"flexcal export urdf {self.robot}{where} --out calibrated.urdf")

@@ -1,13 +1,14 @@
 """Recordings, measured poses, plans and estimates: what they are, how they are read and written, where they come from."""
 
 from flexcal.data.cell import Cell
-from flexcal.data.experiment_folder import labels, recording_name, write_measured_poses, write_recordings
+from flexcal.data.experiment_folder import labels, write_measured_poses, write_recordings
 from flexcal.data.folder_cell import FolderCell
 from flexcal.data.multisine_plan import MultisinePlan
 from flexcal.data.plan_files import read_plan, read_plan_of, write_plan
 from flexcal.data.pose_checks import check_motion
-from flexcal.data.pose_files import read_poses, write_poses
+from flexcal.data.pose_files import read_pose_pool, read_poses, write_poses
 from flexcal.data.pose_plan import PosePlan
+from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import PoseSet, concatenate
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import read_recording, read_recording_blocks, write_recording
@@ -15,10 +16,8 @@ from flexcal.data.time_base import TimeBase
 from flexcal.estimates_file import (
     provenance,
     read_estimates,
-    read_values,
     sha256_of,
     write_estimates,
-    write_values,
 )
 
 __all__ = [
@@ -26,6 +25,7 @@ __all__ = [
     "FolderCell",
     "MultisinePlan",
     "PosePlan",
+    "PosePool",
     "PoseSet",
     "Recording",
     "RecordingLabel",
@@ -37,11 +37,10 @@ __all__ = [
     "read_estimates",
     "read_plan",
     "read_plan_of",
+    "read_pose_pool",
     "read_poses",
     "read_recording",
     "read_recording_blocks",
-    "read_values",
-    "recording_name",
     "sha256_of",
     "write_estimates",
     "write_measured_poses",
@@ -49,5 +48,4 @@ __all__ = [
     "write_poses",
     "write_recording",
     "write_recordings",
-    "write_values",
 ]

@@ -23,14 +23,6 @@ POSES = "poses"
 ENDINGS = (".parquet", ".csv")
 
 
-def recording_name(label: RecordingLabel) -> str:
-    """The name of a recording's file, without its ending."""
-    sign = "plus" if label.sign > 0 else "minus"
-    return (
-        f"pose_{label.pose + 1}_realisation_{label.realisation + 1}_experiment_{label.experiment + 1}_{sign}"
-    )
-
-
 def labels(plan: MultisinePlan) -> Iterator[RecordingLabel]:
     """The recordings of a plan in the order in which they are made: pose, realisation, experiment, sign."""
     for pose in range(len(plan.poses)):
@@ -65,16 +57,12 @@ def write_recordings(
     left = set(labels(plan))
     for recording in recordings:
         if recording.label is None or recording.label not in left:
-            raise FlexcalError(
-                f"the recording {recording.label} is not in the plan, or there twice; record the plan again."
-            )
+            raise FlexcalError(f"{recording.name} is not in the plan, or there twice; record the plan again.")
         left.remove(recording.label)
-        write_recording(folder / (recording_name(recording.label) + ending), recording)
+        write_recording(folder / (recording.label.name + ending), recording)
     if left:
-        missing = min(left, key=recording_name)
-        raise FlexcalError(
-            f"{len(left)} recordings of the plan are missing, for example {recording_name(missing)}."
-        )
+        missing = min(label.name for label in left)
+        raise FlexcalError(f"{len(left)} recordings of the plan are missing, for example {missing}.")
     write_plan(folder / PLAN, plan)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.experiment_folder import PLAN, POSES, existing_file, labels, recording_name
+from flexcal.data.experiment_folder import PLAN, POSES, existing_file, labels
 from flexcal.data.multisine_plan import MultisinePlan
 from flexcal.data.plan_files import Plan, read_plan
 from flexcal.data.pose_files import read_poses
@@ -54,7 +54,7 @@ class FolderCell:
         if not isinstance(own, MultisinePlan):
             raise InputError(f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no joint logs.")
         self._check_same(plan)
-        files = [(existing_file(self.path, recording_name(label)), label) for label in labels(own)]
+        files = [(existing_file(self.path, label.name), label) for label in labels(own)]
         return (read_recording(file, self.model, label) for file, label in files)
 
     def measure(self, plan: PosePlan | None = None) -> PoseSet:
@@ -71,8 +71,8 @@ class FolderCell:
         self._check_same(plan)
         file = existing_file(self.path, POSES)
         poses = read_poses(file, self.model, require_motion=False)
-        _, first = np.unique(poses.pose, return_index=True)
-        q = poses.q[np.sort(first)]
+        first = np.sort(np.unique(poses.pose, return_index=True)[1])
+        q = poses.q[first]
         if q.shape[0] != len(own):
             raise InputError(
                 f"{file}: there are {q.shape[0]} poses, but the plan has {len(own)}; measure them all."
@@ -81,7 +81,7 @@ class FolderCell:
         if apart.max() > _SAME:
             row, joint = (int(i) for i in np.argwhere(apart > _SAME)[0])
             raise InputError(
-                f"{file}, column q{joint + 1}: measured pose {row + 1} lies {apart[row, joint]:.3g} from the planned one; "
+                f"{file}, column q{joint + 1}: measured pose {poses.pose[first[row]]} lies {apart[row, joint]:.3g} from the planned one; "
                 "measure in the order of the plan, or give the plan that was measured."
             )
         return poses

@@ -1,7 +1,8 @@
-"""Whether joint positions can be in the unit they claim."""
+"""Whether joint positions can be in the unit they claim, and whether the robot can take them."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,3 +42,34 @@ def check_joint_units(model: RobotModel, table: Table, signal: Signal, q: np.nda
         else "check the unit and the order of the columns."
     )
     raise table.error(row, signal.column_of(column), f"{limits}; {advice}")
+
+
+def check_joint_limits(
+    model: RobotModel,
+    table: Table,
+    rows: Sequence[int] | np.ndarray,
+    columns: Sequence[str],
+    q: np.ndarray,
+    room: np.ndarray | float = 0.0,
+) -> None:
+    """Raise `InputError` with row, column, pose and joint of the first position of `q` (N, n) outside its limits.
+
+    `rows` (N,) and `columns` (n,) say where it stands in the table, whose column `pose` names it; `room` (n,), rad or m: how much must
+    be free on either side for what moves about the pose.
+    """
+    need = np.broadcast_to(room, q.shape[1:])
+    lower = np.array([joint.lower for joint in model.joints])
+    upper = np.array([joint.upper for joint in model.joints])
+    outside = (q < lower + need) | (q > upper - need)
+    if not outside.any():
+        return
+    row, joint = (int(i) for i in np.argwhere(outside)[0])
+    name = table.columns["pose"][rows[row]]
+    pose = f"pose {name}" if isinstance(name, str) else f"pose {name:g}"
+    unit = "m" if model.joints[joint].kind == "prismatic" else "rad"
+    limits = f"limits of {model.joints[joint].name} ({lower[joint]:.5g} to {upper[joint]:.5g} {unit})"
+    if need[joint]:
+        what = f"{pose}, at {q[row, joint]:.5g} {unit}, leaves less than the {need[joint]:.3g} {unit} that it needs to the {limits}"
+    else:
+        what = f"{pose}, at {q[row, joint]:.5g} {unit}, is outside the {limits}"
+    raise table.error(int(rows[row]), columns[joint], f"{what}; choose another pose, or correct the URDF.")

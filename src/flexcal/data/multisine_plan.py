@@ -26,6 +26,7 @@ class MultisinePlan:
     reference_amplitude, reference_frequency_hz: the slow motion under the excitation, rad and Hz.
     kp, kd: (n,) gains of the position controller referred to the joint, N m/rad and N m s/rad; rate_hz its rate.
     torque: what the logged torque is over a sample; `tau` in files.
+    crest: whether the phases are random, or start there and are shifted for small peaks.
     seed: of the random phases.
 
     Raises `FlexcalError` where shapes or values do not fit together.
@@ -50,6 +51,7 @@ class MultisinePlan:
     kd: NDArray[np.float64]
     rate_hz: float
     torque: Literal["held", "instantaneous", "mean"] = field(metadata={"key": "tau"})
+    crest: Literal["random", "optimised"] = field(default="random", kw_only=True)
     seed: int
 
     def __post_init__(self) -> None:

@@ -38,17 +38,17 @@ def check_motion(poses: PoseSet, model: RobotModel, where: str) -> None:
         )
 
 
-def check_same_pose(poses: PoseSet, table: Table) -> None:
-    """Raise `InputError` with the row where a pose has other joint positions than in its first row."""
-    numbers, first, inverse = np.unique(poses.pose, return_index=True, return_inverse=True)
-    differs = np.abs(poses.q - poses.q[first[inverse]]) > SAME_POSE
+def check_same_pose(pose: np.ndarray, q: np.ndarray, table: Table) -> None:
+    """Raise `InputError` with the row where a `pose` (N,) has other joint positions `q` (N, n) than in its first row."""
+    numbers, first, inverse = np.unique(pose, return_index=True, return_inverse=True)
+    differs = np.abs(q - q[first[inverse]]) > SAME_POSE
     if differs.any():
         row, joint = (int(i) for i in np.argwhere(differs)[0])
         original = int(first[inverse[row]])
         raise table.error(
             row,
             f"q{joint + 1}",
-            f"pose {numbers[inverse[row]]} stands at {poses.q[row, joint]:g} here, but at {poses.q[original, joint]:g} "
+            f"pose {numbers[inverse[row]]} stands at {q[row, joint]:g} here, but at {q[original, joint]:g} "
             f"in {table.file.row_word} {table.first + original}; give every pose its own number.",
         )
 

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.joint_limits import check_joint_units
+from flexcal.data.joint_limits import check_joint_limits, check_joint_units
 from flexcal.data.pose_checks import check_metres, check_motion, check_same_pose
+from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
 from flexcal.data.signals import Signal, assign, standard_columns
 from flexcal.data.table import Table, TableFile, open_table, write_table
@@ -41,6 +42,31 @@ def read_poses(
     if require_motion:
         check_motion(poses, model, " and ".join(str(path) for path in listed))
     return poses
+
+
+def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
+    """Read poses to choose from: `pose`, `q1`… and, where all hold the same one, `payload`; what was measured in them is not used.
+
+    Rows of one pose count once. Raises `InputError` with file, line and column as `read_poses` does, for a pose outside the joint
+    limits, and for payloads that differ.
+    """
+    file = open_table(path)
+    texts = tuple(name for name in _TEXTS if name in file.columns)
+    signals = assign(file, model, ("pose", "q"), (*_NUMBERS, "xyz", "length"), texts)
+    table = file.read(texts)
+    q = signals["q"].values(table)
+    check_joint_units(model, table, signals["q"], q)
+    columns = [signals["q"].column_of(joint) for joint in range(model.n)]
+    check_joint_limits(model, table, np.arange(len(q)), columns, q)
+    pose = _whole_numbers(table, signals["pose"], signals["pose"].values(table)[:, 0])
+    check_same_pose(pose, q, table)
+    first = np.sort(np.unique(pose, return_index=True)[1])
+    held = _payload(table, signals, model)
+    if held is not None and np.ptp(held) > 0:
+        row = int(np.argmax(held != held[0]))
+        sentence = f"{held[row]:g} kg follow {held[0]:g} kg; choose from poses with one payload at a time."
+        raise table.error(row, signals["payload"].columns[0], sentence)
+    return PosePool(q[first], pose[first], None if held is None else float(held[0]))
 
 
 def write_poses(path: str | Path, poses: PoseSet) -> None:
@@ -82,21 +108,17 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
     rows = len(table)
     position = found["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
     sigma = found.get("sigma_xyz", found.get("sigma"))
-    for name in ("sigma", "sigma_xyz", "payload", "length"):
+    for name in ("sigma", "sigma_xyz", "length"):
         if name in found:
-            _check_positive(table, signals[name], found[name], zero=name == "payload")
+            _check_positive(table, signals[name], found[name], zero=False)
     target = _targets(table, model) if "target" in texts else np.full(rows, _first_point(file, model))
     station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
-    if "payload" in found and model.payload is None:
-        raise file.error(
-            "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass."
-        )
     poses = PoseSet(
         q=found["q"],
         position=position,
         sigma=np.broadcast_to(DEFAULT_SIGMA if sigma is None else sigma, (rows, 3)).copy(),
         torque=found.get("tau"),
-        payload=found["payload"][:, 0] if "payload" in found else None,
+        payload=_payload(table, signals, model),
         target=target,
         station=station,
         temperature=found["temperature"][:, 0] if "temperature" in found else None,
@@ -107,7 +129,7 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
         length=found["length"][:, 0] if "length" in found else None,
         sigma_given=sigma is not None,
     )
-    check_same_pose(poses, table)
+    check_same_pose(poses.pose, poses.q, table)
     check_metres(poses, model, table, signals[place])
     return poses
 
@@ -130,6 +152,18 @@ def _first_point(file: TableFile, model: RobotModel) -> str:
 
 def _first_station(model: RobotModel) -> str:
     return next(iter(getattr(model, "stations", ())), "tracker")
+
+
+def _payload(table: Table, signals: dict[str, Signal], model: RobotModel) -> np.ndarray | None:
+    if "payload" not in signals:
+        return None
+    if model.payload is None:
+        raise table.file.error(
+            "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass."
+        )
+    held = signals["payload"].values(table)
+    _check_positive(table, signals["payload"], held, zero=True)
+    return held[:, 0]
 
 
 def _targets(table: Table, model: RobotModel) -> np.ndarray:

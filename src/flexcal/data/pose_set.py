@@ -95,7 +95,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
     """The rows of all sets, in order.
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
-    where there is nothing to join, joint counts differ, or only some sets have torques, payload, temperature,
+    where there is nothing to join, joint counts differ, or only some sets have sigma, torques, payload, temperature,
     orientation or length.
     """
     if not sets:
@@ -110,6 +110,10 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
         values = [getattr(poses, field.name) for poses in sets]
         present = [value is not None for value in values]
         if field.name == "sigma_given":
+            if any(values) and not all(values):
+                raise FlexcalError(
+                    f"only {sum(values)} of {len(sets)} pose sets have sigma; give it for all, or for none."
+                )
             joined[field.name] = all(values)
         elif field.name == "pose":
             joined[field.name] = _numbered_on(values)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -25,6 +26,12 @@ class RecordingLabel:
         if min(self.pose, self.realisation, self.experiment) < 0:
             raise FlexcalError("pose, realisation and experiment of a recording are counted from 0.")
 
+    @property
+    def name(self) -> str:
+        """As its file is called, without the ending; counted from 1: `pose_1_realisation_4_experiment_2_minus`."""
+        counts = f"pose_{self.pose + 1}_realisation_{self.realisation + 1}_experiment_{self.experiment + 1}"
+        return f"{counts}_{'plus' if self.sign > 0 else 'minus'}"
+
 
 @dataclass(frozen=True, eq=False)
 class Recording:
@@ -35,7 +42,7 @@ class Recording:
     arm: (N, n) positions on the arm side of elastic joints, where measured.
     velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
         `tau_ext`); temperature: (N,).
-    time_base: how the time stamps of the file were, where the recording comes from one.
+    time_base, file: how the time stamps were and the file itself, where the recording comes from one.
 
     Raises `FlexcalError` where shapes do not fit or the time step is not positive.
     """
@@ -52,6 +59,7 @@ class Recording:
     external_torque: np.ndarray | None = None
     temperature: np.ndarray | None = None
     time_base: TimeBase | None = None
+    file: Path | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.time_step < np.inf:
@@ -71,6 +79,13 @@ class Recording:
 
     def __len__(self) -> int:
         return self.q.shape[0]
+
+    @property
+    def name(self) -> str:
+        """The file it comes from, else the name of its label: what messages call it."""
+        if self.file is not None:
+            return str(self.file)
+        return "a recording without a label" if self.label is None else self.label.name
 
     @property
     def time(self) -> np.ndarray:

@@ -60,7 +60,7 @@ def read_recording(path: str | Path, model: RobotModel, label: RecordingLabel | 
     base = fit_time_base(t)
     _check_rate(table, signals["t"], base.time_step)
     values = _stacked(model, table, signals)
-    return _recording(signals, resample(t, values, base), base, label, model.n)
+    return _recording(path, signals, resample(t, values, base), base, label, model.n)
 
 
 def read_recording_blocks(
@@ -77,7 +77,7 @@ def read_recording_blocks(
     empty = True
     for base, values in uniform_blocks(_stamped(model, signals, file.blocks((), rows))):
         empty = False
-        yield _recording(signals, values, base, label, model.n)
+        yield _recording(path, signals, values, base, label, model.n)
     if empty:
         raise file.error("the file has a header but no rows; add some.")
 
@@ -132,7 +132,12 @@ def _stacked(model: RobotModel, table: Table, signals: dict[str, Signal]) -> np.
 
 
 def _recording(
-    signals: dict[str, Signal], values: np.ndarray, base: TimeBase, label: RecordingLabel | None, n: int
+    path: str | Path,
+    signals: dict[str, Signal],
+    values: np.ndarray,
+    base: TimeBase,
+    label: RecordingLabel | None,
+    n: int,
 ) -> Recording:
     fields: dict[str, np.ndarray] = {}
     column = 0
@@ -148,6 +153,7 @@ def _recording(
         start=base.start,
         label=label,
         time_base=base,
+        file=Path(path),
         q=fields.pop("q"),
         torque=fields.pop("torque"),
         **fields,

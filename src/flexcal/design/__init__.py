@@ -16,15 +16,15 @@ from flexcal.design.pose_curve import PoseCurve, pose_curve
 from flexcal.design.pose_sensitivity import (
     BaseSensitivity,
     Tolerances,
-    TrackerNoise,
     base_sensitivity,
     geometry_jacobian,
     pose_sensitivity,
 )
-from flexcal.design.poses import CriterionName, PoseDesign, choose_poses, design_poses, random_poses
-from flexcal.design.preload import gravity_torque_std, preloaded
+from flexcal.design.poses import CriterionName, PoseDesign, design_poses, random_poses
+from flexcal.design.preload import preloaded
+from flexcal.design.setup import Acceptance, MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
-from flexcal.design.visibility import Acceptance, visible
+from flexcal.design.visibility import visible
 
 __all__ = [
     "Acceptance",
@@ -33,6 +33,7 @@ __all__ = [
     "Criterion",
     "CriterionName",
     "DOptimal",
+    "MeasuringSetup",
     "Observability",
     "PoseCurve",
     "PoseDesign",
@@ -42,11 +43,9 @@ __all__ = [
     "TraceOptimal",
     "TrackerNoise",
     "base_sensitivity",
-    "choose_poses",
     "design_poses",
     "exchange",
     "geometry_jacobian",
-    "gravity_torque_std",
     "greedy",
     "joint_origins",
     "joint_ranges",

@@ -7,11 +7,13 @@ from collections.abc import Callable
 import numpy as np
 
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.joint_space import LIMIT_MARGIN, joint_ranges
+from flexcal.design.joint_space import joint_ranges
 from flexcal.design.preload import preloaded
-from flexcal.design.visibility import Acceptance, visible
+from flexcal.design.setup import STANDARD, MeasuringSetup
+from flexcal.design.visibility import visible
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
+from flexcal.progress import Progress, silent
 
 _TRIES = 100
 
@@ -20,13 +22,10 @@ def random_candidates(
     checker: CollisionChecker,
     count: int,
     rng: np.random.Generator,
+    setup: MeasuringSetup = STANDARD,
     *,
-    payload: float | None = None,
     preload: bool = False,
-    point: str | None = None,
-    station: str | None = None,
-    acceptance: Acceptance | None = None,
-    limit_margin: float = LIMIT_MARGIN,
+    progress: Progress = silent,
 ) -> np.ndarray:
     """`count` configurations (count, n), uniform over the joint ranges where nothing collides and the target is seen.
 
@@ -34,18 +33,19 @@ def random_candidates(
     poses are checked, not the ways between them. Raises `FlexcalError`, with what each check threw out, when too few are left.
     """
     model = checker.model
-    lower, upper = joint_ranges(model, margin=limit_margin)
+    lower, upper = joint_ranges(model)
     checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-        "floor": lambda q: _above_floor(checker, q, point)
+        "floor": lambda q: _above_floor(checker, q, setup.point)
     }
     if preload:
-        checks["flank preload"] = lambda q: preloaded(model, q, payload)
+        checks["flank preload"] = lambda q: preloaded(model, q, setup.payload)
     checks["collision"] = lambda q: ~checker.collides(q)
-    checks["visibility"] = lambda q: visible(checker, q, point=point, station=station, acceptance=acceptance)
+    checks["visibility"] = lambda q: visible(checker, q, setup)
     lost = dict.fromkeys(checks, 0)
     found: list[np.ndarray] = []
     have = drawn = 0
     while have < count:
+        progress("candidates", have / count)
         if drawn >= _TRIES * count + 1000:
             losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
             raise FlexcalError(
@@ -61,6 +61,7 @@ def random_candidates(
             q = q[passed]
         found.append(q)
         have += len(q)
+    progress("candidates", 1.0)
     return np.concatenate(found or [np.zeros((0, model.n))])[:count]
 
 

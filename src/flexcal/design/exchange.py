@@ -15,9 +15,13 @@ import numpy as np
 from flexcal.design.criteria import Criterion, DOptimal, SpectralCriterion, TraceOptimal
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
+from flexcal.progress import Progress, silent
 
 FAINT = 1e-5
 """Information of the whole pool, per candidate, that is added so that a set smaller than the parameters has a merit."""
+
+CHOOSING = "choosing"
+"""The stage that exchanges tell of."""
 
 REBUILT = 8
 """Additions to a growing set after which its inverse is found anew: early on it loses digits with every update."""
@@ -39,6 +43,7 @@ def exchange(
     *,
     start: Sequence[int] | np.ndarray | None = None,
     passes: int = 20,
+    progress: Progress = silent,
 ) -> Selection:
     """The `count` candidates of best merit that exchanges find; every candidate serves once.
 
@@ -50,19 +55,22 @@ def exchange(
     if isinstance(criterion, SpectralCriterion):
         from flexcal.design.spectral_exchange import spectral_exchange
 
-        return spectral_exchange(sensitivity, count, criterion, start=start, passes=passes)
+        return spectral_exchange(sensitivity, count, criterion, start=start, passes=passes, progress=progress)
     if not isinstance(criterion, DOptimal | TraceOptimal):
         raise FlexcalError(f"exchange knows D, trace and spectral criteria, not {criterion.name}.")
     state = RankUpdates(sensitivity, criterion)
     chosen = [] if start is None else [int(i) for i in start]
     state.rebuild(chosen)
+    progress(CHOOSING, 0.0)
     chosen = _grow(state, count, chosen)
     history = [state.merit]
-    for _ in range(passes):
+    for number in range(passes):
+        progress(CHOOSING, (number + 1) / (passes + 1))
         if not _exchange_once(state, chosen):
             break
         state.rebuild(chosen)
         history.append(state.merit)
+    progress(CHOOSING, 1.0)
     return Selection(
         np.array(chosen), criterion.merit(_information(sensitivity, chosen, criterion)), tuple(history)
     )

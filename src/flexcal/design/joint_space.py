@@ -11,8 +11,8 @@ LIMIT_MARGIN = 0.02
 """Share of a joint's range that is kept free at either end."""
 
 
-def joint_ranges(model: RobotModel, *, margin: float = LIMIT_MARGIN) -> tuple[np.ndarray, np.ndarray]:
-    """Lower and upper end (n,) of every joint, rad or m, `margin` of the range inside its limits; a continuous joint turns ±π.
+def joint_ranges(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper end (n,) of every joint, rad or m, 2 % of the range inside its limits; a continuous joint turns ±π.
 
     Raises `FlexcalError` for limits that cross, or an unlimited prismatic joint.
     """
@@ -30,7 +30,7 @@ def joint_ranges(model: RobotModel, *, margin: float = LIMIT_MARGIN) -> tuple[np
                 )
             lower[i], upper[i] = -np.pi, np.pi
         else:
-            free = margin * (upper[i] - lower[i])
+            free = LIMIT_MARGIN * (upper[i] - lower[i])
             lower[i], upper[i] = lower[i] + free, upper[i] - free
     return lower, upper
 

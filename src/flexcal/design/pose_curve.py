@@ -11,6 +11,7 @@ from flexcal.design.criteria import TraceOptimal
 from flexcal.design.exchange import greedy
 from flexcal.design.poses import PoseDesign, tool_error
 from flexcal.errors import FlexcalError
+from flexcal.progress import Progress, silent
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,12 @@ class PoseCurve:
 
 
 def pose_curve(
-    design: PoseDesign, *, rng: np.random.Generator, counts: Sequence[int] = (), random_sets: int = 15
+    design: PoseDesign,
+    *,
+    rng: np.random.Generator,
+    counts: Sequence[int] = (),
+    random_sets: int = 15,
+    progress: Progress = silent,
 ) -> PoseCurve:
     """The curve for `counts`, by default from the fewest that determine the parameters to four times as many as were chosen.
 
@@ -50,15 +56,12 @@ def pose_curve(
         counts = np.unique(np.geomspace(least, most, 16).round().astype(int)).tolist()
     if min(counts) < 1 or max(counts) > total:
         raise FlexcalError(f"counts must lie between 1 and the {total} candidates.")
+    progress("how many", 0.0)
     order = greedy(sensitivity, max(counts), TraceOptimal(design.tool_weight, "c")).chosen
     chosen = [tool_error(design.base, design.tool_weight, order[:k]) for k in counts]
-    random = [
-        np.median(
-            [
-                tool_error(design.base, design.tool_weight, rng.choice(total, k, replace=False))
-                for _ in range(random_sets)
-            ]
-        )
-        for k in counts
-    ]
+    random = []
+    for k in counts:
+        sets = (rng.choice(total, k, replace=False) for _ in range(random_sets))
+        random.append(np.median([tool_error(design.base, design.tool_weight, drawn) for drawn in sets]))
+        progress("how many", len(random) / len(counts))
     return PoseCurve(np.array(counts), np.array(chosen), np.array(random))

@@ -6,24 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.design.setup import STANDARD, MeasuringSetup
 from flexcal.design.visibility import station_position
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability, Parameter, Parameters, Sensitivity, analyse
 from flexcal.model import RobotModel, gravity_torque, point_kinematics
 from flexcal.model.names import GEOMETRY, unit_of
 from flexcal.units import MILLIMETRE
-
-
-@dataclass(frozen=True)
-class TrackerNoise:
-    """Standard deviation an axis of a laser tracker: `constant` (m) + `proportional` (m per m of distance)."""
-
-    constant: float = 15e-6
-    proportional: float = 6e-6
-
-    def std(self, distance: np.ndarray) -> np.ndarray:
-        """Standard deviation (...), m, at `distance` (...), m."""
-        return self.constant + self.proportional * distance
 
 
 @dataclass(frozen=True)
@@ -35,13 +24,12 @@ class Tolerances:
     station: float = 10 * MILLIMETRE
 
 
+TYPICAL = Tolerances()
+"""A well-made industrial robot, and an instrument whose place was measured with a tape."""
+
+
 def geometry_jacobian(
-    model: RobotModel,
-    q: np.ndarray,
-    *,
-    payload: float | None = None,
-    point: str | None = None,
-    station: str | None = None,
+    model: RobotModel, q: np.ndarray, setup: MeasuringSetup = STANDARD
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Names (p,) and derivatives (samples, 3, p), in m/rad and m/m, of the measured target position by every geometric error.
 
@@ -49,9 +37,9 @@ def geometry_jacobian(
     its gravity torque times its twist column. The arm is undeflected; the axes are the base's (the rank does not depend on the
     station's orientation). Raises `FlexcalError` for an unknown point or station.
     """
-    station = model.stations[0] if station is None else station
-    motion = point_kinematics(model, q, point=point)
-    target = model.point(point)
+    station = setup.station or model.stations[0]
+    motion = point_kinematics(model, q, point=setup.point)
+    target = model.point(setup.point)
     names = [f"station.{station}.{axis}" for axis in "xyz"]
     names += [f"{joint.name}.{key}" for joint in model.joints for key in GEOMETRY]
     names += [f"tool.{key}" for key in GEOMETRY]
@@ -59,7 +47,7 @@ def geometry_jacobian(
         names[-3:] = [f"point.{target.name}.{axis}" for axis in "xyz"]
     loose = list(model.backlash_joints)
     names += [f"{model.joints[i].name}.backlash" for i in loose]
-    flank = np.sign(gravity_torque(model, q, payload)[:, loose])
+    flank = np.sign(gravity_torque(model, q, setup.payload)[:, loose])
     slack = -flank[:, None, :] * motion.motion_jacobian[:, :3, loose, 2]
     place = np.broadcast_to(np.eye(3), (len(flank), 3, 3))
     return tuple(names), np.concatenate([place, motion.geometry_jacobian[:, :3], slack], axis=2)
@@ -68,26 +56,21 @@ def geometry_jacobian(
 def pose_sensitivity(
     model: RobotModel,
     q: np.ndarray,
-    *,
-    payload: float | None = None,
-    point: str | None = None,
-    station: str | None = None,
-    noise: TrackerNoise | None = None,
-    tolerances: Tolerances | None = None,
+    setup: MeasuringSetup = STANDARD,
+    tolerances: Tolerances = TYPICAL,
 ) -> Sensitivity:
-    """Rows of every pose of `q` (samples, n) in the geometric errors (SI), whitened by the tracker's noise; the tolerances are the prior.
+    """Rows of every pose of `q` (samples, n) in the geometric errors (SI), whitened by the instrument's noise; prior: the tolerances.
 
     Where robot.yaml does not say where the instrument stands, its distance is taken as twice the robot's reach.
     """
-    noise, tolerances = noise or TrackerNoise(), tolerances or Tolerances()
-    names, jacobian = geometry_jacobian(model, q, payload=payload, point=point, station=station)
-    origin = station_position(model, station)
-    position = point_kinematics(model, q, point=point, jacobians=False).position
+    names, jacobian = geometry_jacobian(model, q, setup)
+    origin = station_position(model, setup.station)
+    position = point_kinematics(model, q, point=setup.point, jacobians=False).position
     apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
     parameters = Parameters(
         Parameter(name, unit_of(name), 0.0, prior_std=_tolerance(name, tolerances)) for name in names
     )
-    whitened = jacobian / noise.std(apart)[:, None, None]
+    whitened = jacobian / setup.noise.std(apart)[:, None, None]
     return Sensitivity(whitened, parameters, parameters.prior_information())
 
 
@@ -141,4 +124,4 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
 
 def _length_scale(parameters: Parameters) -> float:
     lengths = [p.prior_std for p in parameters if p.unit != "rad" and not p.name.startswith("station.")]
-    return min(lengths, default=Tolerances().length)
+    return min(lengths, default=TYPICAL.length)

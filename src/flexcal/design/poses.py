@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
 
-from flexcal.data import PosePlan
+from flexcal.data import PosePlan, PosePool
 from flexcal.design.candidates import random_candidates
 from flexcal.design.collision import CollisionChecker
 from flexcal.design.criteria import (
     Criterion,
     DOptimal,
-    Observability,
     SpectralCriterion,
     TraceOptimal,
     observability,
@@ -21,17 +20,16 @@ from flexcal.design.criteria import (
 from flexcal.design.exchange import Selection, exchange
 from flexcal.design.pose_sensitivity import (
     BaseSensitivity,
-    Tolerances,
-    TrackerNoise,
     base_sensitivity,
     geometry_jacobian,
     pose_sensitivity,
 )
-from flexcal.design.preload import preload_joints
-from flexcal.design.visibility import Acceptance
+from flexcal.design.preload import preload_joints, preloaded
+from flexcal.design.setup import STANDARD, MeasuringSetup
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability
 from flexcal.model import RobotModel, gravity_torque
+from flexcal.progress import Progress, silent
 
 CriterionName = Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"]
 WORKING_POSES = 300
@@ -42,14 +40,14 @@ WORKING_POSES = 300
 class PoseDesign:
     """A plan of N poses and why these.
 
-    `candidates` (C, n) are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all
-    candidates; `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses;
-    `flank` (N, joints with backlash) is the sign of the gravity torque at `flank_joints`.
+    `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
+    `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
+    (N, joints with backlash) is the sign of the gravity torque at `flank_joints`.
     """
 
     plan: PosePlan
     criterion: Criterion
-    candidates: np.ndarray
+    candidates: PosePool
     selection: Selection
     base: BaseSensitivity
     tool_weight: np.ndarray
@@ -62,9 +60,9 @@ class PoseDesign:
         return self.base.identifiability
 
     @property
-    def observability(self) -> Observability:
-        """O1-O5 of the chosen poses."""
-        return observability(self.base.sensitivity, self.selection.chosen)
+    def numbers(self) -> np.ndarray:
+        """The numbers (N,) of the chosen poses among the candidates, in the order of the plan."""
+        return self.candidates.pose[self.selection.chosen]
 
     @property
     def tool_error(self) -> float:
@@ -74,47 +72,34 @@ class PoseDesign:
         """
         return tool_error(self.base, self.tool_weight, self.selection.chosen)
 
+    @property
+    def criteria(self) -> dict[CriterionName, float]:
+        """What every criterion says of the chosen poses.
+
+        `c` is the tool error (m); `A` the sum of the parameters' variances in units of their tolerances and `D` log det M / p, both with
+        the tolerances as prior; `E` (σ_min of ΘᵀΘ) and O1-O5 are of the measurements alone.
+        """
+        sensitivity, chosen = self.base.sensitivity, self.selection.chosen
+        factor = sensitivity.factor(chosen)
+        information = factor.T @ factor
+        seen = observability(sensitivity, chosen)
+        return {
+            "c": self.tool_error,
+            "A": TraceOptimal(np.eye(len(information)), "A").trace(information),
+            "D": DOptimal().merit(information),
+            "E": seen.sigma_min,
+            "O1": seen.o1,
+            "O2": seen.o2,
+            "O3": seen.o3,
+            "O4": seen.o4,
+            "O5": seen.o5,
+        }
+
 
 def tool_error(base: BaseSensitivity, tool_weight: np.ndarray, chosen: np.ndarray) -> float:
     """Predicted root mean square (m) of the tool error over the working poses behind `tool_weight` after measuring `chosen`."""
     factor = base.sensitivity.factor(chosen)
     return TraceOptimal(tool_weight, "c").trace(factor.T @ factor) ** 0.5
-
-
-def choose_poses(
-    model: RobotModel,
-    count: int,
-    *,
-    rng: np.random.Generator,
-    criterion: CriterionName = "c",
-    candidates: int = 4000,
-    working: np.ndarray | None = None,
-    payload: float | None = None,
-    point: str | None = None,
-    station: str | None = None,
-    acceptance: Acceptance | None = None,
-    noise: TrackerNoise | None = None,
-    tolerances: Tolerances | None = None,
-    collision_margin: float = 0.01,
-    floor: float | None = 0.0,
-) -> PosePlan:
-    """The `count` calibration poses that tell most: `design_poses`, of which only the plan is wanted."""
-    return design_poses(
-        model,
-        count,
-        rng=rng,
-        criterion=criterion,
-        candidates=candidates,
-        working=working,
-        payload=payload,
-        point=point,
-        station=station,
-        acceptance=acceptance,
-        noise=noise,
-        tolerances=tolerances,
-        collision_margin=collision_margin,
-        floor=floor,
-    ).plan
 
 
 def design_poses(
@@ -123,66 +108,61 @@ def design_poses(
     *,
     rng: np.random.Generator,
     criterion: CriterionName = "c",
-    candidates: int = 4000,
+    candidates: int | PosePool = 4000,
+    setup: MeasuringSetup = STANDARD,
     working: np.ndarray | None = None,
-    payload: float | None = None,
-    point: str | None = None,
-    station: str | None = None,
-    acceptance: Acceptance | None = None,
-    noise: TrackerNoise | None = None,
-    tolerances: Tolerances | None = None,
-    collision_margin: float = 0.01,
-    floor: float | None = 0.0,
+    checker: CollisionChecker | None = None,
+    progress: Progress = silent,
 ) -> PoseDesign:
-    """Choose `count` of many random poses by exchange (P1 §5.2).
+    """Choose `count` of many random poses, or of a pool of given ones, by exchange (P1 §5.2).
 
-    Candidates keep to the joint limits, collide with nothing (`collision_margin` m; `floor` m along the base's z, None for none), show
-    the target to the instrument, and have every backlash surely preloaded by gravity. Their sensitivities to the geometric errors are
-    reduced to what can be identified. Criteria: `c` the tool error predicted over the `working` poses (W, n), by default random
-    ones over the whole workspace; `A` the sum of the variances in units of the tolerances; `D` the volume of the confidence
-    ellipsoid; `E` σ_min of ΘᵀΘ; `O1`-`O5` the observability indices. `payload` in kg, None for the declared one.
+    Random candidates keep to the joint limits, collide with nothing (`checker`, by default with 10 mm of margin and a floor at the base)
+    and show the target to the instrument; those of a pool are taken to. In all of them gravity must surely preload every backlash:
+    others are left out. Their sensitivities to the geometric errors are reduced to what can be identified. Criteria: `c` the tool
+    error predicted over the `working` poses (W, n), by default random ones over the whole workspace; `A` the sum of the
+    variances in units of the tolerances; `D` the volume of the confidence ellipsoid; `E` σ_min of ΘᵀΘ; `O1`-`O5` the
+    observability indices. A pool's payload counts for it where `setup` has none.
 
     Raises `FlexcalError` for an unknown criterion, where the poses are fewer than the parameters need, where too few candidates pass the
     checks, and where all of them press a backlash onto one flank.
     """
-    checker = CollisionChecker(model, margin=collision_margin, floor=floor)
-    q = random_candidates(
-        checker,
-        candidates,
-        rng,
-        payload=payload,
-        preload=True,
-        point=point,
-        station=station,
-        acceptance=acceptance,
-    )
-    _check_flanks(model, q, payload)
-    full = pose_sensitivity(
-        model, q, payload=payload, point=point, station=station, noise=noise, tolerances=tolerances
-    )
-    base = base_sensitivity(full)
+    checker = CollisionChecker(model) if checker is None else checker
+    if isinstance(candidates, PosePool):
+        if setup.payload is None:
+            setup = replace(setup, payload=candidates.payload)
+        pool = candidates.subset(preloaded(model, candidates.q, setup.payload))
+        if len(pool) < count:
+            raise FlexcalError(
+                f"the pool holds {len(candidates)} poses, and gravity surely settles the flank of every backlash in {len(pool)} of them; "
+                f"{count} cannot be chosen."
+            )
+    else:
+        q = random_candidates(checker, candidates, rng, setup, preload=True, progress=progress)
+        pool = PosePool(q, np.arange(1, len(q) + 1))
+    _check_flanks(model, pool.q, setup.payload)
+    base = base_sensitivity(pose_sensitivity(model, pool.q, setup))
     if 3 * count < base.identifiability.rank:
         raise FlexcalError(
             f"{count} poses cannot determine {base.identifiability.rank} geometric parameters of {model.name}; "
             f"choose at least {-(-base.identifiability.rank // 3)}, better twice as many."
         )
     if working is None:
-        working = random_candidates(checker, WORKING_POSES, rng, point=point)
-    weight = tool_weight(base, model, working, payload=payload, point=point, station=station)
+        anywhere = replace(setup, acceptance=None)
+        working = random_candidates(checker, WORKING_POSES, rng, anywhere)
+    weight = tool_weight(base, model, working, setup)
     wanted = criterion_named(criterion, weight)
-    selection = exchange(base.sensitivity, count, wanted)
-    chosen = q[selection.chosen]
-    masses = None if payload is None else np.full(count, payload)
+    selection = exchange(base.sensitivity, count, wanted, progress=progress)
+    chosen = pool.q[selection.chosen]
     loose = list(preload_joints(model))
     return PoseDesign(
-        plan=PosePlan(q=chosen, payload=masses, seed=int(rng.integers(2**31))),
+        plan=_plan(chosen, setup, rng),
         criterion=wanted,
-        candidates=q,
+        candidates=pool,
         selection=selection,
         base=base,
         tool_weight=weight,
         flank_joints=tuple(model.joint_names[i] for i in loose),
-        flank=np.sign(gravity_torque(model, chosen, payload))[:, loose],
+        flank=np.sign(gravity_torque(model, chosen, setup.payload))[:, loose],
     )
 
 
@@ -190,35 +170,23 @@ def random_poses(
     model: RobotModel,
     count: int,
     rng: np.random.Generator,
+    setup: MeasuringSetup = STANDARD,
     *,
-    payload: float | None = None,
-    point: str | None = None,
-    station: str | None = None,
-    acceptance: Acceptance | None = None,
-    collision_margin: float = 0.01,
-    floor: float | None = 0.0,
+    checker: CollisionChecker | None = None,
 ) -> PosePlan:
     """Verification poses: uniform over the joint ranges, free of collision, visible, on whatever flank they happen to be.
 
     Raises `FlexcalError` where too few random poses pass the checks.
     """
-    checker = CollisionChecker(model, margin=collision_margin, floor=floor)
-    q = random_candidates(checker, count, rng, point=point, station=station, acceptance=acceptance)
-    masses = None if payload is None else np.full(count, payload)
-    return PosePlan(q=q, payload=masses, seed=int(rng.integers(2**31)))
+    checker = CollisionChecker(model) if checker is None else checker
+    return _plan(random_candidates(checker, count, rng, setup), setup, rng)
 
 
 def tool_weight(
-    base: BaseSensitivity,
-    model: RobotModel,
-    working: np.ndarray,
-    *,
-    payload: float | None = None,
-    point: str | None = None,
-    station: str | None = None,
+    base: BaseSensitivity, model: RobotModel, working: np.ndarray, setup: MeasuringSetup = STANDARD
 ) -> np.ndarray:
     """W = mean over the `working` poses (W, n) of JᵀJ (rank, rank), m²: tr(W Σ) is the mean square error of the tool position."""
-    names, jacobian = geometry_jacobian(model, working, payload=payload, point=point, station=station)
+    names, jacobian = geometry_jacobian(model, working, setup)
     assert names == base.identifiability.names
     rows = base.columns(jacobian).reshape(-1, len(base.scale))
     return rows.T @ rows / len(jacobian)
@@ -236,6 +204,11 @@ def criterion_named(name: CriterionName, weight: np.ndarray) -> Criterion:
         case "E" | "O1" | "O2" | "O3" | "O4" | "O5":
             return SpectralCriterion(name)
     raise FlexcalError(f"there is no criterion '{name}'; choose one of {', '.join(get_args(CriterionName))}.")
+
+
+def _plan(q: np.ndarray, setup: MeasuringSetup, rng: np.random.Generator) -> PosePlan:
+    masses = None if setup.payload is None else np.full(len(q), setup.payload)
+    return PosePlan(q=q, payload=masses, seed=int(rng.integers(2**31)))
 
 
 def _check_flanks(model: RobotModel, q: np.ndarray, payload: float | None) -> None:

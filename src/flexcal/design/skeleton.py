@@ -6,7 +6,7 @@ import numpy as np
 
 from flexcal.model import Joint, RobotModel, point_kinematics
 from flexcal.model.kinematics import joint_batch
-from flexcal.model.rotations import axis_rotation
+from flexcal.model.placement import joint_placement
 
 
 def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -18,17 +18,13 @@ def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
     rotation = np.empty((len(q), model.n, 3, 3))
     origin = np.empty((len(q), model.n, 3))
     for i, joint in enumerate(model.joints):
-        _, about_first, about_second = model.geometry[i, :3]
-        aligned = axis_rotation(joint.normals[1], about_second) @ axis_rotation(joint.normals[0], about_first)
-        turn = joint.rotation @ aligned
-        shift = joint.translation
+        shift, turn = joint_placement(model, i)
         moved = q[:, i] + model.geometry[i, 0]
         if joint.parent < 0:
             turned, origin[:, i] = np.broadcast_to(turn, (len(q), 3, 3)), shift
         else:
             parent = rotation[:, joint.parent]
-            turned = parent @ turn
-            origin[:, i] = origin[:, joint.parent] + parent @ (shift + model.geometry[joint.parent, 3:])
+            turned, origin[:, i] = parent @ turn, origin[:, joint.parent] + parent @ shift
         if joint.kind == "prismatic":
             rotation[:, i] = turned
             origin[:, i] += moved[:, None] * (turned @ joint.axis)

@@ -7,13 +7,14 @@ are then judged by their exact eigenvalues.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from flexcal.design.criteria import DOptimal, SpectralCriterion, TraceOptimal
-from flexcal.design.exchange import Selection, exchange, greedy
+from flexcal.design.exchange import CHOOSING, Selection, exchange, greedy
 from flexcal.estimation import Sensitivity
+from flexcal.progress import Progress, silent
 
 SCREENED = 16
 """Candidates whose eigenvalues are found exactly in every step."""
@@ -82,6 +83,7 @@ def spectral_exchange(
     *,
     start: Sequence[int] | np.ndarray | None = None,
     passes: int = 20,
+    progress: Progress = silent,
 ) -> Selection:
     """As `exchange`, for E and O2-O5: excursions, then exchanges member by member, until both fail. O1 is D in other words.
 
@@ -89,30 +91,48 @@ def spectral_exchange(
     too small has σ_min = 0 and σ_min has many local optima; the better result counts.
     """
     if criterion.name == "O1":
-        found = exchange(sensitivity, count, DOptimal(uses_prior=False), start=start, passes=passes)
+        found = exchange(
+            sensitivity, count, DOptimal(uses_prior=False), start=start, passes=passes, progress=progress
+        )
         merits = np.exp(0.5 * np.array(found.history))
         return Selection(found.chosen, float(np.exp(0.5 * found.merit)), tuple(merits.tolist()))
-    if start is not None:
-        return _from(sensitivity, [int(i) for i in start], criterion, passes)
-    smooth = TraceOptimal(np.eye(sensitivity.jacobian.shape[2]), "A", uses_prior=False)
-    first = greedy(sensitivity, count, smooth).chosen
-    starts = (first, exchange(sensitivity, count, smooth, start=first).chosen)
-    tried = [_from(sensitivity, [int(i) for i in chosen], criterion, passes) for chosen in starts]
+    progress(CHOOSING, 0.0)
+    starts = [start] if start is not None else _starts(sensitivity, count)
+    tried = []
+    for number, chosen in enumerate(starts):
+
+        def tell(share: float, done: int = number) -> None:
+            progress(CHOOSING, (done + share) / len(starts))
+
+        tried.append(_from(sensitivity, [int(i) for i in chosen], criterion, passes, tell))
     return max(tried, key=lambda selection: selection.merit)
 
 
+def _starts(sensitivity: Sensitivity, count: int) -> tuple[np.ndarray, np.ndarray]:
+    """The greedy and the exchanged A-optimal set."""
+    smooth = TraceOptimal(np.eye(sensitivity.jacobian.shape[2]), "A", uses_prior=False)
+    first = greedy(sensitivity, count, smooth).chosen
+    return first, exchange(sensitivity, count, smooth, start=first).chosen
+
+
 def _from(
-    sensitivity: Sensitivity, chosen: list[int], criterion: SpectralCriterion, passes: int
+    sensitivity: Sensitivity,
+    chosen: list[int],
+    criterion: SpectralCriterion,
+    passes: int,
+    tell: Callable[[float], None],
 ) -> Selection:
     pool = _Pool(sensitivity, criterion, chosen)
     merit = criterion.merit(pool.information)
     history = [merit]
-    for _ in range(passes):
+    for number in range(passes):
+        tell(number / passes)
         merit = _excursions(pool, chosen, merit)
         merit = _exchange_once(pool, chosen, merit)
         history.append(merit)
         if not merit > history[-2] * (1 + _ENOUGH):
             break
+    tell(1.0)
     return Selection(np.array(chosen), merit, tuple(history))
 
 

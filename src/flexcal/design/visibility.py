@@ -2,34 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from flexcal.design.collision import CollisionChecker
+from flexcal.design.setup import STANDARD, MeasuringSetup
 from flexcal.design.skeleton import link_frames
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, point_kinematics
-from flexcal.units import DEGREE
 
-
-@dataclass(frozen=True, eq=False)
-class Acceptance:
-    """A reflector fixed to the tool sees within `half_angle` (rad) of `axis` (3,), given in the frame of its point.
-
-    A spherically mounted reflector accepts ±30°. One that the user turns towards the instrument by hand needs none of this.
-    """
-
-    axis: np.ndarray
-    half_angle: float = 30 * DEGREE
-
-    def __post_init__(self) -> None:
-        axis = np.asarray(self.axis, dtype=float)
-        if axis.shape != (3,) or not np.linalg.norm(axis) > 0 or not 0 < self.half_angle <= np.pi:
-            raise FlexcalError(
-                "an acceptance needs an axis of three numbers, not all zero, and a half angle between 0 and π."
-            )
-        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
+BEAM_RADIUS = 0.01
+"""m, of the line of sight."""
+TARGET_CLEARANCE = 0.03
+"""m before the target at which the line of sight ends: the reflector sits on something."""
 
 
 def station_position(model: RobotModel, station: str | None = None) -> np.ndarray | None:
@@ -46,37 +30,25 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
     return None if entry is None else np.array(entry.xyz)
 
 
-def visible(
-    checker: CollisionChecker,
-    q: np.ndarray,
-    *,
-    point: str | None = None,
-    station: str | None = None,
-    acceptance: Acceptance | None = None,
-    beam_radius: float = 0.01,
-    target_clearance: float = 0.03,
-) -> np.ndarray:
+def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = STANDARD) -> np.ndarray:
     """Whether the instrument sees the target at each configuration of `q` (samples, n), as (samples,) of bool.
 
-    The line of sight is a cylinder of `beam_radius` (m) that ends `target_clearance` (m) before the target, since the reflector sits on
-    something; it is only asked for where the station declares `line_of_sight`. Obstacles block it too. A robot.yaml without
-    the station's place sees everything. Raises `FlexcalError` for an unknown point or station.
+    The line of sight is a cylinder; it is only asked for where the station declares `line_of_sight`. Obstacles block it too. A robot.yaml
+    without the station's place sees everything. Raises `FlexcalError` for an unknown point or station.
     """
     model = checker.model
-    origin = station_position(model, station)
+    origin = station_position(model, setup.station)
     if origin is None:
         return np.ones(len(q), dtype=bool)
-    target = point_kinematics(model, q, point=point, jacobians=False)
+    target = point_kinematics(model, q, point=setup.point, jacobians=False)
     seen = np.ones(len(q), dtype=bool)
-    if acceptance is not None:
+    if setup.acceptance is not None:
         towards = origin - target.position
-        cosine = np.einsum("sij,j,si->s", target.orientation, acceptance.axis, towards) / np.linalg.norm(
-            towards, axis=1
-        )
-        seen &= cosine >= np.cos(acceptance.half_angle)
-    if model.config.stations[model.stations[0] if station is None else station].line_of_sight:
+        cosine = np.einsum("sij,j,si->s", target.orientation, setup.acceptance.axis, towards)
+        seen = cosine >= np.cos(setup.acceptance.half_angle) * np.linalg.norm(towards, axis=1)
+    if model.config.stations[setup.station or model.stations[0]].line_of_sight:
         left = np.flatnonzero(seen)
-        seen[left] = ~blocked(checker, q[left], origin, target.position[left], beam_radius, target_clearance)
+        seen[left] = ~blocked(checker, q[left], origin, target.position[left], BEAM_RADIUS, TARGET_CLEARANCE)
     return seen
 
 

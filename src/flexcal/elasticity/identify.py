@@ -14,11 +14,12 @@ from flexcal.elasticity.parameters import stage_one_parameters
 from flexcal.elasticity.prediction import PoseModel, ResponseModel
 from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
 from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
-from flexcal.elasticity.search import MultiStart, Progress, Search
+from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
 from flexcal.estimation import Estimate, Parameters, Problem, solve
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
 
 ROUNDS = 2
 """How often model error and reference motion are evaluated about the last estimate and the fit is repeated."""
@@ -55,7 +56,7 @@ def identify_stiffness(
     weighting: Weighting | None = None,
     search: Search | None = None,
     tolerances: Tolerances | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> StiffnessResult:
     """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
 
@@ -80,6 +81,7 @@ def identify_stiffness(
     shifts = [np.zeros_like(response.response) for response in responses]
     estimate = None
     rounds = ROUNDS if tolerances.any or reference is not None else 1
+    progress("fitting", 0.0)
     for number in range(rounds):
         if reference is not None:
             shifts = reference_shifts(measured.model, x, reference)
@@ -88,8 +90,7 @@ def identify_stiffness(
         last = number == rounds - 1
         estimate = _fit(residual, error, parameters, x, 1e-7 if last else 1e-3)
         x = estimate.parameters.coordinates()
-        if progress is not None:
-            progress("fitting", (number + 1) / rounds)
+        progress("fitting", (number + 1) / rounds)
     assert estimate is not None
     predicted = tuple(g + shift for g, shift in zip(measured.model.responses(x), shifts, strict=True))
     pairs = list(zip(measured.poses, predicted, strict=True))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
@@ -15,9 +15,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameters, Problem, solve
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-
-Progress = Callable[[str, float], None]
-"""Called with what is being done and the fraction of it that is done."""
+from flexcal.progress import Progress, silent
 
 
 class Search(Protocol):
@@ -29,7 +27,7 @@ class Search(Protocol):
         responses: Sequence[FrequencyResponse],
         parameters: Parameters,
         rng: np.random.Generator,
-        progress: Progress | None = None,
+        progress: Progress = silent,
     ) -> np.ndarray:
         """Estimation coordinates (p,) to start the fit from."""
         ...
@@ -67,7 +65,7 @@ class MultiStart:
         responses: Sequence[FrequencyResponse],
         parameters: Parameters,
         rng: np.random.Generator,
-        progress: Progress | None = None,
+        progress: Progress = silent,
     ) -> np.ndarray:
         """The best end point; see the class."""
         thinned = thin(responses, self.lines)
@@ -77,6 +75,7 @@ class MultiStart:
         problem = Problem(parameters, residual.linearise, residual.residual)
         springs = [parameters.index(name) for name in spring_names(robot)]
         ends: list[tuple[float, np.ndarray]] = []
+        progress("searching", 0.0)
         for number in range(self.starts):
             x = parameters.coordinates()
             if number:
@@ -87,14 +86,14 @@ class MultiStart:
                 continue
             ends.append((end.cost, end.parameters.coordinates()))
             lowest = min(cost for cost, _ in ends)
-            if progress is not None:
-                progress("searching", (number + 1) / self.starts)
+            progress("searching", (number + 1) / self.starts)
             if sum(cost < 1.02 * lowest + 0.5 for cost, _ in ends) >= self.agreement:
                 break
         if not ends:
             raise FlexcalError(
                 "The elastic robot could not be evaluated at any start; check the stiffnesses in robot.yaml."
             )
+        progress("searching", 1.0)
         return min(ends, key=lambda end: end[0])[1]
 
 
@@ -117,7 +116,7 @@ class PopulationSearch:
         responses: Sequence[FrequencyResponse],
         parameters: Parameters,
         rng: np.random.Generator,
-        progress: Progress | None = None,
+        progress: Progress = silent,
     ) -> np.ndarray:
         """The best individual of the last generation; see the class."""
         from scipy.optimize import differential_evolution
@@ -128,6 +127,7 @@ class PopulationSearch:
         start = parameters.coordinates()
         scales = [_element_scale(response.response) for response in thinned]
         done = 0
+        progress("searching", 0.0)
 
         def cost(u: np.ndarray) -> float:
             x = start.copy()
@@ -142,8 +142,7 @@ class PopulationSearch:
         def tell(_: np.ndarray, convergence: float = 0.0) -> None:
             nonlocal done
             done += 1
-            if progress is not None:
-                progress("searching", done / self.generations)
+            progress("searching", done / self.generations)
 
         found = differential_evolution(
             cost,
@@ -155,6 +154,7 @@ class PopulationSearch:
             rng=rng,
             callback=tell,
         )
+        progress("searching", 1.0)
         start[springs] += found.x
         return start
 

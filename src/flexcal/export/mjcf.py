@@ -9,6 +9,7 @@ placement, the length errors in the placement of the next body.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -19,7 +20,8 @@ from flexcal.atomic import write_text
 from flexcal.errors import FlexcalError
 from flexcal.model import Inertia, RobotModel
 from flexcal.model.inertia import parallel_axis
-from flexcal.model.rotations import axis_rotation, rotation_wxyz
+from flexcal.model.placement import link_placement, point_placement
+from flexcal.model.rotations import rotation_wxyz
 
 if TYPE_CHECKING:
     import mujoco
@@ -44,6 +46,8 @@ def mjcf_spec(
     """
     import mujoco
 
+    if mujoco.get_mju_user_warning() is None:  # MuJoCo would leave a MUJOCO_LOG.TXT in the current folder
+        mujoco.set_mju_user_warning(logging.getLogger("flexcal.mujoco").warning)
     motors = set(range(model.n)) if free is None else set(free)
     if len(motors) < model.n and q is None:
         raise FlexcalError("joints are to be locked but no pose is given; pass q, one value per joint.")
@@ -57,11 +61,7 @@ def mjcf_spec(
     for i, inertia in enumerate(carried_inertias(model, payload)):
         joint = model.joints[i]
         parent = spec.worldbody if joint.parent < 0 else bodies[joint.parent]
-        position, rotation = joint_placement(model, i)
-        if i not in motors and joint.kind == "prismatic":
-            position = position + rotation @ joint.axis * at[i]
-        elif i not in motors:
-            rotation = rotation @ axis_rotation(joint.axis, at[i])
+        position, rotation = link_placement(model, i, 0.0 if i in motors else at[i])
         body = parent.add_body(name=joint.link, pos=position, quat=rotation_wxyz(rotation))
         body.mass = inertia.mass
         body.ipos = inertia.com
@@ -88,34 +88,6 @@ def write_mjcf(model: RobotModel, path: str | Path) -> None:
     write_text(path, spec.to_xml())
 
 
-def joint_placement(model: RobotModel, i: int) -> tuple[np.ndarray, np.ndarray]:
-    """Position (3,) m and rotation (3, 3) of joint `i` at q = 0 in its parent link, with every geometric error."""
-    joint, geometry = model.joints[i], model.geometry[i]
-    length = np.zeros(3) if joint.parent < 0 else model.geometry[joint.parent, 3:]
-    rotation = (
-        joint.rotation
-        @ axis_rotation(joint.normals[1], geometry[2])
-        @ axis_rotation(joint.normals[0], geometry[1])
-    )
-    position = joint.translation + length
-    if joint.kind == "prismatic":
-        return position + rotation @ joint.axis * geometry[0], rotation
-    return position, rotation @ axis_rotation(joint.axis, geometry[0])
-
-
-def point_placement(model: RobotModel, name: str) -> tuple[int, np.ndarray, np.ndarray]:
-    """Joint whose link carries a target, its position (3,) m and frame (3, 3) in that link, with the errors of link and tool."""
-    point = model.point(name)
-    tool, own = model.tool, model.point_error[list(model.points).index(name)]
-    x, y, z = np.eye(3)
-    rotation = (
-        point.rotation @ axis_rotation(y, tool[2]) @ axis_rotation(x, tool[1]) @ axis_rotation(z, tool[0])
-    )
-    length = tool[3:] if name == next(iter(model.points)) else np.zeros(3)
-    position = point.translation + model.geometry[point.joint, 3:] + rotation @ (point.xyz + own + length)
-    return point.joint, position, rotation
-
-
 def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
     """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
     held = model.payload
@@ -128,12 +100,11 @@ def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[I
     mass = held.mass if payload is None else payload
     if mass == 0:
         return model.inertias
-    own = held.rotation @ held.inertia @ held.rotation.T * (mass / held.mass if held.mass > 0 else 1.0)
-    link = model.inertias[held.joint]
+    link, own = model.inertias[held.joint], held.carried(mass)
     total = link.mass + mass
-    com = (link.mass * link.com + mass * held.com_in_link) / total
-    inertia = link.inertia + own
-    inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, held.com_in_link - com)
+    com = (link.mass * link.com + mass * own.com) / total
+    inertia = link.inertia + own.inertia
+    inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, own.com - com)
     return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
 
 

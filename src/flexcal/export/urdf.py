@@ -11,7 +11,8 @@ import numpy as np
 from flexcal.atomic import write_text
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, point_kinematics, static_equilibrium
-from flexcal.model.rotations import axis_rotation, rotation_rpy, rpy_rotation
+from flexcal.model.placement import link_placement, point_placement
+from flexcal.model.rotations import rotation_rpy, rpy_rotation
 from flexcal.units import MILLIMETRE
 
 _SAMPLES = 2000
@@ -47,19 +48,10 @@ def write_urdf(model: RobotModel, path: str | Path, *, rng: np.random.Generator 
     root = tree.getroot()
     joints = {joint.get("name"): joint for joint in root.findall("joint")}
     for i, joint in enumerate(model.joints):
-        errors = model.geometry[i]
-        length = model.geometry[joint.parent, 3:] if joint.parent >= 0 else np.zeros(3)
-        turn = (
-            axis_rotation(joint.normals[1], errors[2]) @ axis_rotation(joint.normals[0], errors[1])
-            if joint.kind == "prismatic"
-            else axis_rotation(joint.normals[1], errors[2])
-            @ axis_rotation(joint.normals[0], errors[1])
-            @ axis_rotation(joint.axis, errors[0])
-        )
-        shift = joint.rotation.T @ length
-        if joint.kind == "prismatic":
-            shift = shift + turn @ joint.axis * errors[0]
-        _move(joints[joint.name], shift, turn)
+        position, rotation = link_placement(model, i)
+        if (position != joint.translation).any() or (rotation != joint.rotation).any():
+            shift = joint.rotation.T @ (position - joint.translation)
+            _move(joints[joint.name], shift, joint.rotation.T @ rotation)
     _add_points(model, root)
     ET.indent(tree)
     text = ET.tostring(root, encoding="unicode", xml_declaration=False)
@@ -68,9 +60,7 @@ def write_urdf(model: RobotModel, path: str | Path, *, rng: np.random.Generator 
 
 
 def _move(joint: ET.Element, shift: np.ndarray, turn: np.ndarray) -> None:
-    """Append Trans(shift) · turn to a joint's origin; leaves the origin as it was written where both are nothing."""
-    if not shift.any() and (turn == np.eye(3)).all():
-        return
+    """Append Trans(shift) · turn to a joint's origin."""
     origin = joint.find("origin")
     if origin is None:
         origin = ET.SubElement(joint, "origin")
@@ -86,22 +76,16 @@ def _place(origin: ET.Element, xyz: np.ndarray, rotation: np.ndarray) -> None:
 
 def _add_points(model: RobotModel, root: ET.Element) -> None:
     links = {link.get("name") for link in root.findall("link")}
-    z, x, y = np.eye(3)[[2, 0, 1]]
-    tool_turn = (
-        axis_rotation(y, model.tool[2]) @ axis_rotation(x, model.tool[1]) @ axis_rotation(z, model.tool[0])
-    )
-    for k, (name, point) in enumerate(model.points.items()):
+    for name in model.points:
         if name in links:
             raise FlexcalError(
                 f"the point '{name}' has the name of a link of {model.urdf.name}; rename it under `points:`."
             )
-        offset = point.xyz + model.point_error[k] + (model.tool[3:] if k == 0 else 0.0)
-        rotation = point.rotation @ tool_turn
+        carrier, position, rotation = point_placement(model, name)
         ET.SubElement(root, "link", name=name)
         joint = ET.SubElement(root, "joint", name=f"{name}_point", type="fixed")
-        arm = point.translation + model.geometry[point.joint, 3:]
-        _place(ET.SubElement(joint, "origin"), arm + rotation @ offset, rotation)
-        ET.SubElement(joint, "parent", link=model.joints[point.joint].link)
+        _place(ET.SubElement(joint, "origin"), position, rotation)
+        ET.SubElement(joint, "parent", link=model.joints[carrier].link)
         ET.SubElement(joint, "child", link=name)
 
 

@@ -1,7 +1,7 @@
 """From recordings of multisine experiments to frequency response matrices with their covariances."""
 
 from flexcal.frequency.averages import Average
-from flexcal.frequency.local_polynomial import local_polynomial, local_polynomial_response
+from flexcal.frequency.local_polynomial import local_polynomial_responses
 from flexcal.frequency.multisine import (
     crest_factor,
     half_integer_frequency,
@@ -24,8 +24,7 @@ __all__ = [
     "frequency_responses",
     "half_integer_frequency",
     "leave_out_detection_lines",
-    "local_polynomial",
-    "local_polynomial_response",
+    "local_polynomial_responses",
     "noise_lines",
     "odd_lines",
     "optimise_crest",

@@ -37,7 +37,7 @@ def average_response(spectra: ExperimentSpectra, realisations: np.ndarray, avera
             return joint_input_output(spectra.acceleration, spectra.torque, spectra.excitation)
         case "errors_in_variables":
             return errors_in_variables(spectra.acceleration, spectra.torque, spectra.noise)
-    raise FlexcalError(f"There is no average {average!r}; choose one of {', '.join(get_args(Average))}.")
+    raise FlexcalError(f"there is no average {average!r}; choose one of {', '.join(get_args(Average))}.")
 
 
 def arithmetic(realisations: np.ndarray) -> np.ndarray:

@@ -1,107 +1,177 @@
-"""Local polynomial method: a frequency response from few experiments, or from records that never reach a steady state.
+"""Robust local polynomial method: a frequency response from few experiments, or from records that never reach a steady state.
 
-Pintelon and Schoukens 2012, ch. 7: around every line, Y(k+d) = (Σ_m G_m d^m) U(k+d) + Σ_m T_m d^m + V(k+d) is fitted by
-least squares, with the plant G shared by all experiments and a transient (leakage) term T for each. G_0 is the response.
+Pintelon and Schoukens 2012, ch. 7. A transient leaks smoothly over frequency, so near a line it is the polynomial through the bins
+between the lines, which carry nothing else but noise: it is taken out of position and torque alike. What is left over a few lines and
+all experiments, Y(k+d) = (Σ_m G_m d^m) U(k+d) + V(k+d), gives G_0, the response, by least squares; the scatter about it is noise,
+distortion, and what a parabola misses of a resonance.
 """
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.data import MultisinePlan, Recording
 from flexcal.errors import FlexcalError
 from flexcal.frequency import covariance as cov
-from flexcal.frequency.spectrum import torque_hold
+from flexcal.frequency.periods import column_factor
+from flexcal.frequency.records import PoseRecords, by_pose
+from flexcal.frequency.response import SMALLEST_FREEDOM, FrequencyResponse, axis_names
+from flexcal.frequency.spectrum import has_reference, kept_samples
 
 ORDER = 2
+LEAST_LINES, MOST_LINES = 3, 7
+"""Lines in a window: enough for a parabola, and not so many that a resonance is none."""
+TRANSIENT_BINS = 12
+"""Bins between the lines that a transient is found from."""
 _RANK_TOLERANCE = 1e-10
 
 
-def local_polynomial(
-    inputs: np.ndarray, outputs: np.ndarray, bins: np.ndarray, half_width: int, order: int = ORDER
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """G and its covariance from the full-record spectra of E experiments: U (E, K, n_u), Y (E, K, n_y) at bins 0…K-1.
+@dataclass(frozen=True, eq=False)
+class LocalFit:
+    """`response` (L, n_y, n_u); the covariance of its vec (column-major) is `gain` (L, n_u, n_u) ⊗ `scatter` (L, n_y, n_y).
 
-    `bins` (L,) are where G is wanted, `half_width` the bins on either side that take part. Returns G (L, n_y, n_u), the
-    covariance (L, n_y n_u, n_y n_u) of vec G (column-major; from the residuals: noise and distortion together) and the
-    residual degrees of freedom of a window. Raises `FlexcalError` where a window has too few bins, or where the
-    excitation in it does not tell the inputs apart.
+    `scatter` is that of the outputs about the fit, with `degrees_of_freedom`.
     """
-    experiments, count, n_u = inputs.shape
-    n_y = outputs.shape[-1]
-    width = 2 * half_width + 1
-    unknowns = (order + 1) * (n_u + experiments)
-    freedom = experiments * width - unknowns
-    if freedom < n_y or width > count:
-        raise FlexcalError(
-            f"A window of {width} bins and {experiments} experiments cannot determine {unknowns} unknowns and a "
-            f"covariance; the record has {count} bins: widen the window or record longer."
-        )
-    start = np.clip(np.asarray(bins) - half_width, 0, count - width)
-    window = start[:, None] + np.arange(width)
-    distance = (window - np.asarray(bins)[:, None]) / half_width
-    powers = distance[:, :, None] ** np.arange(order + 1)  # (L, W, M)
 
+    response: np.ndarray
+    gain: np.ndarray
+    scatter: np.ndarray
+    degrees_of_freedom: int
+
+
+def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> LocalFit:
+    """The fit to the spectra of E experiments at L lines, U (E, L, n_u) and Y (E, L, n_y), from the `count` lines around each.
+
+    Raises `FlexcalError` where these are too few, or where the excitation does not tell the inputs apart.
+    """
+    experiments, lines, n_u = inputs.shape
+    unknowns = (ORDER + 1) * n_u
+    freedom = experiments * count - unknowns
+    if freedom < outputs.shape[-1] or count > lines:
+        raise FlexcalError(
+            f"a window of {count} of {lines} lines in {experiments} experiments cannot determine {unknowns} unknowns and a "
+            "covariance; measure more lines or experiments."
+        )
+    at = np.arange(lines)
+    window = np.clip(at - count // 2, 0, lines - count)[:, None] + np.arange(count)
+    powers = ((window - at[:, None]) / max(count // 2, 1))[:, :, None] ** np.arange(ORDER + 1)  # (L, W, M)
     u = np.moveaxis(inputs[:, window], 0, 1)  # (L, E, W, n_u)
-    y = np.moveaxis(outputs[:, window], 0, 1).reshape(window.shape[0], -1, n_y)
+    y = np.moveaxis(outputs[:, window], 0, 1).reshape(lines, -1, outputs.shape[-1])
     scale = np.sqrt((np.abs(u) ** 2).mean((1, 2)))[:, None, None, :]
     if not (scale > 0.0).all():
         raise FlexcalError(
-            "An input carries no power in a window of the local polynomial method; widen the window."
+            "an input of the local polynomial method carries no power at some line; excite every axis."
         )
-    plant = powers[:, None, :, :, None] * (u / scale)[:, :, :, None, :]
-    transient = powers[:, None, :, None, :] * np.eye(experiments)[None, :, None, :, None]
-    shape = (window.shape[0], experiments * width, -1)
-    transient = np.broadcast_to(transient, (window.shape[0], experiments, width, experiments, order + 1))
-    regressors = np.concatenate([plant.reshape(shape), transient.reshape(shape)], -1)
-
-    q, r = np.linalg.qr(regressors)
+    regressors = powers[:, None, :, :, None] * (u / scale)[:, :, :, None, :]
+    q, r = np.linalg.qr(regressors.reshape(lines, experiments * count, unknowns))
     diagonal = np.abs(np.diagonal(r, axis1=-2, axis2=-1))
     if (diagonal.min(-1) < _RANK_TOLERANCE * diagonal.max(-1)).any():
         raise FlexcalError(
-            "The excitation in a window of the local polynomial method does not tell the inputs apart; widen the window "
-            "or measure more experiments."
+            "the excitation near some line does not tell the inputs of the local polynomial method apart; measure more experiments."
         )
     projected = np.swapaxes(q, -1, -2).conj() @ y
-    selector = np.broadcast_to(np.eye(r.shape[-1]), r.shape)
-    inverse = np.linalg.solve(r, selector)[:, :n_u]  # the rows of R⁻¹ that belong to G_0
+    inverse = np.linalg.solve(r, np.broadcast_to(np.eye(unknowns), r.shape))[
+        :, :n_u
+    ]  # the rows that belong to G_0
     response = np.swapaxes(inverse @ projected / scale[:, 0, 0, :, None], -1, -2)
+    gain = inverse @ np.swapaxes(inverse, -1, -2).conj() / (scale[:, 0, 0, :, None] * scale[:, 0, 0, None, :])
     residual = y - q @ projected
-    noise = np.swapaxes(residual, -1, -2) @ residual.conj() / freedom
-    gain = inverse @ np.swapaxes(inverse, -1, -2).conj()
-    gain = gain / (scale[:, 0, 0, :, None] * scale[:, 0, 0, None, :])
-    return response, cov.kronecker(gain, noise), freedom
+    return LocalFit(response, gain, np.swapaxes(residual, -1, -2) @ residual.conj() / freedom, freedom)
 
 
-def local_polynomial_response(
-    plan: MultisinePlan, recordings: Iterable[Recording], half_width: int, order: int = ORDER
-) -> tuple[np.ndarray, np.ndarray, int]:
-    """G (L, n, n) in rad/s² per N m at the lines of the plan, with covariance and residual degrees of freedom.
+def without_transient(
+    columns: np.ndarray, lines: np.ndarray, quiet: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Spectra (E, K, c) at the bins `lines` (L,) less the transient, (E, L, c), and the covariance (L, c, c) of what noise leaves there.
 
-    `recordings` are all of one pose and of equal length: one, or several experiments, of any realisation, with or
-    without a steady state; nothing is dropped. They enter as they are: subtract a reference motion first, or leave it
-    out of the plan, and leave the sign of an experiment alone. The record must be a whole number of periods, so the lines
-    are bins of it; `half_width` counts those bins, P of them from line to line over P periods.
+    The transient is a polynomial through the nearest of the bins `quiet` (B,), which carry no periodic signal. Raises `FlexcalError`
+    where these are too few.
     """
-    positions, torques, steps = [], [], set()
-    axes = np.asarray(plan.joints)
-    for recording in recordings:
-        positions.append(recording.q[:, axes] - recording.q[:, axes].mean(0))
-        torques.append(recording.torque[:, axes])
-        steps.add(recording.time_step)
-    if len(steps) != 1 or len({position.shape for position in positions}) != 1:
-        raise FlexcalError("The local polynomial method needs recordings of one length and one sample time.")
-    step, samples = steps.pop(), positions[0].shape[0]
-    bins = np.asarray(plan.lines) * plan.base_frequency_hz * step * samples
-    if np.abs(bins - np.rint(bins)).max() > 1e-6 * samples:
+    if quiet.size < TRANSIENT_BINS:
         raise FlexcalError(
-            "The recordings are not a whole number of periods long; cut them to whole periods."
+            f"{quiet.size} bins between the lines are too few to find a transient from; record more periods or lines."
         )
-    bins = np.rint(bins).astype(int)
-    top = min(bins.max() + half_width + 1, samples // 2)
-    first = max(bins.min() - half_width, 1)
-    omega = 2.0 * np.pi * np.arange(first, top) / (samples * step)
-    hold = torque_hold(plan, omega, step)
-    y = np.fft.rfft(np.stack(positions), axis=1)[:, first:top] * -(omega**2)[:, None]
-    u = np.fft.rfft(np.stack(torques), axis=1)[:, first:top] * hold[:, None]
-    return local_polynomial(u, y, bins - first, half_width, order)
+    first = np.clip(np.searchsorted(quiet, lines) - TRANSIENT_BINS // 2, 0, quiet.size - TRANSIENT_BINS)
+    window = quiet[first[:, None] + np.arange(TRANSIENT_BINS)]  # (L, W)
+    distance = (window - lines[:, None]) / TRANSIENT_BINS
+    powers = distance[:, :, None] ** np.arange(ORDER + 1)
+    q, r = np.linalg.qr(powers)
+    seen = np.moveaxis(columns[:, window], 0, 1)  # (L, E, W, c)
+    projected = np.swapaxes(q, 1, 2)[:, None] @ seen
+    centre = np.linalg.solve(r, np.broadcast_to(np.eye(ORDER + 1), r.shape))[
+        :, :1
+    ]  # the row of the value at the line
+    corrected = columns[:, lines] - np.moveaxis((centre[:, None] @ projected)[:, :, 0], 0, 1)
+    residual = (seen - q[:, None] @ projected).reshape(len(lines), -1, columns.shape[2])
+    noise = np.swapaxes(residual, 1, 2) @ residual.conj() / (len(columns) * (TRANSIENT_BINS - ORDER - 1))
+    return corrected, noise * (1.0 + (centre**2).sum((1, 2)))[:, None, None]
+
+
+def local_polynomial_responses(
+    plan: MultisinePlan, recordings: Iterable[Recording], *, joint_names: Sequence[str] | None = None
+) -> Iterator[FrequencyResponse]:
+    """The frequency response of every pose by the local polynomial method, each yielded when its recordings are complete.
+
+    Nothing is dropped: the settle periods take part, and one realisation is enough. With both signs they are subtracted, which
+    takes the reference motion out; without, there must be none. A window holds as many lines as give the covariance 20 degrees
+    of freedom, from 3 to 7. Raises `FlexcalError` where a recording is missing, double, too short or does not fit.
+    """
+    if has_reference(plan) and not plan.signs:
+        raise FlexcalError(
+            "the local polynomial method cannot tell the reference motion from the response; measure both signs, or without it."
+        )
+    names = axis_names(plan, joint_names)
+    for records in by_pose(plan, recordings, keep_whole):
+        yield _response(records, names)
+
+
+def keep_whole(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray, ...]:
+    """Mean position, and the spectrum (K, 2n) of position and torque over the whole record, at all bins from the first line to the last."""
+    rows, axes = slice(0, kept_samples(plan, recording).stop), np.asarray(plan.joints)
+    position = recording.q[rows]
+    mean = position.mean(0)
+    signal = np.hstack([position[:, axes] - mean[axes], recording.torque[rows][:, axes]])
+    band = np.asarray(plan.lines) * plan.periods
+    return mean, np.fft.rfft(signal, axis=0)[band[0] : band[-1] + 1] * (2.0 / len(signal))
+
+
+def _response(records: PoseRecords, names: tuple[str, ...]) -> FrequencyResponse:
+    plan, n = records.plan, len(records.plan.joints)
+    lines = np.asarray(plan.lines) * plan.periods
+    columns = records.difference(1).reshape(-1, lines[-1] - lines[0] + 1, 2 * n)
+    columns, noise = without_transient(columns, lines - lines[0], _quiet_bins(plan) - lines[0])
+    factor = column_factor(records, np.asarray(plan.lines))
+    columns = columns * factor
+    noise = noise * factor[:, :, None] * factor[:, None, :].conj()
+    needed = -(-(SMALLEST_FREEDOM + (ORDER + 1) * n) // len(columns))
+    fit = local_polynomial(
+        columns[:, :, n:], columns[:, :, :n], int(np.clip(needed + 1 - needed % 2, LEAST_LINES, MOST_LINES))
+    )
+    return FrequencyResponse(
+        frequencies_hz=plan.frequencies_hz,
+        response=fit.response,
+        covariance=cov.kronecker(fit.gain, fit.scatter),
+        noise_covariance=cov.kronecker(fit.gain, cov.output_noise(fit.response, noise)),
+        degrees_of_freedom=fit.degrees_of_freedom,
+        realisations=fit.response[None],
+        joints=names,
+        q_mean=records.q_mean,
+        payload=plan.payload,
+        pose=records.pose,
+        sample_time=records.time_step,
+        average="local_polynomial",
+    )
+
+
+def _quiet_bins(plan: MultisinePlan) -> np.ndarray:
+    """Bins of a record of P periods, from the first line to the last, without anything periodic: distortion keeps to multiples of f0.
+
+    A reference at (m + 1/2) f0 reaches the half-integers too. One period has no bins between; there the even lines are taken.
+    """
+    lines, periods = np.asarray(plan.lines) * plan.periods, plan.periods
+    bins = np.arange(lines[0], lines[-1] + 1)
+    if periods == 1:
+        return bins[bins % 2 == 0]
+    between = bins[bins % periods != 0]
+    return between[2 * between % periods != 0] if has_reference(plan) and periods > 2 else between

@@ -5,6 +5,8 @@ a line of phasor X is |X| cos(2π k f0 t + arg X) in the time domain.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -17,7 +19,7 @@ _PEAK_SAMPLES_PER_LINE = 8  # time grid of the crest factor: samples per period 
 def orthogonal_matrix(n_u: int) -> np.ndarray:
     """The (n_u, n_u) unitary matrix T of eq. (24), T_pq = n_u^(-1/2) exp(j 2π (p-1)(q-1) / n_u), for any n_u ≥ 1."""
     if n_u < 1:
-        raise FlexcalError(f"A multisine needs at least one excited axis, not {n_u}.")
+        raise FlexcalError(f"a multisine needs at least one excited axis, not {n_u}.")
     index = np.arange(n_u)
     return np.exp(2j * np.pi / n_u * ((index[:, None] * index) % n_u)) / np.sqrt(n_u)
 
@@ -30,23 +32,29 @@ def odd_lines(base_frequency_hz: float, low_hz: float, high_hz: float) -> np.nda
     lines = lines[lines % 2 == 1]
     if not lines.size:
         raise FlexcalError(
-            f"No odd multiple of {base_frequency_hz} Hz lies in {low_hz}-{high_hz} Hz; widen the band."
+            f"no odd multiple of {base_frequency_hz} Hz lies in {low_hz}-{high_hz} Hz; widen the band."
         )
     return lines
 
 
-def leave_out_detection_lines(
-    lines: np.ndarray, rng: np.random.Generator, group: int = 4
-) -> tuple[np.ndarray, np.ndarray]:
-    """Split odd lines into (excited, detection): one random line of every `group` successive ones is left out.
+def leave_out_detection_lines(plan: MultisinePlan, group: int = 4) -> MultisinePlan:
+    """The plan without one random line of every `group` successive ones, the others amplified so that the power stays.
 
-    What the detection lines show above the noise is the odd nonlinear distortion (Pintelon & Schoukens 2012, §4.3);
-    the same lines are left out in all experiments, so the excited ones stay orthogonal.
+    What these detection lines show above the noise is the odd nonlinear distortion (Pintelon & Schoukens 2012, §4.3); the same lines are
+    left out in all experiments, so the excited ones stay orthogonal. Which ones is a function of the plan's seed.
     """
-    lines = np.asarray(lines)
+    lines = np.asarray(plan.lines)
+    rng = np.random.default_rng([plan.seed, lines.size])
     starts = np.arange(0, lines.size - group + 1, group)
     left_out = starts + rng.integers(group, size=starts.size)
-    return np.delete(lines, left_out), lines[left_out]
+    kept = np.delete(plan.amplitude, left_out, axis=1)
+    scale = np.sqrt((plan.amplitude**2).sum(1) / (kept**2).sum(1))
+    return replace(
+        plan,
+        lines=np.delete(lines, left_out),
+        detection_lines=lines[left_out],
+        amplitude=kept * scale[:, None],
+    )
 
 
 def half_integer_frequency(base_frequency_hz: float, near_hz: float) -> float:
@@ -65,22 +73,26 @@ def random_phases(plan: MultisinePlan, realisation: int) -> np.ndarray:
     return np.random.default_rng(sequence).uniform(0.0, 2.0 * np.pi, np.shape(plan.amplitude))
 
 
-def spectra(plan: MultisinePlan, realisation: int, phases: np.ndarray | None = None) -> np.ndarray:
+@lru_cache(maxsize=64)
+def phases(plan: MultisinePlan, realisation: int) -> np.ndarray:
+    """The phases (n_u, L) in rad of one realisation as the plan wants them: random, or shifted from there for a low crest factor."""
+    drawn = random_phases(plan, realisation)
+    return optimise_crest(plan.amplitude, drawn, plan.lines) if plan.crest == "optimised" else drawn
+
+
+def spectra(plan: MultisinePlan, realisation: int) -> np.ndarray:
     """Torque phasors Γ (L, n_u, n_u) in N m of eq. (25): rows are axes, column e is experiment e.
 
     Γ(k) = diag(A_i(k) exp(jφ_i(k))) T, so an experiment drives axis i with A_i / √n_u at every line, ΓΓᴴ = diag(A_i²),
-    and the inverse of Γ is as well conditioned as the amplitudes allow. `phases` (n_u, L) replaces the random ones.
+    and the inverse of Γ is as well conditioned as the amplitudes allow.
     """
-    phases = random_phases(plan, realisation) if phases is None else phases
-    diagonal = np.asarray(plan.amplitude) * np.exp(1j * phases)
+    diagonal = np.asarray(plan.amplitude) * np.exp(1j * phases(plan, realisation))
     return diagonal.T[:, :, None] * orthogonal_matrix(diagonal.shape[0])
 
 
-def torque(
-    plan: MultisinePlan, realisation: int, experiment: int, sign: int = 1, phases: np.ndarray | None = None
-) -> np.ndarray:
+def torque(plan: MultisinePlan, realisation: int, experiment: int, sign: int = 1) -> np.ndarray:
     """One period (samples, n_u) of the excitation torque in N m at the control rate; row 0 is t = 0."""
-    column = sign * spectra(plan, realisation, phases)[:, :, experiment]
+    column = sign * spectra(plan, realisation)[:, :, experiment]
     samples = samples_per_period(plan.base_frequency_hz, 1.0 / plan.rate_hz)
     return synthesise(column, plan.lines, samples)
 
@@ -90,7 +102,7 @@ def synthesise(phasors: np.ndarray, lines: Sequence[int] | np.ndarray, samples: 
     lines = np.asarray(lines)
     if lines.size and 2 * lines.max() >= samples:
         raise FlexcalError(
-            f"The line {lines.max()} needs more than {2 * lines.max()} samples a period, not {samples}; "
+            f"the line {lines.max()} needs more than {2 * lines.max()} samples a period, not {samples}; "
             "raise the rate or lower the band."
         )
     bins = np.zeros((samples // 2 + 1, *phasors.shape[1:]), complex)
@@ -111,7 +123,7 @@ def samples_per_period(base_frequency_hz: float, time_step: float) -> int:
     samples = 1.0 / (base_frequency_hz * time_step)
     if abs(samples - round(samples)) > 1e-6 * samples:
         raise FlexcalError(
-            f"A period of {1.0 / base_frequency_hz:g} s is not a whole number of samples of {time_step:g} s "
+            f"a period of {1.0 / base_frequency_hz:g} s is not a whole number of samples of {time_step:g} s "
             f"({samples:.6f}); choose a base frequency that divides the rate."
         )
     return round(samples)
@@ -123,9 +135,9 @@ def crest_factor(signal: np.ndarray) -> np.ndarray:
 
 
 def optimise_crest(
-    amplitude: np.ndarray, phases: np.ndarray, lines: np.ndarray, iterations: int = 200
+    amplitude: np.ndarray, start: np.ndarray, lines: np.ndarray, iterations: int = 200
 ) -> np.ndarray:
-    """Phases (n_u, L) with a lower crest factor, started from `phases`, jointly over the n_u experiments.
+    """Phases (n_u, L) with a lower crest factor, begun at the phases `start`, jointly over the n_u experiments.
 
     In experiment e axis p carries its multisine with all phases turned by 2π(p-1)(e-1)/n_u, so each axis has one phase
     vector and n_u signals to keep low. Clip and swap (Van der Ouderaa, Schoukens and Renneboog 1988): clip all n_u
@@ -136,7 +148,7 @@ def optimise_crest(
     n_u = amplitude.shape[0]
     samples = 1 << int(np.ceil(np.log2(_PEAK_SAMPLES_PER_LINE * lines.max())))
     turn = np.sqrt(n_u) * orthogonal_matrix(n_u)  # (axis, experiment)
-    current, best = np.array(phases, float), np.array(phases, float)
+    current, best = np.array(start, float), np.array(start, float)
     lowest = np.full(n_u, np.inf)
     for step in range(iterations + 1):
         phasors = (amplitude * np.exp(1j * current)).T[:, :, None] * turn

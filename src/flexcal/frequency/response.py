@@ -12,7 +12,8 @@ from flexcal.data import MultisinePlan, Recording
 from flexcal.errors import FlexcalError, InputError
 from flexcal.frequency import covariance as cov
 from flexcal.frequency.averages import Average, average_response, right_divide
-from flexcal.frequency.records import PoseRecords
+from flexcal.frequency.periods import experiment_spectra, keep_periods, odd_distortion
+from flexcal.frequency.records import PoseRecords, by_pose
 
 POOLED_LINES = 15  # neighbouring lines that share one covariance: 45 degrees of freedom with 4 realisations
 SMALLEST_FREEDOM = 20
@@ -27,7 +28,8 @@ class FrequencyResponse:
     distortion, the total of one realisation over R; noise_covariance the same for the noise alone;
     degrees_of_freedom behind `covariance`; realisations (R, L, n, n), those of eq. (20); joints: names of the axes;
     q_mean (all joints,) rad, the mean motor position to linearise at; payload kg or None; pose: its number in the
-    plan; sample_time s; average: how the realisations were averaged.
+    plan; sample_time s; average: how the realisations were averaged; odd_distortion (n,) of each axis, relative to its
+    excited acceleration, where the plan left lines out to see it.
     """
 
     frequencies_hz: np.ndarray
@@ -42,6 +44,7 @@ class FrequencyResponse:
     pose: int
     sample_time: float
     average: str = "arithmetic"
+    odd_distortion: np.ndarray | None = None
 
     @property
     def omega(self) -> np.ndarray:
@@ -78,6 +81,7 @@ class FrequencyResponse:
         values = {field.name: getattr(self, field.name) for field in fields(self)}
         values["joints"] = np.array(self.joints)
         values["payload"] = np.nan if self.payload is None else self.payload
+        values["odd_distortion"] = np.zeros(0) if self.odd_distortion is None else self.odd_distortion
         with atomic_path(path) as temporary, temporary.open("wb") as stream:
             np.savez_compressed(stream, **values)
 
@@ -106,6 +110,7 @@ class FrequencyResponse:
             pose=int(values["pose"]),
             sample_time=float(values["sample_time"]),
             average=str(values["average"]),
+            odd_distortion=values["odd_distortion"] if values["odd_distortion"].size else None,
         )
 
     def _elements(self, covariance: np.ndarray) -> np.ndarray:
@@ -130,12 +135,9 @@ def frequency_response(
     Ĝ^[r] = (-ω² Q) Γ⁻¹ for each realisation (20), with the torque spectrum corrected for the hold.
     `pooled_lines` neighbouring lines share one covariance. `joint_names`: of the excited axes.
     Raises `FlexcalError` where a recording is missing, double, too short or does not fit the plan, where there are
-    fewer than two realisations (then see `local_polynomial_response`), or the excitation does not reach every axis.
+    fewer than two realisations (then see `local_polynomial_responses`), or the excitation does not reach every axis.
     """
-    records = PoseRecords(plan, pose)
-    for recording in recordings:
-        if recording.label is None or recording.label.pose == pose:
-            records.add(recording)
+    (records,) = by_pose(plan, recordings, keep_periods, [pose])
     return response_of(records, average, joint_names=joint_names, pooled_lines=pooled_lines)
 
 
@@ -148,19 +150,8 @@ def frequency_responses(
     pooled_lines: int = POOLED_LINES,
 ) -> Iterator[FrequencyResponse]:
     """`frequency_response` for every pose of the plan in one pass over its recordings; each is yielded when complete."""
-    open_poses: dict[int, PoseRecords] = {}
-    for recording in recordings:
-        if recording.label is None:
-            raise FlexcalError("A recording has no label (pose, realisation, experiment, sign); give it one.")
-        pose = recording.label.pose
-        records = open_poses.setdefault(pose, PoseRecords(plan, pose))
-        records.add(recording)
-        if records.complete:
-            yield response_of(
-                open_poses.pop(pose), average, joint_names=joint_names, pooled_lines=pooled_lines
-            )
-    for records in open_poses.values():
-        records.check_complete()
+    for records in by_pose(plan, recordings, keep_periods):
+        yield response_of(records, average, joint_names=joint_names, pooled_lines=pooled_lines)
 
 
 def response_of(
@@ -172,25 +163,22 @@ def response_of(
 ) -> FrequencyResponse:
     """The frequency response from collected spectra; see `frequency_response`."""
     plan = records.plan
-    records.check_complete()
-    joints = tuple(joint_names) if joint_names is not None else tuple(f"joint_{j + 1}" for j in plan.joints)
-    if len(joints) != len(plan.joints):
-        raise FlexcalError(f"{len(joints)} joint names were given for {len(plan.joints)} excited axes.")
+    joints = axis_names(plan, joint_names)
     members = plan.realisations
     lines = np.asarray(plan.lines)
     if members < 2 or (members - 1) * min(pooled_lines, lines.size) < SMALLEST_FREEDOM:
         raise FlexcalError(
             f"{members} realisations of {lines.size} lines leave too little scatter for a covariance with "
             f"{SMALLEST_FREEDOM} degrees of freedom; measure more realisations, pool more lines, or use "
-            "local_polynomial_response."
+            "the local polynomial method (--method local-polynomial)."
         )
-    spectra = records.spectra(pooled_lines)
+    spectra = experiment_spectra(records, pooled_lines)
     try:
         realisations = right_divide(spectra.acceleration, spectra.torque)
         gain = cov.input_gain(spectra.torque)
     except np.linalg.LinAlgError as problem:
         raise FlexcalError(
-            "The torque of the experiments leaves an axis unexcited at some line (Γ is singular)."
+            "the torque of the experiments leaves an axis unexcited at some line (Γ is singular)."
         ) from (problem)
     mean = realisations.mean(0)
     noise = cov.output_noise(mean, spectra.noise)
@@ -208,4 +196,13 @@ def response_of(
         pose=records.pose,
         sample_time=records.time_step,
         average=average,
+        odd_distortion=odd_distortion(records, mean, noise),
     )
+
+
+def axis_names(plan: MultisinePlan, given: Sequence[str] | None) -> tuple[str, ...]:
+    """The names of the excited axes; raises `FlexcalError` where another number of them is given."""
+    names = tuple(given) if given is not None else tuple(f"joint_{j + 1}" for j in plan.joints)
+    if len(names) != len(plan.joints):
+        raise FlexcalError(f"{len(names)} joint names were given for {len(plan.joints)} excited axes.")
+    return names

@@ -25,13 +25,25 @@ class ExperimentSpectra:
 
 
 def kept_samples(plan: MultisinePlan, recording: Recording) -> slice:
-    """The rows of a recording from the end of the settle periods to the last whole period of the plan."""
-    samples = samples_per_period(plan.base_frequency_hz, recording.time_step)
-    needed = plan.periods * samples
-    if recording.q.shape[0] < needed:
+    """The rows of a recording from the end of the settle periods to the last whole period of the plan.
+
+    Raises `FlexcalError` that names the recording where it is too short, or its sample time does not fit the plan.
+    """
+    step = recording.time_step
+    if plan.torque == "held" and step * plan.rate_hz > 1.0 + 1e-6:
         raise FlexcalError(
-            f"The recording {_name(recording)} has {recording.q.shape[0]} samples, fewer than the {needed} of "
-            f"{plan.periods} periods; record the whole experiment."
+            f"{recording.name}: the log has a step of {step:g} s, longer than the {1.0 / plan.rate_hz:g} s for which the "
+            "torque is held; log at the control rate."
+        )
+    try:
+        samples = samples_per_period(plan.base_frequency_hz, step)
+    except FlexcalError as problem:
+        raise FlexcalError(f"{recording.name}: {problem}") from problem
+    needed = plan.periods * samples
+    if len(recording) < needed:
+        raise FlexcalError(
+            f"{recording.name}: the log has {len(recording)} samples, fewer than the {needed} of {plan.periods} periods; "
+            "record the whole experiment."
         )
     return slice(plan.settle_periods * samples, needed)
 
@@ -62,7 +74,7 @@ def spectrum(signal: np.ndarray, periods: int, lines: np.ndarray) -> np.ndarray:
 
 def noise_in_half_sum(plan: MultisinePlan) -> bool:
     """Whether the noise is read from (plus + minus)/2 at the excited lines themselves; see `noise_lines`."""
-    return plan.signs and not (_has_reference(plan) and _is_whole(_reference_ratio(plan)))
+    return plan.signs and not (has_reference(plan) and _is_whole(_reference_ratio(plan)))
 
 
 def noise_lines(plan: MultisinePlan) -> np.ndarray:
@@ -90,7 +102,7 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
         else:
             bins = np.arange(low * kept, high * kept + 1)
             candidates = bins[bins % kept != 0] / kept
-    if not _has_reference(plan):
+    if not has_reference(plan):
         return candidates
     return candidates[~_is_whole(candidates / _reference_ratio(plan))]
 
@@ -107,15 +119,11 @@ def torque_hold(plan: MultisinePlan, omega: np.ndarray, time_step: float) -> np.
         return np.ones(half.shape, complex)
     if plan.torque == "mean":
         return np.exp(-1j * half) / np.sinc(half / np.pi)
-    if time_step * plan.rate_hz > 1.0 + 1e-6:
-        raise FlexcalError(
-            f"The log has a step of {time_step:g} s, longer than the {1.0 / plan.rate_hz:g} s for which the torque is "
-            "held; log at the control rate."
-        )
     return np.sinc(half / np.pi) * np.exp(-1j * half)
 
 
-def _has_reference(plan: MultisinePlan) -> bool:
+def has_reference(plan: MultisinePlan) -> bool:
+    """Whether there is a reference motion under the excitation."""
     return plan.reference_amplitude != 0.0 and plan.reference_frequency_hz != 0.0
 
 
@@ -125,10 +133,3 @@ def _reference_ratio(plan: MultisinePlan) -> float:
 
 def _is_whole(ratio: np.ndarray | float) -> np.ndarray:
     return np.abs(ratio - np.rint(ratio)) < 1e-6
-
-
-def _name(recording: Recording) -> str:
-    label = recording.label
-    if label is None:
-        return "without a label"
-    return f"of pose {label.pose}, realisation {label.realisation}, experiment {label.experiment}, sign {label.sign:+d}"

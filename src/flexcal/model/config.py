@@ -30,6 +30,10 @@ class PayloadConfig:
     def __post_init__(self) -> None:
         if self.mass < 0 or self.mass_std < 0:
             raise FlexcalError("the payload's mass and mass_std must not be negative.")
+        if self.mass == 0 and (self.mass_std > 0 or self.inertia is not None):
+            raise FlexcalError(
+                "a payload of 0 kg has neither mass_std nor inertia; give the mass they belong to, or leave them out."
+            )
 
 
 @dataclass(frozen=True)
@@ -40,19 +44,32 @@ class PriorConfig:
     com: float = 0.010
     rotor_inertia: float = 0.05
 
+    def __post_init__(self) -> None:
+        if self.mass < 0 or self.com < 0 or not self.rotor_inertia > 0:
+            raise FlexcalError(
+                "the prior's mass and com must not be negative (0: known exactly), and its rotor_inertia must be positive."
+            )
+
 
 @dataclass(frozen=True)
 class CouplingConfig:
-    """A transmission in which `motor` also turns `joint`, by `ratio`."""
+    """A transmission in which `motor` also turns `joint`, by `ratio`. For the identification of dynamics."""
 
     motor: str
     joint: str
     ratio: float
 
+    def __post_init__(self) -> None:
+        if self.motor == self.joint or self.ratio == 0:
+            raise FlexcalError("a coupling is between two different joints, with a ratio other than 0.")
+
 
 @dataclass(frozen=True)
 class DrivesConfig:
-    """Drive values referred to the joint, one entry per joint: kg m², N m s/rad, N m, turns per turn."""
+    """Drive values referred to the joint, one entry per joint: kg m², N m s/rad, N m, turns per turn.
+
+    `ratio` and `coupling` are for the identification of dynamics.
+    """
 
     rotor_inertia: tuple[float, ...] | None = None
     viscous: tuple[float, ...] | None = None
@@ -116,12 +133,20 @@ class GeometryConfig:
 
 @dataclass(frozen=True)
 class DynamicsConfig:
-    """Signal treatment of the dynamic identification; absent values are proposed from the data."""
+    """Signal treatment of the identification of dynamics; absent values are proposed from the data."""
 
     friction: str | tuple[str, ...] = "auto"
     cutoff_hz: float | None = None
     decimation: int | None = None
     mask_standstill: bool = True
+
+    def __post_init__(self) -> None:
+        if isinstance(self.friction, str) and self.friction != "auto":
+            raise FlexcalError(f"friction must be 'auto' or a list of terms, not '{self.friction}'.")
+        if self.cutoff_hz is not None and not self.cutoff_hz > 0:
+            raise FlexcalError(f"cutoff_hz must be positive, not {self.cutoff_hz:g} Hz.")
+        if self.decimation is not None and self.decimation < 1:
+            raise FlexcalError(f"decimation must be 1 or more, not {self.decimation}.")
 
 
 @dataclass(frozen=True)
@@ -139,6 +164,12 @@ class ControllerConfig:
     kp: tuple[float, ...]
     kd: tuple[float, ...]
     rate_hz: float
+
+    def __post_init__(self) -> None:
+        if min(self.kp, default=0.0) < 0 or min(self.kd, default=0.0) < 0 or not self.rate_hz > 0:
+            raise FlexcalError(
+                "the controller's kp and kd must not be negative, and its rate_hz must be positive."
+            )
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ import numpy as np
 from flexcal.model.equilibrium import elastic_axes
 from flexcal.model.inertia import Inertia
 from flexcal.model.loading import bearing_frame
+from flexcal.model.placement import joint_placement
 from flexcal.model.robot_model import RobotModel
-from flexcal.model.rotations import axis_rotation
 
 
 class ElasticArm:
@@ -33,14 +33,8 @@ class ElasticArm:
         for i, joint in enumerate(robot.joints):
             frame = robot.bearing_frames.get(i)
             frame = bearing_frame(joint) if frame is None else frame
-            errors = robot.geometry[i]
-            length = robot.geometry[joint.parent, 3:] if joint.parent >= 0 else np.zeros(3)
-            aligned = (
-                joint.rotation
-                @ axis_rotation(joint.normals[1], errors[2])
-                @ axis_rotation(joint.normals[0], errors[1])
-            )
-            placement = pin.SE3(aligned @ frame, joint.translation + length)
+            position, aligned = joint_placement(robot, i)
+            placement = pin.SE3(aligned @ frame, position)
             if joint.parent >= 0:
                 placement = pin.SE3(self.turns[joint.parent].T, np.zeros(3)) * placement
             parent = self.bodies[joint.parent] if joint.parent >= 0 else 0
@@ -69,17 +63,9 @@ class ElasticArm:
         total = pin.Inertia(link.mass, link.com, link.inertia)
         held = self.robot.payload
         if held is not None and held.joint == joint and self.payload > 0:
-            total = total + self._payload_inertia(held.com)
+            carried = held.carried(self.payload)
+            total = total + pin.Inertia(carried.mass, carried.com, carried.inertia)
         self.model.inertias[self.bodies[joint]] = pin.SE3(turn.T, np.zeros(3)).act(total)
-
-    def _payload_inertia(self, com: np.ndarray) -> Any:
-        import pinocchio as pin
-
-        held = self.robot.payload
-        assert held is not None
-        scale = self.payload / held.mass if held.mass > 0 else 0.0
-        about = held.rotation @ held.inertia @ held.rotation.T * scale
-        return pin.Inertia(self.payload, held.translation + held.rotation @ com, about)
 
     def configuration(self, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
         """Pinocchio's configuration (nq,) of motors at `q` (n,) and the arm deflected by `deflection` (n, 3)."""

@@ -10,17 +10,20 @@ from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_batch
 from flexcal.model.robot_model import RobotModel
 
+_FLANK_PASSES = 5
+_RIGID = 1e15
+
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
     """Rest positions of a batch of poses (n joints, d elastic coordinates, E elastic joints).
 
     `deflection` (samples, n, 3) rad: tilt about x, about y, and twist of the arm beyond the motor, backlash included; `torque`
-    (samples, n) N m of the motor on the arm that holds gravity; `flank` (samples, n) its sign where the joint has backlash, else 0;
-    `axes` (d, 2) joint and component of each elastic coordinate; `compliance` (samples, d, d) rad/(N m), the inverse of spring plus
-    gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each coordinate by mass and first moment of each link;
-    `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every joint. The last three are empty
-    without sensitivities.
+    (samples, n) N m of the motor on the arm that holds gravity; `flank` (samples, n) the side of its backlash that the arm rests on,
+    the sign of that torque, 0 where there is none; `axes` (d, 2) joint and component of each elastic coordinate; `compliance`
+    (samples, d, d) rad/(N m), the inverse of spring plus gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each
+    coordinate by mass and first moment of each link; `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every
+    joint. The last three are empty without sensitivities.
     """
 
     deflection: np.ndarray
@@ -90,12 +93,31 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
 
     Found by putting a spring of unbounded stiffness in every joint; prismatic joints read 0.
     """
+    _, deflection, _ = _held_rigidly(model, q, payload, sensitivities=False)
+    return -_RIGID * deflection[:, :, 2]
+
+
+def gravity_regressor(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Derivative (samples, n, 4 n) of `gravity_torque` by mass and first moment of each link, its payload's included."""
+    twists, deflection, regressor = _held_rigidly(model, q, payload, sensitivities=True)
+    result = np.zeros((len(deflection), model.n, 4 * model.n))
+    result[:, twists] = regressor
+    return result
+
+
+def _held_rigidly(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None, *, sensitivities: bool
+) -> tuple[list[int], np.ndarray, np.ndarray]:
+    """The revolute joints, deflection and regressor of `Equilibrium` with a spring of unbounded stiffness in each of these joints."""
     q = joint_batch(model, q)
-    axes = [(i, 2) for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
-    payload = payload_batch(model, payload, len(q))
-    rigid = 1e15
-    deflection = _solve(model, axes, np.full(len(axes), rigid), q, payload, sensitivities=False)[0]
-    return -rigid * deflection[:, :, 2]
+    twists = [i for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+    masses = payload_batch(model, payload, len(q))
+    stiffness = np.full(len(twists), _RIGID)
+    axes = [(i, 2) for i in twists]
+    deflection, _, regressor, _ = _solve(model, axes, stiffness, q, masses, sensitivities=sensitivities)
+    return twists, deflection, regressor
 
 
 def static_equilibrium(
@@ -110,30 +132,39 @@ def static_equilibrium(
     """Rest position of every pose for motors held at `q` (samples, n), to 1e-12 rad.
 
     `payload` (samples,) or a scalar in kg at the declared payload's centre of mass; None takes the declared mass. `flank` (samples, n)
-    overrides the sign of the drive torque that places the arm in the backlash (q_arm = q_M - τ/c - b sign τ, b half the gap). Without
-    `elastic` the arm is rigid and only backlash and gravity compliance displace it. Raises `FlexcalError` where springs cannot carry
-    the arm.
+    overrides the sign of the drive torque that places the arm in the backlash (q_arm = q_M - τ/c - b sign τ, b half the gap); it is that
+    of the torque at rest itself, but for an arm that hangs within its gap, where either sign would pull it across: there one of the
+    two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Raises `FlexcalError`
+    where springs cannot carry the arm.
     """
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
-    load = gravity_torque(model, q, masses)
     axes = elastic_axes(model) if elastic else []
-    slack = -np.sign(load) * model.backlash if flank is None else -flank * model.backlash
-    slack = slack - load * model.gravity_compliance + transmission_error(model, q)
     stiffness = np.array([model.stiffness[a] for a in axes])
     if not (np.isfinite(stiffness) & (stiffness > 0)).all():
         raise FlexcalError(
             f"{model.name}: every stiffness must be positive and finite, not {stiffness.min():g} N m/rad."
         )
-    deflection, *derivatives = _solve(model, axes, stiffness, q + slack, masses, sensitivities=sensitivities)
-    for i, component in axes:
-        if component == 2:
-            load[:, i] = -model.stiffness[i, 2] * deflection[:, i, 2]
+    load = gravity_torque(model, q, masses)
+    free = transmission_error(model, q) - load * model.gravity_compliance
+    loose = model.backlash > 0
+    sprung = [i for i, component in axes if component == 2]
+    rest = np.sign(load) if flank is None else flank
+    for last in (False,) * (_FLANK_PASSES - 1) + (True,):
+        slack = free - rest * model.backlash
+        deflection, *derivatives = _solve(
+            model, axes, stiffness, q + slack, masses, sensitivities=sensitivities
+        )
+        torque = load.copy()
+        torque[:, sprung] = -model.stiffness[sprung, 2] * deflection[:, sprung, 2]
+        if flank is not None or last or (np.sign(torque) == rest)[:, loose].all():
+            break
+        rest = np.sign(torque)
+    sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank
     deflection[:, :, 2] += slack
-    sign = np.sign(load) if flank is None else flank
     has_backlash = np.isin(np.arange(model.n), model.backlash_joints)
     return Equilibrium(
-        deflection, load, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
+        deflection, torque, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
     )
 
 

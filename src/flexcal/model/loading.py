@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,11 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
     names = [joint.name for joint in joints]
     for k, name in enumerate(config.geometry.backlash):
         _joint(file, ("geometry", "backlash", k), names, name)
+    for k, coupling in enumerate(config.drives.coupling):
+        _joint(file, ("drives", "coupling", k, "motor"), names, coupling.motor)
+        _joint(file, ("drives", "coupling", k, "joint"), names, coupling.joint)
+    for key in ("kp", "kd") if config.controller is not None else ():
+        _check_count(file, ("controller", key), getattr(config.controller, key), n)
     points = {name: _point(file, description, name, config) for name in config.points}
     payload = _payload(file, description, config)
     stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
@@ -72,7 +78,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         points=points,
         nominal_payload=payload,
         bearing_frames=bearing_frames,
-        tree=_tree(joints, bearing_frames),
+        tree=kinematic_tree(joints, bearing_frames),
         stations=stations,
         harmonics=HARMONICS,
         geometry=np.zeros((n, 6)),
@@ -159,7 +165,8 @@ def bearing_frame(joint: Joint) -> np.ndarray:
     return np.column_stack([x, np.cross(joint.axis, x), joint.axis])
 
 
-def _tree(joints: tuple[Joint, ...], bearing_frames: dict[int, np.ndarray]) -> Tree:
+def kinematic_tree(joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray]) -> Tree:
+    """The kernels' view of some joints, and of the bearing frames (3, 3) of the elastic ones by joint index."""
     return Tree.build(
         [j.parent for j in joints],
         [j.kind == "prismatic" for j in joints],
@@ -174,14 +181,19 @@ def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndar
     values = getattr(config.drives, key)
     if values is None:
         return np.full(n, np.nan)
+    _check_count(file, ("drives", key), values, n)
+    if key != "ratio" and min(values) < 0:
+        raise file.error(("drives", key), f"{key} must not be negative, but is {min(values):g}.")
+    if key == "ratio" and 0 in values:
+        raise file.error(("drives", key), "a ratio of 0 turns nothing; give motor turns per joint turn.")
+    return np.array(values)
+
+
+def _check_count(file: YamlFile, keys: tuple[str, str], values: Sequence[float], n: int) -> None:
     if len(values) != n:
         raise file.error(
-            ("drives", key),
-            f"{key} has {len(values)} entries but the robot has {n} joints; give one per joint.",
+            keys, f"{keys[1]} has {len(values)} entries but the robot has {n} joints; give one per joint."
         )
-    if key != "ratio" and min(values) < 0:
-        raise file.error(("drives", key), f"{key} must not be negative.")
-    return np.array(values)
 
 
 def _path(joints: tuple[Joint, ...], joint: int) -> list[int]:

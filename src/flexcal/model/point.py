@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.model.inertia import Inertia
+
 
 @dataclass(frozen=True, eq=False)
 class Point:
@@ -34,6 +36,11 @@ class Payload:
     mass_std: float
     com: np.ndarray
     inertia: np.ndarray
+
+    def carried(self, mass: float) -> Inertia:
+        """Inertia in the link's frame of `mass` kg held in its place; the declared inertia scales with the mass."""
+        share = mass / self.mass if self.mass > 0 else 0.0
+        return Inertia(mass, self.com_in_link, self.rotation @ (share * self.inertia) @ self.rotation.T)
 
     @property
     def com_in_link(self) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,14 +17,25 @@ class Posterior:
     parameters: Parameters
     covariance: np.ndarray
 
+    def determines(self, name: str) -> bool:
+        """Whether a parameter was estimated, and not held because the data could not tell it from others."""
+        if name not in self.parameters:
+            return False
+        number = self.parameters.index(name)
+        return bool(self.covariance[number, number] > 0)
+
+    def marginal(self, names: Sequence[str]) -> np.ndarray:
+        """Joint covariance (k, k) of the named parameters, in estimation coordinates."""
+        numbers = [self.parameters.index(name) for name in names]
+        return self.covariance[np.ix_(numbers, numbers)]
+
     def updated(self, estimate: Estimate, names: tuple[str, ...]) -> Posterior:
         """With the named parameters taken from `estimate`; what only the older holds stays, taken as independent of it."""
         newer = estimate.parameters.subset(names)
         older = [name for name in self.parameters.names if name not in newer]
-        numbers = [self.parameters.index(name) for name in older]
         size = len(older)
         covariance = np.zeros((size + len(newer), size + len(newer)))
-        covariance[:size, :size] = self.covariance[np.ix_(numbers, numbers)]
+        covariance[:size, :size] = self.marginal(older)
         covariance[size:, size:] = estimate.marginal(names)[1]
         return Posterior(self.parameters.subset(older) + newer, covariance)
 

@@ -127,10 +127,13 @@ class RobotModel:
 
     @property
     def payload(self) -> Payload | None:
-        """The declared payload with its current mass and centre of mass."""
-        if self.nominal_payload is None:
+        """The declared payload with its current mass and centre of mass, and the inertia of that mass."""
+        held = self.nominal_payload
+        if held is None:
             return None
-        return replace(self.nominal_payload, mass=float(self.payload_mass[0]), com=self.payload_com)
+        mass = float(self.payload_mass[0])
+        share = mass / held.mass if held.mass > 0 else 1.0
+        return replace(held, mass=mass, com=self.payload_com, inertia=share * held.inertia)
 
     @cached_property
     def reach(self) -> float:
@@ -159,6 +162,14 @@ class RobotModel:
                 f"there is no point '{key}' under `points:` in {self.path}; there are {', '.join(self.points)}."
             )
         return self.points[key]
+
+    def station_index(self, name: str) -> int:
+        """Index of one of the instrument's places; raises `FlexcalError` that lists the names."""
+        if name not in self.stations:
+            raise FlexcalError(
+                f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations)}; add it under `stations:`."
+            )
+        return self.stations.index(name)
 
     @cached_property
     def _locations(self) -> dict[str, tuple[str, tuple[int, ...]]]:

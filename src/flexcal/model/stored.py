@@ -12,7 +12,7 @@ from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model.robot_model import RobotModel
 
-_NUISANCE = re.compile(r".*\.pose_[0-9]+")
+NUISANCE = re.compile(r".*\.pose_[0-9]+")
 """Names of what was estimated for one pose of an experiment: not the robot's own."""
 
 
@@ -29,7 +29,7 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     """
     for block, estimate in blocks.items():
         unknown = [
-            n for n in estimate.parameters.names if n not in model.values and not _NUISANCE.fullmatch(n)
+            n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
         ]
         if unknown:
             raise InputError(

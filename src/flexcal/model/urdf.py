@@ -4,16 +4,20 @@ from __future__ import annotations
 
 import os
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from typing import BinaryIO
 
 import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.model.inertia import Inertia
 from flexcal.model.joint import Joint, normals_to
+from flexcal.model.urdf_checks import carried_links
+from flexcal.model.urdf_xml import read_elements
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,23 +42,24 @@ class Description:
 def read_urdf(path: Path) -> Description:
     """Read a URDF of revolute, continuous, prismatic and fixed joints.
 
-    Raises `InputError` where the file is missing or does not parse, where it has no movable joint, and for other joint types.
+    Raises `InputError`, with line and link or joint, where the file is missing, incomplete or unreadable, where it has no movable joint,
+    and for other joint types.
     """
     import pinocchio as pin
 
     if not path.is_file():
         raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
-    try:
-        with _quiet() as _:
+    links = carried_links(read_elements(path))
+    with _silenced() as said:
+        try:
             model = pin.buildModelFromUrdf(str(path))
-    except (ValueError, RuntimeError) as problem:
-        raise InputError(f"{path}: not a valid URDF ({_reason(path)}); correct it.") from problem
+        except (ValueError, RuntimeError) as problem:
+            raise InputError(f"{path}: not a valid URDF ({_first_complaint(said)}); correct it.") from problem
     if model.njoints < 2:
         raise InputError(f"{path}: the URDF has no movable joint; a robot needs at least one.")
-    links = _child_links(path)
     joints = []
     for i in range(1, model.njoints):
-        kind, axis = _kind_and_axis(path, model.joints[i], model.names[i])
+        kind, axis = _kind_and_axis(model.joints[i])
         bounded = model.joints[i].nq == 1
         at, rate = model.joints[i].idx_q, model.joints[i].idx_v
         effort = model.effortLimit if hasattr(model, "effortLimit") else model.upperEffortLimit
@@ -85,55 +90,34 @@ def read_urdf(path: Path) -> Description:
     return Description(model.name, tuple(joints), inertias, frames)
 
 
-def _kind_and_axis(path: Path, joint, name: str) -> tuple[str, np.ndarray]:
+def _kind_and_axis(joint) -> tuple[str, np.ndarray]:
     short = joint.shortname().removeprefix("JointModel")
-    for prefix, kind in (("RUB", "revolute"), ("R", "revolute"), ("P", "prismatic")):
-        if short.startswith(prefix) and short[len(prefix) :] in ("X", "Y", "Z"):
-            return kind, np.eye(3)["XYZ".index(short[len(prefix) :])]
-    if short in ("RevoluteUnaligned", "RevoluteUnboundedUnaligned", "PrismaticUnaligned"):
-        axis = np.array(joint.extract().axis if hasattr(joint, "extract") else joint.axis, dtype=float)
-        return ("prismatic" if short.startswith("P") else "revolute"), axis / np.linalg.norm(axis)
-    raise InputError(
-        f"{path}: joint '{name}' is of a type flexcal does not handle ({short}); use revolute, continuous, prismatic or fixed."
-    )
-
-
-def _child_links(path: Path) -> dict[str, str]:
-    import xml.etree.ElementTree as ET
-
-    result = {}
-    for joint in ET.parse(path).getroot().findall("joint"):
-        child = joint.find("child")
-        if child is not None:
-            result[joint.get("name", "")] = child.get("link", "")
-    return result
-
-
-def _reason(path: Path) -> str:
-    import xml.etree.ElementTree as ET
-
-    try:
-        root = ET.parse(path).getroot()
-    except ET.ParseError as problem:
-        return str(problem)
-    if root.tag != "robot":
-        return f"its root element is <{root.tag}>, not <robot>"
-    return "a link, joint, parent or child is missing or wrong"
+    kind = "prismatic" if short.startswith("P") else "revolute"
+    if short[-1] in "XYZ":
+        return kind, np.eye(3)["XYZ".index(short[-1])]
+    axis = np.array(joint.extract().axis if hasattr(joint, "extract") else joint.axis, dtype=float)
+    return kind, axis / np.linalg.norm(axis)
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
-    """Keep the C++ parser from printing to the process's standard error and output."""
+def _silenced() -> Iterator[BinaryIO]:
+    """Keep the C++ parser from printing to the process's standard output and error; the file gets what it says."""
     sys.stdout.flush()
     sys.stderr.flush()
     saved = [os.dup(1), os.dup(2)]
     try:
-        with open(os.devnull, "wb") as nowhere:
-            os.dup2(nowhere.fileno(), 1)
-            os.dup2(nowhere.fileno(), 2)
-            yield
+        with tempfile.TemporaryFile() as said:
+            os.dup2(said.fileno(), 1)
+            os.dup2(said.fileno(), 2)
+            yield said
     finally:
         os.dup2(saved[0], 1)
         os.dup2(saved[1], 2)
         for descriptor in saved:
             os.close(descriptor)
+
+
+def _first_complaint(said: BinaryIO) -> str:
+    said.seek(0)
+    errors = [line for line in said.read().decode(errors="replace").splitlines() if line.startswith("Error:")]
+    return " ".join(errors[0].removeprefix("Error:").split()) if errors else "no reason is given"

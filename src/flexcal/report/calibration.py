@@ -107,13 +107,15 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
 
 def calibration_checks(study: CalibrationStudy) -> tuple[Check, ...]:
     """The checks behind the verdict."""
-    fit = study.selected
+    fit, found = study.selected, study.selected.identifiability
+    table = study.selection.table if study.selection is not None else ()
+    left_out = next(((order, place) for terms, order, place in table if terms == fit.terms), None)
     return (
-        check_left_out(fit, study.selection),
+        check_left_out(fit.errors.mean, left_out),
         check_residual(
             "Does noise explain what the fit leaves?", fit.estimate, sigma_given=fit.poses.sigma_given
         ),
-        check_rank(fit.identifiability),
+        check_rank(len(found.names), found.rank, found.gap),
         check_outliers(fit),
     )
 

@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration import Calibration, TermSelection, Verification
-from flexcal.estimation import Estimate, Identifiability
-from flexcal.report.figures.predicted_quantiles import prediction_std
+from flexcal.calibration import Calibration, ErrorStatistics, Verification
+from flexcal.estimation import Estimate
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Check
 
@@ -25,10 +24,9 @@ FEW_POSES = 20
 CLEAR_GAP = 3.0
 
 
-def check_fresh_poses(calibration: Calibration, verification: Verification) -> Check:
+def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
     """Whether accuracy was judged on enough poses that the fit never saw, and holds there."""
     question = "Was it checked on poses that the fit never saw?"
-    fitted, fresh = calibration.errors, verification.all
     answer = (
         f"Yes, on {fresh.poses}: 9 of 10 are within {millimetres(fresh.p90)} mm there, and within {millimetres(fitted.p90)} mm on the "
         f"{fitted.poses} poses of the fit."
@@ -56,7 +54,7 @@ def check_claimed_uncertainty(
             "unknown",
         )
     clear = ~verification.ambiguous
-    std = prediction_std(verification, noise)[clear]
+    std = verification.expected_rms(noise)[clear]
     if not clear.any() or not (std > 0).all():
         return Check(
             question, "No uncertainty was predicted at these poses, so it cannot be compared.", "unknown"
@@ -101,15 +99,17 @@ def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = Tru
     return Check(question, answer, "good")
 
 
-def check_rank(found: Identifiability) -> Check:
-    """Whether the parameters that the poses determine stand clear of those that they do not."""
+def check_rank(parameters: int, rank: int, gap: float) -> Check:
+    """Whether the parameters that the poses determine stand clear, by `gap` decades, of those that they do not."""
     question = "Is it clear which parameters the poses determine?"
-    dropped = len(found.names) - found.rank
-    answer = f"{found.rank} of {len(found.names)} geometric parameters are determined; "
+    dropped = parameters - rank
+    answer = f"{rank} of {parameters} geometric parameters are determined; "
     if not dropped:
         return Check(question, f"{answer}none had to be dropped.", "good")
-    clear = found.gap >= CLEAR_GAP
-    answer += f"the {dropped} others are absorbed by them, with a gap of {found.gap:.0f} decades between the two groups."
+    clear = gap >= CLEAR_GAP
+    answer += (
+        f"the {dropped} others are absorbed by them, with a gap of {gap:.0f} decades between the two groups."
+    )
     return Check(question, answer if clear else f"{answer} That gap is small.", "good" if clear else "care")
 
 
@@ -148,20 +148,17 @@ def check_truth(covered: int, total: int) -> Check:
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
 
 
-def check_left_out(calibration: Calibration, selection: TermSelection | None) -> Check:
-    """Whether poses left out of the fit were predicted as well as those in it."""
+def check_left_out(mean: float, left_out: tuple[float, float] | None) -> Check:
+    """Whether poses left out of the fit, by order and by place, were predicted as well as those in it; mean errors in m."""
     question = "Does it hold at poses that the fit did not see?"
-    rows = [row for row in selection.table if row[0] == calibration.terms] if selection is not None else []
-    if not rows:
+    if left_out is None:
         return Check(
             question,
             "Not known: nothing was left out. Measure some fresh poses and run flexcal verify before relying on it.",
             "care",
         )
-    _, order, workspace = rows[0]
-    mean = calibration.errors.mean
-    answer = f"Left out in turn, poses are {millimetres(workspace)} mm off on average, {millimetres(mean)} mm when part of the fit."
-    if max(order, workspace) > 1.5 * mean:
+    answer = f"Left out in turn, poses are {millimetres(left_out[1])} mm off on average, {millimetres(mean)} mm when part of the fit."
+    if max(left_out) > 1.5 * mean:
         return Check(
             question, f"{answer} That is a large step: the model is too rich for these poses.", "care"
         )

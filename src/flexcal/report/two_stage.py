@@ -87,9 +87,10 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
 def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     fit, found = study.calibration, study.stiffness.estimate
+    geometry = fit.identifiability
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
     checks = [
-        check_fresh_poses(fit, study.elastic_verification),
+        check_fresh_poses(fit.errors, study.elastic_verification.all),
         check_claimed_uncertainty(study.elastic_verification, study.unpredicted_noise),
         check_residual(
             "Does noise explain what the geometric fit leaves?",
@@ -98,7 +99,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         ),
         check_residual("Does noise explain what the elastic fit leaves?", found),
         check_springs(found, stiffness, damping),
-        check_rank(fit.identifiability),
+        check_rank(len(geometry.names), geometry.rank, geometry.gap),
         check_flanks(study.elastic_verification),
     ]
     if study.truth is not None:

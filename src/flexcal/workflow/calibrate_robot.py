@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
@@ -17,34 +16,23 @@ from flexcal.calibration import (
     calibrate,
     predict,
     register,
+    require_points,
     select_terms,
 )
+from flexcal.calibration.geometry_fit import LossName
 from flexcal.data import PoseSet, provenance, read_estimates, read_poses, write_estimates
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import FlexcalError
 from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
+from flexcal.progress import Progress, silent
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.units import MILLIMETRE
+from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.results import identifiability_block, quantities, write_results
 
-Progress = Callable[[str, float], None]
-
 AUTO = "auto"
-LossName = Literal["squares", "huber", "cauchy"]
-
-_NORMAL_MEDIAN = 1.4826
-"""Standard deviation over median size of a Gaussian."""
-
-
-@dataclass(frozen=True)
-class Outlier:
-    """A measurement that the robust loss gave hardly any weight: number of its pose, point, distance from the fit (m)."""
-
-    pose: int
-    target: str
-    error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,16 +49,6 @@ class RobotCalibration:
     selected: Calibration
     estimate: Estimate
     estimates: Path
-
-    @property
-    def outliers(self) -> tuple[Outlier, ...]:
-        """The outliers of the selected fit, the farthest first."""
-        fit = self.selected
-        distance = np.linalg.norm(fit.residuals, axis=1)
-        rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
-        return tuple(
-            Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows
-        )
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
@@ -96,8 +74,10 @@ class RobotCalibration:
                 "ambiguous_poses": int(selected.ambiguous.sum()),
             },
             "outliers": [
-                {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE} for o in self.outliers
+                {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
+                for o in outliers_of(selected)
             ],
+            "remarks": list(calibration_remarks(selected)),
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
         }
@@ -112,7 +92,7 @@ def calibrate_robot(
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     out: Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> RobotCalibration:
     """Calibrate the robot of a robot.yaml on files of measured poses, and store the estimate as its block `calibration`.
 
@@ -121,43 +101,38 @@ def calibrate_robot(
     scatter about the fit stands for it. With `out`, estimates, results.json and report.html go to that folder and nothing beside robot.yaml
     changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
-    tell = progress or (lambda stage, share: None)
-    tell("reading", 0.0)
+    progress("reading", 0.0)
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
     poses = read_poses(list(files), model)
-    _require_points(poses, files)
+    require_points(poses, " and ".join(str(file) for file in files))
     wanted = _terms(model, terms)
-    tell("reading", 1.0)
+    progress("reading", 1.0)
 
     def fit(robot_: RobotModel, chosen: Sequence[str], stage: str, *, elastic: bool) -> Calibration:
-        tell(stage, 0.0)
-        once = partial(
-            calibrate,
+        progress(stage, 0.0)
+        found = calibrate(
             robot_,
-            stiffness=blocks.get("stiffness"),
+            poses,
             terms=chosen,
             elastic=elastic,
             elasticity=elasticity,
             secant_scale=secant_scale,
             loss=loss,
         )
-        found = once(poses)
-        if not poses.sigma_given:
-            found = once(_with_scatter(found, loss))
-        tell(stage, 1.0)
+        progress(stage, 1.0)
         return found
 
     base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
     rigid = fit(model, base, "rigid fit", elastic=False)
     selection = None
     if wanted is None:
-        tell("terms", 0.0)
+        progress("terms", 0.0)
         good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
-        selection = select_terms(model, poses.subset(good), stiffness=blocks.get("stiffness"))
-        tell("terms", 1.0)
+        selection = select_terms(model, poses.subset(good))
+        progress("terms", 1.0)
         model, wanted = selection.model, selection.terms
     elastic = bool(model.elastic)
     same = not elastic and tuple(wanted) == base
@@ -177,10 +152,10 @@ def calibrate_robot(
     if out is not None:
         document = result.document()
         write_results(out, document)
-        tell("report", 0.0)
+        progress("report", 0.0)
         study = CalibrationStudy(model, before, rigid, selected, selection, origin, results=document)
         write_calibration_report(out / "report.html", study)
-        tell("report", 1.0)
+        progress("report", 1.0)
     return result
 
 
@@ -189,17 +164,6 @@ def nominal_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
     bare = replace(model, station=np.zeros_like(model.station))
     placed = register(bare, poses, predict(bare, poses, elastic=False).position)
     return poses.position - predict(placed, poses, elastic=False).position
-
-
-def _with_scatter(found: Calibration, loss: LossName) -> PoseSet:
-    """The poses with sigma taken from the scatter about a fit; with a robust loss from its median."""
-    rows = found.residuals.size
-    freedom = max(rows - found.identifiability.rank, 1)
-    if loss == "squares":
-        scatter = float(np.sqrt(np.sum(found.residuals**2) / freedom))
-    else:
-        scatter = _NORMAL_MEDIAN * float(np.median(np.abs(found.residuals))) * np.sqrt(rows / freedom)
-    return replace(found.poses, sigma=np.full_like(found.poses.sigma, max(scatter, 1e-9)))
 
 
 def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
@@ -221,13 +185,6 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
         )
     full = [t for term in asked for t in (harmonics if term == "transmission" else (term,))]
     return tuple(dict.fromkeys(["kinematic", *full]))
-
-
-def _require_points(poses: PoseSet, files: Sequence[Path]) -> None:
-    if poses.length is not None:
-        raise InputError(
-            f"{files[0]} measures lengths of a wire, which cannot be calibrated on yet; give points x, y, z."
-        )
 
 
 def _store(path: Path, others: Mapping[Block, Estimate], estimate: Estimate) -> None:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from flexcal.data import MultisinePlan, write_plan
 from flexcal.errors import InputError
+from flexcal.frequency import leave_out_detection_lines
 from flexcal.model import RobotModel
 from flexcal.workflow.frequency_plans import frequency_plan
 
@@ -28,6 +29,7 @@ class DesignedFrequency:
             "poses": len(plan.poses),
             "excited_axes": [joint + 1 for joint in plan.joints],
             "lines": len(plan.lines),
+            "detection_lines": len(plan.detection_lines),
             "lowest_hz": float(plan.frequencies_hz[0]),
             "highest_hz": float(plan.frequencies_hz[-1]),
             "recordings": recordings,
@@ -42,9 +44,13 @@ def plan_frequency_experiments(
     *,
     kind: Literal["default", "paper"] = "default",
     poses: Path | None = None,
+    crest: Literal["random", "optimised"] = "random",
+    detection_lines: bool = False,
     seed: int = 0,
 ) -> DesignedFrequency:
     """Write the plan `kind` for a robot to `out`; `poses` (default: frequency_poses.csv beside robot.yaml) lists where to excite.
+
+    `crest`: random phases, or ones with small peaks; with `detection_lines` one line in four is left out, to see odd distortion.
 
     Raises `FlexcalError` where the robot declares no elastic joint or no controller, or the poses cannot be read.
     """
@@ -52,6 +58,8 @@ def plan_frequency_experiments(
     if not model.elastic:
         raise InputError(f"{robot} declares no elastic joint, so there is nothing to excite; add `elastic:`.")
     beside = model.path.parent / "frequency_poses.csv"
-    plan = frequency_plan(model, beside if poses is None else poses, kind, seed)
+    plan = replace(frequency_plan(model, beside if poses is None else poses, kind, seed), crest=crest)
+    if detection_lines:
+        plan = leave_out_detection_lines(plan)
     write_plan(out, plan)
     return DesignedFrequency(plan, out)

@@ -12,6 +12,9 @@ from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.yaml_writer import to_plain
 
+_PLANS = (PLAN, "frequency_plan.yaml")
+"""The frequency plan in a folder of responses: as 'identify response' leaves it, and as the demo does."""
+
 
 def robot_file(plan: Path, given: Path | None) -> Path:
     """The robot.yaml of a plan: the one given, else that beside the plan, else that in the current folder; raises `InputError`."""
@@ -60,19 +63,17 @@ def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyRes
     return [files[i] for i in order], [responses[i] for i in order]
 
 
-def plan_of(files: Sequence[Path]) -> MultisinePlan | None:
-    """The plan under which responses were measured, from the file beside them; None where there is none.
+def plan_files(files: Sequence[Path]) -> list[Path]:
+    """The frequency plans beside responses, one a folder; none where a folder lacks it."""
+    folders = dict.fromkeys(file.parent for file in files)
+    found = [next((f / name for name in _PLANS if (f / name).is_file()), None) for f in folders]
+    return [path for path in found if path is not None] if all(found) else []
 
-    Raises `InputError` where plans differ.
-    """
-    paths = [_plan_in(folder) for folder in dict.fromkeys(file.parent for file in files)]
-    plans = [read_plan_of(path, MultisinePlan) for path in paths if path.is_file()]
-    for path, plan in zip(paths[1:], plans[1:], strict=False):
+
+def common_plan(paths: Sequence[Path]) -> MultisinePlan | None:
+    """The plan in these files, None without any; raises `InputError` where plans differ."""
+    plans = [read_plan_of(path, MultisinePlan) for path in paths]
+    for path, plan in zip(paths[1:], plans[1:], strict=True):
         if to_plain(plan) != to_plain(plans[0]):
             raise InputError(f"{path} is another plan than {paths[0]}; identify from responses of one plan.")
-    return plans[0] if len(plans) == len(paths) else None
-
-
-def _plan_in(folder: Path) -> Path:
-    """The frequency plan of a folder of responses: as 'identify response' leaves it, or as the demo does."""
-    return folder / PLAN if (folder / PLAN).is_file() else folder / "frequency_plan.yaml"
+    return plans[0] if plans else None

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
 from flexcal.data import MultisinePlan
+from flexcal.data.joint_limits import check_joint_limits
+from flexcal.data.table import open_table
 from flexcal.errors import InputError
 from flexcal.frequency.multisine import half_integer_frequency, odd_lines
 from flexcal.model import RobotModel
@@ -18,6 +19,8 @@ BASE_FREQUENCY_HZ = 0.25
 BAND_HZ = (3.0, 80.0)
 EXCITATION = 0.04
 """Root mean square of the excitation of an axis in one experiment, relative to its drive's effort."""
+DROOP = 2 * DEGREE
+"""How far an excited axis may stray from its reference: under gravity, which the soft loop holds imperfectly, and by the excitation."""
 
 
 def frequency_plan(
@@ -26,7 +29,7 @@ def frequency_plan(
     """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°); P1 §4.1.3, Fig. 4.
 
     Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two of them dropped, both signs.
-    Raises `InputError` where the file lacks the plan's poses, or robot.yaml a controller.
+    Raises `InputError` where the file lacks the plan's poses, robot.yaml a controller, or a pose the room that the motion about it needs.
     """
     if model.controller is None:
         raise InputError(
@@ -36,9 +39,12 @@ def frequency_plan(
     joints = tuple(e.index for e in model.elastic)
     efforts = np.array([model.joints[i].effort for i in joints])
     amplitude = EXCITATION * efforts * np.sqrt(2 * len(joints) / len(lines))
+    reference = (1.5 if kind == "default" else 3.0) * DEGREE
+    room = np.zeros(model.n)
+    room[list(joints)] = reference + DROOP
     return MultisinePlan(
         name=kind,
-        poses=read_frequency_poses(poses_file, kind, model.n),
+        poses=read_frequency_poses(poses_file, kind, model, room),
         joints=joints,
         payload=None if kind == "default" else 0.0,
         base_frequency_hz=BASE_FREQUENCY_HZ,
@@ -48,7 +54,7 @@ def frequency_plan(
         settle_periods=2,
         realisations=4,
         signs=True,
-        reference_amplitude=(1.5 if kind == "default" else 3.0) * DEGREE,
+        reference_amplitude=reference,
         reference_frequency_hz=half_integer_frequency(BASE_FREQUENCY_HZ, 2.125),
         kp=np.array(model.controller.kp),
         kd=np.array(model.controller.kd),
@@ -58,16 +64,23 @@ def frequency_plan(
     )
 
 
-def read_frequency_poses(path: Path, kind: str, joints: int) -> np.ndarray:
-    """Poses (P, n) in rad of one plan from a file with columns plan, pose, q1_deg … qn_deg; raises `InputError`."""
-    try:
-        with path.open(newline="") as stream:
-            rows = [row for row in csv.DictReader(stream) if row.get("plan") == kind]
-        poses = np.array([[float(row[f"q{i}_deg"]) for i in range(1, joints + 1)] for row in rows])
-    except (OSError, KeyError, ValueError) as problem:
-        raise InputError(
-            f"{path}: no poses can be read ({problem}); columns plan, pose, q1_deg … q{joints}_deg are needed."
-        ) from problem
-    if not len(poses):
+def read_frequency_poses(
+    path: Path, kind: str, model: RobotModel, room: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Poses (P, n) in rad of one plan from a table with columns plan, pose, q1_deg … qn_deg.
+
+    Raises `InputError` with file, line and column for what does not fit and for a joint with less than `room` (n,) rad to its limits.
+    """
+    file = open_table(path)
+    columns = [f"q{i}_deg" for i in range(1, model.n + 1)]
+    if file.columns != ("plan", "pose", *columns):
+        raise file.error(
+            f"the columns are {', '.join(file.columns)}, but for {model.path} they must be plan, pose, {', '.join(columns)}."
+        )
+    table = file.read(("plan", "pose"))
+    rows = np.flatnonzero(table.columns["plan"] == kind)
+    if not len(rows):
         raise InputError(f"{path}: there is no pose of the plan '{kind}'.")
-    return poses * DEGREE
+    poses = np.stack([table.columns[column] for column in columns], axis=1)[rows] * DEGREE
+    check_joint_limits(model, table, rows, columns, poses, room)
+    return poses

@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from flexcal.data import FolderCell, MultisinePlan, Recording, write_plan
 from flexcal.data.experiment_folder import PLAN
 from flexcal.errors import InputError
-from flexcal.frequency import Average, FrequencyResponse, frequency_responses
+from flexcal.frequency import (
+    Average,
+    FrequencyResponse,
+    frequency_responses,
+    local_polynomial_responses,
+)
 from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
 from flexcal.workflow.results import write_results
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +36,19 @@ class IdentifiedResponses:
 
 
 def identify_response(
-    robot: Path, folder: Path, out: Path, *, average: Average = "arithmetic", progress: Progress | None = None
+    robot: Path,
+    folder: Path,
+    out: Path,
+    *,
+    method: Average | Literal["local_polynomial"] = "arithmetic",
+    progress: Progress = silent,
 ) -> IdentifiedResponses:
     """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, streaming: no two recordings are ever in memory.
 
-    The plan goes with them: the fit of stage 1 needs its reference motion.
+    `method` averages the realisations in one of the ways of `frequency_response`, or is the local polynomial method. The plan goes with
+    the responses: the fit of stage 1 needs its reference motion.
     Raises `FlexcalError` where a log is missing, has gaps or does not fit the plan.
     """
-    tell = progress or (lambda stage, share: None)
     model = RobotModel.from_yaml(robot, estimates=False)
     cell = FolderCell(folder, model)
     plan = cell.plan
@@ -49,8 +58,11 @@ def identify_response(
         )
     total = len(plan.poses) * plan.recordings_per_pose
     names = [model.joint_names[i] for i in plan.joints]
-    recordings = _counted(cell.record(), total, tell)
-    responses = tuple(frequency_responses(plan, recordings, average, joint_names=names))
+    recordings = _counted(cell.record(), total, progress)
+    if method == "local_polynomial":
+        responses = tuple(local_polynomial_responses(plan, recordings, joint_names=names))
+    else:
+        responses = tuple(frequency_responses(plan, recordings, method, joint_names=names))
     files = tuple(out / f"response_pose_{response.pose + 1}.npz" for response in responses)
     for response, file in zip(responses, files, strict=True):
         response.save(file)
@@ -60,11 +72,11 @@ def identify_response(
     return result
 
 
-def _counted(recordings: Iterable[Recording], total: int, tell: Progress) -> Iterator[Recording]:
-    tell("responses", 0.0)
+def _counted(recordings: Iterable[Recording], total: int, progress: Progress) -> Iterator[Recording]:
+    progress("responses", 0.0)
     for number, recording in enumerate(recordings, start=1):
         yield recording
-        tell("responses", number / total)
+        progress("responses", number / total)
 
 
 def _summary(response: FrequencyResponse, file: Path) -> dict[str, Any]:
@@ -79,7 +91,9 @@ def _summary(response: FrequencyResponse, file: Path) -> dict[str, Any]:
         "lines": len(response.frequencies_hz),
         "lowest_hz": float(response.frequencies_hz[0]),
         "highest_hz": float(response.frequencies_hz[-1]),
+        "method": response.average,
         "degrees_of_freedom": response.degrees_of_freedom,
         "relative_std": relative(response.std),
         "relative_noise_std": relative(response.noise_std),
+        "odd_distortion": response.odd_distortion,
     }

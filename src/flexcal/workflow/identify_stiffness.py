@@ -2,24 +2,43 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from flexcal.data import provenance, read_estimates, write_estimates
-from flexcal.elasticity import StiffnessResult, identify_stiffness
+from flexcal.elasticity import (
+    CovarianceWeighting,
+    MultiStart,
+    PaperWeighting,
+    PopulationSearch,
+    Search,
+    StiffnessResult,
+    UniformWeighting,
+    Weighting,
+    identify_stiffness,
+)
 from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
-from flexcal.workflow.experiment_files import plan_of, read_responses
+from flexcal.progress import Progress, silent
+from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 
-Progress = Callable[[str, float], None]
+WeightingName = Literal["covariance", "paper", "uniform"]
+SearchName = Literal["multi-start", "population"]
+
+_WEIGHTINGS: dict[WeightingName, Weighting] = {
+    "covariance": CovarianceWeighting(),
+    "paper": PaperWeighting(),
+    "uniform": UniformWeighting(),
+}
+_SEARCHES: dict[SearchName, Search] = {"multi-start": MultiStart(), "population": PopulationSearch()}
 
 _GEOMETRIC = (*GEOMETRY, "backlash")
 """What the calibration knows that stage 1 does not estimate itself."""
@@ -68,9 +87,11 @@ def identify_robot_stiffness(
     files: Sequence[Path],
     *,
     inertias_known: bool = False,
+    weighting: WeightingName = "covariance",
+    search: SearchName = "multi-start",
     seed: int = 0,
     out: Path | None = None,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> RobotStiffness:
     """Fit the springs of a robot.yaml to frequency responses (files, or folders of them), and store the block `stiffness`.
 
@@ -79,7 +100,6 @@ def identify_robot_stiffness(
     and results.json go to that folder. `seed` is that of the search for a start. Raises `FlexcalError` where responses do not fit the
     robot; nothing is written then.
     """
-    tell = progress or (lambda stage, share: None)
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="stiffness") if source.exists() else {}
@@ -89,17 +109,22 @@ def identify_robot_stiffness(
         geometric = {n: v for n, v in calibrated.values.items() if n.rpartition(".")[2] in _GEOMETRIC}
         model = model.with_values(geometric)
     inputs, responses = read_responses(files)
-    plan = plan_of(inputs)
+    plans = plan_files(inputs)
+    plan = common_plan(plans)
     result = identify_stiffness(
         model,
         responses,
         rng=np.random.default_rng([seed, 1]),
         inertias_known=inertias_known,
         plan=plan,
-        progress=tell,
+        weighting=_WEIGHTINGS[weighting],
+        search=_SEARCHES[search],
+        progress=progress,
     )
-    options = {"inertias_known": inertias_known, "seed": seed}
-    origin = provenance([robot, bare.urdf, *inputs], options, source if blocks else None, tuple(blocks))
+    options = {"inertias_known": inertias_known, "weighting": weighting, "search": search, "seed": seed}
+    origin = provenance(
+        [robot, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
+    )
     estimate = replace(result.estimate, provenance=origin)
     target = source if out is None else out / "estimates.yaml"
     found = RobotStiffness(result, plan is not None, estimate, target)

@@ -24,8 +24,8 @@ _ROUNDING = 1e-9
 
 
 def json_text(document: Mapping[str, Any]) -> str:
-    """`document` as JSON; numbers that are not finite become null."""
-    return json.dumps(_plain(document), indent=2, ensure_ascii=False, allow_nan=False)
+    """`document` as JSON, in ASCII letters; numbers that are not finite become null."""
+    return json.dumps(_plain(document), indent=2, allow_nan=False)
 
 
 def write_results(folder: Path, document: Mapping[str, Any]) -> None:

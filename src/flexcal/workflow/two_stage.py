@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -12,14 +12,15 @@ from typing import Literal
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, register, verify
-from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, write_truth
+from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
 from flexcal.data import MultisinePlan, Recording, provenance, write_estimates, write_plan, write_poses
-from flexcal.design import choose_poses, random_poses
+from flexcal.design import MeasuringSetup, design_poses, random_poses
 from flexcal.elasticity import identify_stiffness
 from flexcal.estimation import Estimate
 from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
 from flexcal.report.publication import TX90L_PAPER
 from flexcal.report.study import TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
@@ -27,9 +28,6 @@ from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.results import write_results
 from flexcal.workflow.two_stage_results import two_stage_document, write_verification
 from flexcal.yaml_reader import read_yaml
-
-Progress = Callable[[str, float], None]
-"""Called with the name of the stage and the share of it that is done."""
 
 CALIBRATION_POSES = 40
 RIGID_POSES = (40, 100)
@@ -61,7 +59,7 @@ def run_two_stage(
     truth: Path | None = None,
     inertias_known: bool = False,
     report: bool = True,
-    progress: Progress | None = None,
+    progress: Progress = silent,
 ) -> TwoStageStudy:
     """Run the two-stage calibration on the virtual cell and leave every intermediate file, results.json and report.html in `out`.
 
@@ -69,7 +67,6 @@ def run_two_stage(
     `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and stored. `inertias_known` gives
     the identification the true link inertias, to see what CAD costs. Raises `FlexcalError` for files that do not fit.
     """
-    tell = progress or (lambda stage, share: None)
     watch = Stopwatch()
     nominal = RobotModel.from_yaml(robot, estimates=False)
     config = read_yaml(robot.parent / "cell.yaml", CellConfig)
@@ -79,7 +76,7 @@ def run_two_stage(
         hidden,
         draw_truth(nominal, config.spread, np.random.default_rng([seed, 0]))
         if truth is None
-        else read_truth(truth),
+        else read_truth_of(truth, nominal),
     )
     cell = VirtualCell(nominal.with_values(read_truth(hidden)), config, seed, controller_model=nominal)
     believed = nominal.with_values(_inertias(read_truth(hidden))) if inertias_known else nominal
@@ -88,47 +85,51 @@ def run_two_stage(
     write_plan(out / "frequency_plan.yaml", frequency)
     with watch.stage("frequency"):
         responses = tuple(
-            measure_responses(cell, frequency, believed, lambda share: tell("frequency", share))
+            measure_responses(cell, frequency, believed, lambda share: progress("frequency", share))
         )
-    for response in responses:
-        response.save(out / f"response_pose_{response.pose + 1}.npz")
+    files = [out / f"response_pose_{response.pose + 1}.npz" for response in responses]
+    for response, file in zip(responses, files, strict=True):
+        response.save(file)
     with watch.stage("stage1"):
-        tell("stage1", 0.0)
+        progress("stage1", 0.0)
         stiffness = identify_stiffness(
             believed,
             responses,
             inertias_known=inertias_known,
             plan=frequency,
             rng=np.random.default_rng([seed, 1]),
+            progress=lambda part, share: progress("stage1", (share + (part == "fitting")) / 2),
         )
         elastic = believed.with_estimate(stiffness.estimate)
-        tell("stage1", 1.0)
+        progress("stage1", 1.0)
     with watch.stage("poses"):
-        tell("poses", 0.0)
-        payload = frequency.payload
-        chosen = choose_poses(
-            elastic, CALIBRATION_POSES, rng=np.random.default_rng([seed, 2]), payload=payload
-        )
+        progress("poses", 0.0)
+        setup = MeasuringSetup(payload=frequency.payload)
+        chosen = design_poses(
+            elastic, CALIBRATION_POSES, rng=np.random.default_rng([seed, 2]), setup=setup
+        ).plan
+        progress("poses", 0.25)
         for_rigid = [
-            choose_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), payload=payload)
+            design_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), setup=setup).plan
             for n in RIGID_POSES
         ]
-        anywhere = random_poses(
-            nominal, VERIFICATION_POSES, np.random.default_rng([seed, 4]), payload=payload
-        )
-        tell("poses", 1.0)
+        progress("poses", 0.9)
+        anywhere = random_poses(nominal, VERIFICATION_POSES, np.random.default_rng([seed, 4]), setup)
+        progress("poses", 1.0)
     with watch.stage("stage2"):
-        tell("stage2", 0.0)
+        progress("stage2", 0.0)
         measured = cell.measure(chosen)
-        calibration = calibrate(elastic, measured, stiffness=stiffness.estimate)
-        tell("stage2", 0.5)
+        calibration = calibrate(elastic, measured)
+        progress("stage2", 0.5)
         rigid = tuple(calibrate(believed, cell.measure(p), elastic=False) for p in for_rigid)
-        tell("stage2", 1.0)
+        progress("stage2", 1.0)
     write_poses(out / "calibration_poses.csv", measured)
-    _store(out, robot, stiffness.estimate, calibration.estimate)
+    options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
+    stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, calibration.estimate)
+    calibration = replace(calibration, estimate=stored)
     exported = write_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):
-        tell("verification", 0.0)
+        progress("verification", 0.0)
         seen = cell.measure(anywhere)
         write_poses(out / "verification_poses.csv", seen)
         known = read_truth(hidden)
@@ -157,14 +158,14 @@ def run_two_stage(
             command=f"flexcal demo --seed {seed} --plan {plan}"
             + ("" if truth is None else f" --truth {truth.name}"),
         )
-        tell("verification", 1.0)
+        progress("verification", 1.0)
     study = replace(study, results=two_stage_document(study, exported))
     with watch.stage("report"):
-        tell("report", 0.0)
+        progress("report", 0.0)
         write_verification(out / "verification.csv", study)
         if report:
             write_two_stage_report(out / "report.html", study)
-        tell("report", 1.0)
+        progress("report", 1.0)
     study = replace(study, results=two_stage_document(study, exported))
     write_results(out, study.results)
     return study
@@ -185,13 +186,22 @@ def measure_responses(
     return frequency_responses(plan, counted(), joint_names=names)
 
 
-def _store(out: Path, robot: Path, stiffness: Estimate, geometry: Estimate) -> None:
-    """Store both blocks of `out`/estimates.yaml with what they came from."""
+def _store(
+    out: Path,
+    robot: Sequence[Path],
+    responses: Sequence[Path],
+    options: Mapping[str, object],
+    stiffness: Estimate,
+    geometry: Estimate,
+) -> Estimate:
+    """Store both blocks of `out`/estimates.yaml with what they came from; the geometry with its provenance."""
     path = out / "estimates.yaml"
-    responses = sorted(out.glob("response_pose_*.npz"))
-    write_estimates(path, "stiffness", replace(stiffness, provenance=provenance([robot, *responses])))
-    origin = provenance([robot, out / "calibration_poses.csv"], None, path, ("stiffness",))
-    write_estimates(path, "calibration", replace(geometry, provenance=origin))
+    origin = provenance([*robot, out / "frequency_plan.yaml", *responses], options)
+    write_estimates(path, "stiffness", replace(stiffness, provenance=origin))
+    origin = provenance([*robot, out / "calibration_poses.csv"], options, path, ("stiffness",))
+    stored = replace(geometry, provenance=origin)
+    write_estimates(path, "calibration", stored)
+    return stored
 
 
 def _inertias(truth: dict[str, float]) -> dict[str, float]:

@@ -9,13 +9,15 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, Verification, verify
-from flexcal.data import PoseSet, read_poses
+from flexcal.calibration import ErrorStatistics, Verification, require_points, verify
+from flexcal.data import PoseSet, provenance, read_estimates, read_poses, sha256_of
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
-from flexcal.model.stored import apply_estimates
+from flexcal.model.stored import with_blocks
+from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
+from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.results import write_results
 
 
@@ -23,15 +25,32 @@ from flexcal.workflow.results import write_results
 class RobotVerification:
     """Errors of the calibrated robot at `poses`, and `nominal`: those of the uncalibrated one after a rigid registration.
 
-    `nominal` is None with fewer than four poses, which a registration fits too well to say anything.
+    `nominal` is None with fewer than four poses, which a registration fits too well to say anything; `fitted` are the files among them
+    that the calibration was made from.
     """
 
     poses: PoseSet
     result: Verification
     nominal: ErrorStatistics | None
+    fitted: tuple[str, ...]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence each."""
+        remarks = list(unused_columns(self.poses))
+        if self.fitted:
+            which = " and ".join(self.fitted)
+            remarks.append(
+                f"the calibration was fitted to {which}, so this says little about other poses; verify on poses that it never saw"
+            )
+        return tuple(remarks)
 
     def document(self) -> dict[str, Any]:
-        """The content of results.json; `predicted_std_mm` is the mean 1σ of the distance that the calibration promises."""
+        """The content of results.json; `rms_mm` has the root mean square distances.
+
+        `parameters` is what the parameters' covariance predicts, `expected` with the measurement's sigma on top (null where the files give
+        none), `measured` what was found.
+        """
         result = self.result
         measured = result.all.in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
@@ -39,8 +58,13 @@ class RobotVerification:
             blocks["nominal"] = self.nominal.in_millimetres()
         return {
             "verification": blocks,
-            "predicted_std_mm": float(np.mean(result.std)) / MILLIMETRE,
+            "rms_mm": {
+                "parameters": _rms(result.expected_rms()),
+                "expected": _rms(result.expected_rms(self.poses.sigma)) if self.poses.sigma_given else None,
+                "measured": _rms(np.linalg.norm(result.errors, axis=1)),
+            },
             "ambiguous_poses": int(result.ambiguous.sum()),
+            "remarks": list(self.remarks),
         }
 
 
@@ -49,31 +73,36 @@ def verify_robot(
 ) -> RobotVerification:
     """Predict the points of `files` with the calibrated robot and compare.
 
-    `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json is left in
-    that folder. Raises `FlexcalError` where there is no calibration, a station stands where no calibration pose was
+    `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json and
+    report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no calibration pose was
     measured, or a file does not fit.
     """
     bare = RobotModel.from_yaml(robot, estimates=False)
     stored = _estimates_file(bare, estimates)
-    model = apply_estimates(bare, stored)
-    if "tool.length_x" not in model.posterior.parameters:
+    blocks = read_estimates(stored)
+    if "calibration" not in blocks:
         raise InputError(
             f"{stored}: there is no calibration in it; run 'flexcal calibrate {robot} POSES…' first."
         )
+    model = with_blocks(bare, blocks, stored)
     poses = read_poses(list(files), model, require_motion=False)
-    if poses.length is not None:
-        raise InputError(
-            f"{files[0]} measures lengths of a wire, which cannot be verified yet; give points x, y, z."
-        )
+    require_points(poses, " and ".join(str(file) for file in files))
     for station in poses.stations:
         if f"station.{station}.x" not in model.posterior.parameters:
             raise FlexcalError(
                 f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
             )
-    before = ErrorStatistics.of(nominal_errors(bare, poses)) if _registrable(poses) else None
-    result = RobotVerification(poses, verify(model, poses), before)
+    before = nominal_errors(bare, poses) if _registrable(poses) else None
+    nominal = None if before is None else ErrorStatistics.of(before)
+    known = blocks["calibration"].provenance.values()
+    fitted = tuple(file.name for file in files if sha256_of(file) in known)
+    result = RobotVerification(poses, verify(model, poses), nominal, fitted)
     if out is not None:
-        write_results(out, result.document())
+        document = result.document()
+        write_results(out, document)
+        origin = provenance([robot, bare.urdf, *files], None, stored, tuple(blocks))
+        study = VerificationStudy(model, poses, result.result, before, origin, results=document)
+        write_verification_report(out / "report.html", study)
     return result
 
 
@@ -85,6 +114,11 @@ def _estimates_file(model: RobotModel, given: Path | None) -> Path:
             f"{path} does not exist, so there is nothing to verify; run 'flexcal calibrate {model.path} POSES…' first."
         )
     return path
+
+
+def _rms(distance: np.ndarray) -> float:
+    """Root mean square (mm) of distances (N,) in m."""
+    return float(np.sqrt(np.mean(distance**2))) / MILLIMETRE
 
 
 def _registrable(poses: PoseSet) -> bool:

@@ -15,7 +15,7 @@ def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
     """Components x, y, z of the residuals (N, 3) m in millimetres, one panel each, with the instrument's ± 2σ around them."""
     figure = panels(3, 1, 470, ["x", "y", "z"], row_gap=0.08)
     noise = 2 * poses.sigma / MILLIMETRE
-    largest = 1.1 * max(float(np.abs(residuals).max(initial=1e-9)) / MILLIMETRE, float(np.median(noise)))
+    largest = 1.1 * max(float(np.abs(residuals).max(initial=1e-9)) / MILLIMETRE, float(noise.max()))
     for k in range(3):
         for sign in (1, -1):
             figure.add_trace(

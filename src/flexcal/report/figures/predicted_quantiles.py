@@ -19,7 +19,7 @@ def predicted_quantiles(verification: Verification, noise: np.ndarray | None = N
     """
     clear = ~verification.ambiguous
     observed = np.sort(np.linalg.norm(verification.errors[clear], axis=1)) / MILLIMETRE
-    expected = expected_quantiles(prediction_std(verification, noise)[clear]) / MILLIMETRE
+    expected = expected_quantiles(verification.expected_rms(noise)[clear]) / MILLIMETRE
     largest = 1.06 * max(float(observed.max(initial=1e-3)), float(expected.max(initial=1e-3)))
     figure = canvas(400)
     figure.add_trace(
@@ -39,13 +39,6 @@ def predicted_quantiles(verification: Verification, noise: np.ndarray | None = N
     figure.update_yaxes(title_text="observed error / mm", range=[0, largest], rangemode="tozero")
     figure.update_layout(font={"color": INK})
     return figure
-
-
-def prediction_std(verification: Verification, noise: np.ndarray | None = None) -> np.ndarray:
-    """1σ (N,) m of the distance: of the prediction, with the instrument's noise (N, 3) on top where given."""
-    if noise is None:
-        return verification.std
-    return np.sqrt(verification.std**2 + (noise**2).sum(axis=1))
 
 
 def expected_quantiles(std: np.ndarray) -> np.ndarray:

@@ -12,7 +12,7 @@ from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.data import PoseSet
 from flexcal.report.figures.calibration_errors import millimetre_axis
 from flexcal.report.figures.canvas import canvas, positive, single
-from flexcal.report.palette import ELASTIC, INK, PAGE
+from flexcal.report.palette import ELASTIC, INK
 from flexcal.units import MILLIMETRE
 
 
@@ -65,14 +65,15 @@ def verification_errors(
             )
         )
     if paper is not None:
-        for value, text in ((paper.p90, "paper, 90 %"), (paper.max, "paper, worst")):
+        ends = single([poses.pose.min(), poses.pose.max()])
+        for value, share, dash in ((paper.p90, "90 %", "dot"), (paper.max, "worst", "dash")):
             if np.isfinite(value):
-                figure.add_hline(y=value / MILLIMETRE, line={"color": INK, "width": 1, "dash": "dot"})
-                above = text.endswith("worst")
-                figure.add_annotation(
-                    x=1, xref="paper", xanchor="right", y=np.log10(value / MILLIMETRE), yanchor="bottom" if above else "top",
-                    text=text, showarrow=False, font={"size": 11, "color": INK}, bgcolor=PAGE, opacity=0.85,
-                )  # fmt: skip
+                name = f"paper, {share}"
+                line = {"color": INK, "width": 1.2, "dash": dash}
+                both = single(np.full(2, value / MILLIMETRE))
+                figure.add_trace(
+                    go.Scatter(x=ends, y=both, mode="lines", line=line, name=name, hoverinfo="name+y")
+                )
     millimetre_axis(figure)
     figure.update_xaxes(title_text="verification pose")
     return figure

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from flexcal.estimation import Identifiability, name_direction
+from flexcal.estimation import Dropped, Identifiability, name_direction
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.page import Block, FigureBlock, Table, Text
 from flexcal.report.publication import Publication
@@ -43,14 +45,15 @@ def identifiability_blocks(found: Identifiability, paper: Publication | None) ->
         ),
     ]
     if dropped:
-        blocks.append(_dropped_table(found))
+        blocks.append(dropped_table(found.dropped))
     blocks.append(_weak_table(found))
     return tuple(blocks)
 
 
-def _dropped_table(found: Identifiability) -> Table:
+def dropped_table(dropped: Sequence[Dropped]) -> Table:
+    """Every dropped parameter with what absorbed it."""
     rows = []
-    for item in found.dropped:
+    for item in dropped:
         absorbed = [(name, c) for name, c in item.absorbed_by if abs(c) > _NOTHING]
         terms = [_amount(c) + name for name, c in absorbed[:_MOST]]
         more = len(absorbed) - len(terms)

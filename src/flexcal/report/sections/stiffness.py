@@ -42,15 +42,7 @@ def stiffness_section(study: TwoStageStudy) -> Section:
             f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to {word}, with 95 % intervals. "
             "The numbers are in Table 1.",
         ),
-        FigureBlock(
-            "figure-5",
-            f"Figure 5: the measured frequency response, {labels[0].lower()}",
-            response_levels(first),
-            f"How strongly each motor accelerates (row) for a torque on each motor (column), at {len(first.frequencies_hz)} frequencies. "
-            "Valleys and peaks are the arm swinging on its springs. The lower curves are one standard deviation of the mean: noise of "
-            "the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
-            _levels_in_words(first),
-        ),
+        response_block(first, labels[0]),
         FigureBlock(
             "figure-7",
             "Figures 7 to 9: measured responses against the fitted model",
@@ -69,6 +61,19 @@ def stiffness_section(study: TwoStageStudy) -> Section:
         "accelerations that answer, show how stiff each drive and each bearing is: the arm resonates where its springs say. "
         f"{_experiment(study)}",
         tuple(blocks),
+    )
+
+
+def response_block(response: FrequencyResponse, label: str) -> FigureBlock:
+    """Fig. 5: one measured frequency response."""
+    return FigureBlock(
+        "figure-5",
+        f"Figure 5: the measured frequency response, {label.lower()}",
+        response_levels(response),
+        f"How strongly each motor accelerates (row) for a torque on each motor (column), at {len(response.frequencies_hz)} frequencies. "
+        "Valleys and peaks are the arm swinging on its springs. The lower curves are one standard deviation of the mean: noise of "
+        "the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
+        _levels_in_words(response),
     )
 
 

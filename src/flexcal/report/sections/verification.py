@@ -116,7 +116,7 @@ def _floor_words(study: TwoStageStudy) -> tuple[str, ...]:
         words = [
             "The floor, what would remain with every parameter known exactly, was not computed for this run."
         ]
-    std = study.elastic_verification.std
+    std = study.elastic_verification.parameter_rms
     if (std > 0).any():
         words.append(
             f"Uncertainty of the parameters alone predicts errors of {millimetres(float((std**2).mean() ** 0.5))} mm (root mean square). "

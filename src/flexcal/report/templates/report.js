@@ -4,11 +4,18 @@
   const dark = JSON.parse(document.getElementById("dark-colours").textContent);
   const scheme = window.matchMedia("(prefers-color-scheme: dark)");
   // Buttons by name: the default ones would offer to send the data to a server.
-  const config = { responsive: true, displaylogo: false, plotlyServerURL: "" };
+  const config = { displaylogo: false, plotlyServerURL: "" };
   const flatButtons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
   const spaceButtons = [["toImage", "resetCameraDefault3d"]];
   const figures = new Map();
   let printing = false;
+  const widths = new ResizeObserver(function (entries) {
+    for (const entry of entries) {
+      const place = entry.target;
+      const full = place._fullLayout;
+      if (full && Math.abs(full.width - place.clientWidth) > 1) setTimeout(() => draw(place.id), 0);
+    }
+  });
 
   function recoloured(value) {
     if (typeof value === "string") return dark[value] || value;
@@ -34,9 +41,7 @@
     let layout = Object.assign({}, figure.layout);
     if (narrow) {
       layout.font = Object.assign({}, layout.font, { size: 11 });
-      const legend = layout.showlegend ? 30 : 0;
-      layout.margin = Object.assign({}, layout.margin, { l: Math.min(layout.margin.l, 44), r: 6, t: layout.margin.t + legend });
-      layout.height += legend;
+      layout.margin = Object.assign({}, layout.margin, { l: Math.min(layout.margin.l, 44), r: 6 });
       layout.dragmode = layout.scene ? layout.dragmode : false;
       if (layout.scene) {
         const eye = layout.scene.camera.eye;
@@ -51,10 +56,21 @@
     }
     const waiting = place.querySelector(".waiting");
     if (waiting) waiting.remove();
-    return Plotly.react(place, data, layout, Object.assign({}, config, {
+    const drawn = Plotly.react(place, data, layout, Object.assign({}, config, {
       displayModeBar: narrow ? false : "hover",
       modeBarButtons: layout.scene ? spaceButtons : flatButtons,
     }));
+    return drawn.then(function () {
+      makeRoom(place, layout);
+    });
+  }
+
+  // The legend stands above the figure in as many rows as it needs; the titles of panels stand between.
+  function makeRoom(place, layout) {
+    const legend = place.querySelector("g.legend");
+    if (!legend) return;
+    const missing = Math.ceil(legend.getBBox().height) + 28 - layout.margin.t;
+    if (missing > 0) Plotly.relayout(place, { "margin.t": layout.margin.t + missing, height: layout.height + missing });
   }
 
   function drawAll() {
@@ -68,6 +84,7 @@
     document.head.append(program);
     for (const holder of document.querySelectorAll("script[data-specification]")) {
       figures.set(holder.dataset.specification, JSON.parse(holder.textContent));
+      widths.observe(document.getElementById(holder.dataset.specification));
     }
     const waiting = [...figures.keys()];
     (function next() {

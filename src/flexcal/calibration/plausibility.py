@@ -1,0 +1,46 @@
+"""Whether a fit ended near enough to where it began to be believed: data with a wrong sign or unit can be fitted perfectly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.calibrate import Calibration
+from flexcal.calibration.terms import tolerances
+
+FAR = 50.0
+"""Tolerances by which no geometric parameter should be off: 15 mm, 25 mrad."""
+
+FAR_FROM_PRIOR = 5.0
+"""Standard deviations of its prior by which no stiffness, mass or centre of mass should be off."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A parameter that ended at `value`, `times` its tolerance (or the standard deviation of its prior) from its start."""
+
+    name: str
+    start: float
+    value: float
+    unit: str
+    times: float
+
+
+def moved_far(found: Calibration) -> tuple[Moved, ...]:
+    """The parameters that a fit moved implausibly far, the farthest first."""
+    estimate, prior = found.estimate.parameters, found.prior
+    kept = [name for name in found.identifiability.kept_names if _has_size(name)]
+    named = [*kept, *prior.parameters.names]
+    end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
+    size = np.concatenate([tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))])
+    limit = np.concatenate([np.full(len(kept), FAR), np.full(len(prior.parameters), FAR_FROM_PRIOR)])
+    times = np.abs(end - start) / size
+    far = [k for k in np.argsort(-times / limit) if times[k] > limit[k]]
+    items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
+    return tuple(Moved(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
+
+
+def _has_size(name: str) -> bool:
+    """Whether robot.yaml or the URDF say how large a parameter may be: not of the place of the instrument, nor of a compliance."""
+    return not name.startswith("station.") and not name.endswith(".gravity_compliance")

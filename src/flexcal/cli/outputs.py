@@ -1,0 +1,101 @@
+"""What `--out` may write over: only what flexcal wrote; a file that somebody else wrote or changed is never touched."""
+
+from __future__ import annotations
+
+import glob
+import hashlib
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from flexcal.errors import InputError
+
+LEDGER = ".flexcal"
+"""In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it; of a name the last line counts."""
+
+
+@contextmanager
+def outputs(out: Path | None, names: Sequence[str] = ()) -> Iterator[None]:
+    """Around a verb that writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing.
+
+    Raises `InputError` beforehand where the folder cannot be written to, and where one of the files is there already that flexcal did
+    not write or that was changed since. When the verb fails, what it made is removed again; when it succeeds, so is what an earlier run
+    left under these names.
+    """
+    if out is None:
+        yield
+        return
+    folder = out if names else out.parent
+    patterns = names or [glob.escape(out.name)]
+    made = _make(folder)
+    known = _ledger(folder)
+    before = _present(folder, patterns)
+    try:
+        for path in before:
+            if known.get(path.name) != _sha256(path):
+                raise InputError(
+                    f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
+                    "give another --out, or move it away."
+                )
+        yield
+    except BaseException:
+        for path in _present(folder, patterns).keys() - before.keys():
+            path.unlink()
+        _record(folder, _present(folder, patterns), before, known)
+        for path in made:
+            with suppress(OSError):
+                path.rmdir()
+        raise
+    after = _present(folder, patterns)
+    for path in before:
+        if after.get(path) == before[path]:
+            path.unlink()
+    _record(folder, after, before, known)
+
+
+def _make(folder: Path) -> list[Path]:
+    """Make a folder; the folders that had to be made for it, the innermost first."""
+    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise InputError(f"{folder} cannot be written to (it is a file); choose another --out.") from None
+    except OSError as problem:
+        raise InputError(
+            f"{folder} cannot be written to ({problem.strerror or problem}); choose another --out."
+        ) from problem
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise InputError(f"{folder} cannot be written to (permission denied); choose another --out.")
+    return missing
+
+
+def _present(folder: Path, patterns: Sequence[str]) -> dict[Path, tuple[int, int]]:
+    """The files there by these names, and what changes whenever one is written anew."""
+    files = {path for pattern in patterns for path in folder.glob(pattern) if path.is_file()}
+    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in sorted(files)}
+
+
+def _ledger(folder: Path) -> dict[str, str]:
+    path = folder / LEDGER
+    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
+    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+
+
+def _record(
+    folder: Path,
+    present: dict[Path, tuple[int, int]],
+    before: dict[Path, tuple[int, int]],
+    known: dict[str, str],
+) -> None:
+    """Add what was written anew, in one write, so that verbs which run at the same time do not lose each other's lines."""
+    written = {path.name: _sha256(path) for path in present if present[path] != before.get(path)}
+    lines = [f"{digest}  {name}\n" for name, digest in written.items() if known.get(name) != digest]
+    if lines:
+        with (folder / LEDGER).open("a", encoding="utf-8") as stream:
+            stream.write("".join(lines))
+
+
+def _sha256(path: Path) -> str:
+    with path.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()

@@ -1,0 +1,36 @@
+"""Poses to choose from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+
+
+@dataclass(frozen=True, eq=False)
+class PosePool:
+    """N feasible poses: `q` (N, n) rad, their numbers `pose` (N,), and the `payload` (kg) held in all of them; None as declared.
+
+    Raises `FlexcalError` where shapes do not fit or a number stands twice.
+    """
+
+    q: np.ndarray
+    pose: np.ndarray
+    payload: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.q.ndim != 2 or self.pose.shape != self.q.shape[:1]:
+            raise FlexcalError(
+                f"a pool of {self.pose.size} poses has joint positions of shape {self.q.shape}."
+            )
+        if np.unique(self.pose).size < self.pose.size:
+            raise FlexcalError("a pool holds every pose once; give every pose its own number.")
+
+    def __len__(self) -> int:
+        return len(self.q)
+
+    def subset(self, rows: np.ndarray) -> PosePool:
+        """The poses with these indices, or where this mask is true, in their order."""
+        return PosePool(self.q[rows], self.pose[rows], self.payload)

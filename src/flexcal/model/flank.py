@@ -1,0 +1,52 @@
+"""On which flank of its backlash gravity presses a joint, and how surely: the one rule for choosing poses and for judging them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.model.equilibrium import gravity_regressor, payload_batch
+from flexcal.model.robot_model import RobotModel
+
+CERTAIN = 3.0
+"""Standard deviations that the torque on a drive must be away from zero for its sign to be certain."""
+
+
+def certain_flank(
+    model: RobotModel, q: np.ndarray, torque: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Whether the sign of `torque` (samples, n) N m, with which drives hold gravity at `q` (samples, n), is certain, (samples, n)."""
+    return np.abs(torque) > CERTAIN * gravity_torque_std(model, q, payload)
+
+
+def gravity_torque_std(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Standard deviation (samples, n), N m, of the gravity torque at `q` (samples, n), to first order.
+
+    From the covariance of masses and centres of mass: that of the model's posterior where they were estimated, else independent ones as
+    `prior:` and the payload's `mass_std` say. `payload` (samples,) or a scalar in kg at the declared payload's centre of mass.
+    Prismatic joints read 0.
+    """
+    masses = payload_batch(model, payload, len(q))
+    regressor = gravity_regressor(model, q, masses).reshape(len(q), model.n, model.n, 4)
+    names: list[str] = []
+    rows: list[np.ndarray] = []
+    declared: list[float] = []
+    for k, joint in enumerate(model.joints):
+        names += [f"{joint.link}.{key}" for key in ("mass", "com_x", "com_y", "com_z")]
+        rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.com[k])
+        rows += [model.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
+        declared += [model.prior.mass * model.mass[k], *[model.prior.com] * 3]
+    held = model.payload
+    if held is not None and held.mass > 0:
+        own = regressor[:, :, held.joint]
+        names.append("payload.mass")
+        rows.append((masses / held.mass)[:, None] * (own[:, :, 0] + own[:, :, 1:] @ held.com_in_link))
+        declared.append(held.mass_std)
+    covariance = np.diag(np.square(declared))
+    known = [i for i, name in enumerate(names) if model.posterior.determines(name)]
+    parameters = model.posterior.parameters.subset([names[i] for i in known])
+    slopes = parameters.natural_slope(parameters.coordinates())
+    covariance[np.ix_(known, known)] = model.posterior.marginal(parameters.names) * np.outer(slopes, slopes)
+    slope = np.stack(rows, axis=2)
+    return np.sqrt(np.einsum("snp,pq,snq->sn", slope, covariance, slope))

@@ -1,0 +1,76 @@
+"""The elements of a URDF with the lines they stand on, which messages need and no URDF parser keeps."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+import numpy as np
+
+from flexcal.errors import InputError
+
+
+@dataclass(frozen=True)
+class Element:
+    """An XML element of the file `path`: its tag, attributes, first `line` and children."""
+
+    path: Path
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """The children of this tag."""
+        return (child for child in self.children if child.tag == tag)
+
+    def find(self, tag: str) -> Element | None:
+        """The first child of this tag."""
+        return next(self.all(tag), None)
+
+    def error(self, sentence: str) -> InputError:
+        """An `InputError` that places `sentence` at the element's line."""
+        return InputError(f"{self.path} line {self.line}: {sentence}")
+
+    def numbers(self, attribute: str, count: int, owner: str) -> np.ndarray:
+        """The `count` finite numbers of an attribute; raises `InputError` that names its `owner` where it is missing or holds others."""
+        text = self.attributes.get(attribute)
+        if text is None:
+            raise self.error(f"<{self.tag}> of {owner} lacks the attribute '{attribute}'; add it.")
+        try:
+            values = np.array([float(word) for word in text.split()])
+        except ValueError:
+            values = np.array([np.nan])
+        if len(values) != count or not np.isfinite(values).all():
+            what = "a number" if count == 1 else f"{count} numbers"
+            raise self.error(
+                f'{attribute}="{text}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.'
+            )
+        return values
+
+
+def read_elements(path: Path) -> Element:
+    """The root element of an XML file; raises `InputError` with line and column where it is not well-formed."""
+    parser = expat.ParserCreate()
+    above: list[Element] = []
+    roots: list[Element] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(path, tag, attributes, parser.CurrentLineNumber)
+        (above[-1].children if above else roots).append(element)
+        above.append(element)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda tag: above.pop()
+    try:
+        parser.Parse(path.read_bytes(), True)
+    except OSError as problem:
+        raise InputError(f"{path} cannot be read ({problem.strerror}); check the file.") from problem
+    except expat.ExpatError as problem:
+        raise InputError(
+            f"{path} line {problem.lineno}, column {problem.offset + 1}: not well-formed XML "
+            f"({expat.ErrorString(problem.code)}); correct it there."
+        ) from problem
+    return roots[0]

@@ -1,0 +1,17 @@
+"""What is to be said of columns of pose files that a verb reads and does not need."""
+
+from __future__ import annotations
+
+from flexcal.data import PoseSet
+
+
+def unused_columns(poses: PoseSet) -> tuple[str, ...]:
+    """One sentence a quantity that is there and has no effect."""
+    remarks = []
+    if poses.torque is not None:
+        remarks.append(
+            "the torques tau1… in the files are not used: they carry friction, so the model says on which flank a joint rests"
+        )
+    if poses.temperature is not None:
+        remarks.append("the temperature in the files is not used: no term of the model depends on it")
+    return tuple(remarks)

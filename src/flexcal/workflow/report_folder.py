@@ -1,0 +1,60 @@
+"""The report of a folder that a verb filled before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from flexcal.data import read_estimates
+from flexcal.errors import InputError
+from flexcal.report.stored import StoredStudy, write_stored_report
+from flexcal.workflow.experiment_files import read_responses
+from flexcal.workflow.results import RESULTS, read_results
+
+REPORT = "report.html"
+_REPORTED = ("calibration", "verification", "stage1")
+
+
+def report_folder(folder: Path) -> Path:
+    """Write report.html of a folder from its results.json and, where they are there, estimates, responses and verification.csv.
+
+    Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
+    """
+    if not (folder / RESULTS).is_file():
+        raise InputError(
+            f"{folder} holds no {RESULTS}; give the folder that demo, identify, calibrate or verify left with --out."
+        )
+    results = read_results(folder)
+    if not any(key in results for key in _REPORTED):
+        raise InputError(
+            f"{folder / RESULTS} holds no calibration, verification or stiffness; give the folder of one of these."
+        )
+    estimates, measured = folder / "estimates.yaml", sorted(folder.glob("response_pose_*.npz"))
+    study = StoredStudy(
+        name=folder.resolve().name,
+        results=results,
+        estimates=read_estimates(estimates) if estimates.is_file() else {},
+        responses=read_responses(measured)[1],
+        errors=_verification_errors(folder / "verification.csv"),
+    )
+    write_stored_report(folder / REPORT, study)
+    return folder / REPORT
+
+
+def _verification_errors(path: Path) -> dict[str, np.ndarray]:
+    """Errors (N, 3) m of the elastic and the rigid model, from the table that a two-stage run leaves."""
+    if not path.is_file():
+        return {}
+    try:
+        table = pl.read_csv(path)
+        truth = table.select("x", "y", "z").to_numpy()
+        return {
+            kind: truth - table.select(f"{kind}_x", f"{kind}_y", f"{kind}_z").to_numpy()
+            for kind in ("elastic", "rigid")
+        }
+    except (pl.exceptions.PolarsError, TypeError) as problem:
+        raise InputError(
+            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
+        ) from problem

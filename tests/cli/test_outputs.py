@@ -1,0 +1,94 @@
+"""`--out` never touches what somebody else wrote, and a verb that fails leaves nothing behind."""
+
+from __future__ import annotations
+
+import hashlib
+from pathlib import Path
+
+import pytest
+from cli_files import snapshot
+from test_bad_input import refused
+
+from flexcal.cli.outputs import LEDGER, outputs
+from flexcal.errors import InputError
+
+
+def sha256(path: Path) -> str:
+    return hashlib.sha256(path.read_bytes()).hexdigest()
+
+
+@pytest.mark.parametrize("name", ["robot.yaml", "frequency_poses.csv", "notes.txt"])
+def test_a_users_file_is_no_place_for_a_plan(run, tx90l_folder: Path, name: str) -> None:
+    (tx90l_folder / "notes.txt").write_text("mine")
+    arguments = ("design", "frequency", tx90l_folder / "robot.yaml", "--out", tx90l_folder / name)
+    assert "never changed" in refused(run, tx90l_folder, *arguments)
+
+
+def test_a_users_measurements_are_not_replaced(run, tx90l_folder: Path, tmp_path: Path) -> None:
+    robot, out = tx90l_folder / "robot.yaml", tmp_path / "mine"
+    plan = tmp_path / "plan.yaml"
+    assert run("design", "poses", robot, "--random", "--count", 3, "--out", plan).status == 0
+    out.mkdir()
+    (out / "poses.csv").write_text("pose,q1\n1,0\n")
+    measure = ("measure", plan, "--robot", robot, "--cell", "virtual", "--out")
+    assert "mine/poses.csv" in refused(run, tmp_path, *measure, out)
+    assert run(*measure, tmp_path / "new").status == 0
+    first = snapshot(tmp_path / "new")
+    assert run(*measure, tmp_path / "new").status == 0
+    assert snapshot(tmp_path / "new") == first
+    with (tmp_path / "new" / "poses.csv").open("a") as stream:
+        stream.write("\n")
+    assert "has been changed" in refused(run, tmp_path, *measure, tmp_path / "new")
+
+
+def test_demo_does_not_touch_a_robots_estimates(run, tx90l_folder: Path) -> None:
+    (tx90l_folder / "estimates.yaml").write_text("calibration: {values: {}}\n")
+    assert "estimates.yaml" in refused(run, tx90l_folder, "demo", "--out", tx90l_folder)
+
+
+@pytest.mark.parametrize("place", ["file", "file/below", "/proc/none/such"])
+def test_a_place_that_is_no_folder(run, tmp_path: Path, place: str) -> None:
+    (tmp_path / "file").write_text("mine")
+    sentence = refused(run, tmp_path, "demo", "--out", tmp_path / place)
+    assert place in sentence and "cannot be written to" in sentence
+
+
+def test_folders_that_are_missing_are_made(tmp_path: Path) -> None:
+    with outputs(tmp_path / "a" / "b", ("x*",)):
+        (tmp_path / "a" / "b" / "x1").write_text("1")
+    assert (tmp_path / "a" / "b" / LEDGER).read_text() == f"{sha256(tmp_path / 'a' / 'b' / 'x1')}  x1\n"
+
+
+def test_what_an_earlier_run_left_goes(tmp_path: Path) -> None:
+    """Three responses of a new plan among six of an old one would be fitted together."""
+    (tmp_path / "other").write_text("mine")
+    for count in (6, 3):
+        with outputs(tmp_path, ("x*",)):
+            for k in range(count):
+                (tmp_path / f"x{k}").unlink(missing_ok=True)
+                (tmp_path / f"x{k}").write_text(str(count))
+    assert sorted(p.name for p in tmp_path.iterdir()) == [LEDGER, "other", "x0", "x1", "x2"]
+
+
+@pytest.mark.parametrize("problem", [InputError("no"), KeyboardInterrupt()])
+def test_a_verb_that_fails_leaves_nothing(tmp_path: Path, problem: BaseException) -> None:
+    with pytest.raises(type(problem)), outputs(tmp_path / "a" / "b", ("x*", "y")):
+        (tmp_path / "a" / "b" / "x1").write_text("1")
+        raise problem
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_verb_that_fails_may_be_run_again(tmp_path: Path) -> None:
+    """What it had replaced of its own by then still counts as its own."""
+    with outputs(tmp_path, ("x", "y")):
+        (tmp_path / "x").write_text("1")
+    with pytest.raises(InputError), outputs(tmp_path, ("x", "y")):
+        (tmp_path / "x").unlink()
+        (tmp_path / "x").write_text("2")
+        (tmp_path / "y").write_text("2")
+        raise InputError("no")
+    assert not (tmp_path / "y").exists()
+    with outputs(tmp_path, ("x", "y")):
+        (tmp_path / "x").unlink()
+        (tmp_path / "x").write_text("3")
+    assert (tmp_path / "x").read_text() == "3"

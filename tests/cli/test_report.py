@@ -1,0 +1,64 @@
+"""`flexcal report`, and the reports that `calibrate --out` and `verify --out` leave."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from test_bad_input import refused
+
+
+@pytest.fixture
+def calibrated(run, ur5_folder: Path) -> Path:
+    """The folder of a rigid calibration of the UR5 on 20 poses."""
+    out = ur5_folder / "out"
+    files = (ur5_folder / "robot.yaml", ur5_folder / "random.csv")
+    assert run("calibrate", *files, "--terms", "kinematic", "--out", out).status == 0
+    return out
+
+
+def test_help_says_where_the_report_comes_from(run) -> None:
+    for verb in ("calibrate", "verify"):
+        words = " ".join(run(verb, "--help").out.split())
+        assert "report.html" in words and "without it there is no report" in words
+
+
+def test_report_of_a_calibration(run, calibrated: Path) -> None:
+    whole = (calibrated / "report.html").read_text("utf-8")
+    (calibrated / "report.html").unlink()
+    page = run("report", calibrated)
+    assert page.status == 0 and f"next: open {calibrated / 'report.html'}" in page.out
+    again = (calibrated / "report.html").read_text("utf-8")
+    for number in ("25 of 45", "elbow_joint.length_x"):
+        assert number in again and number in whole
+    assert run("report", calibrated, "--json").document == {"report": str(calibrated / "report.html")}
+
+
+def test_verification_leaves_its_report(run, calibrated: Path) -> None:
+    folder, out = calibrated.parent, calibrated.parent / "check"
+    header, *rows = (folder / "grid.csv").read_text().splitlines()
+    (folder / "fresh.csv").write_text("\n".join([header, *rows[::25]]) + "\n")
+    arguments = (
+        folder / "robot.yaml",
+        folder / "fresh.csv",
+        "--estimates",
+        calibrated,
+        "--out",
+        out,
+        "--json",
+    )
+    mean = run("verify", *arguments).document["verification"]["measured"]["mean_mm"]
+    html = (out / "report.html").read_text("utf-8")
+    assert "verification report" in html and "as delivered" in html and f"{mean:.3f}" in html
+    assert run("report", out).status == 0
+    assert f"{mean:.3f}" in (out / "report.html").read_text("utf-8")
+
+
+def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Path) -> None:
+    assert "no results.json" in refused(run, tmp_path, "report", ur5_folder)
+    assert "no results.json" in refused(run, tmp_path, "report", tmp_path / "none")
+    (tmp_path / "measured").mkdir()
+    (tmp_path / "measured" / "results.json").write_text('{"kind": "poses", "poses": 3}\n')
+    assert "no calibration" in refused(run, tmp_path, "report", tmp_path / "measured")
+    (tmp_path / "measured" / "results.json").write_text("{")
+    assert "cannot be read" in refused(run, tmp_path, "report", tmp_path / "measured")
