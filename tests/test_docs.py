@@ -56,7 +56,7 @@ def produced(model: RobotModel) -> dict[str, str]:
         sample_time=2.5e-4,
     )
     names = {name: unit_of(name) for name in model.values}
-    return names | {item.name: item.unit for item in stage_one_parameters(model, [response])}
+    return names | {item.name: item.unit for item in stage_one_parameters(model, [response], gaps=True)}
 
 
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:
@@ -66,7 +66,7 @@ def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel)
         assert units == [unit], name
     for written in table:
         assert any(re.fullmatch(pattern(written), name) for name in names), written
-    assert {"joint_1.viscous.pose_1", "joint_2.drive.softening.pose_1", "payload.com_z"} <= set(names)
+    assert {"joint_1.viscous.pose_1", "joint_2.drive.half_gap", "payload.com_z"} <= set(names)
 
 
 def test_the_gap_is_as_wide_as_it_says(methods: str, tx90l: RobotModel, rng: np.random.Generator) -> None:

@@ -167,9 +167,9 @@ def test_bias_on_the_stiffnesses_is_below_half_a_percent(
         s2 = -((2 * np.pi * lines[:, None, None]) ** 2)
         hold = (np.sinc(lines / rate_hz) * np.exp(-1j * np.pi * lines / rate_hz))[:, None, None]
         differences.append(((stepped - exact) / hold * s2 * scale).ravel())
-        rows.append(
-            np.stack([(reference.derivatives[n] * tx90l.value(n) * scale).ravel() for n in names], axis=1)
-        )
+        assert reference.names == tuple(names)
+        size = np.array([tx90l.value(n) for n in names])
+        rows.append((reference.derivatives * size * scale[..., None]).reshape(-1, len(names)))
     left, right = np.concatenate(rows), np.concatenate(differences)
     bias = np.linalg.lstsq(np.vstack([left.real, left.imag]), np.concatenate([right.real, right.imag]))[0]
     stiffness = [abs(b) for n, b in zip(names, bias, strict=True) if n.endswith(".stiffness")]

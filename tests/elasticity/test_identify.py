@@ -20,6 +20,7 @@ from flexcal.elasticity import (
     reference_shift,
     spring_names,
 )
+from flexcal.elasticity.gap import open_share
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
 
@@ -192,15 +193,33 @@ def test_intervals_are_true_with_inertias_as_wrong_as_cad(stiff, poses, synthesi
     check_intervals(*squared_errors(stiff, poses["default"], synthesise, drawn, range(40), inertias=True))
 
 
-def test_softening_by_backlash_is_found(tx90l, poses, synthesise, rng):
-    """A drive that is softer in one pose, as an open gap makes it, does not pull the stiffness down."""
-    name = "joint_3.drive.stiffness"
-    responses = synthesise(tx90l, poses["default"], noise=0.02, rng=rng, step=8)
-    softer = tx90l.with_values({name: 0.95 * tx90l.value(name)})
-    soft = synthesise(softer, poses["default"], noise=0.02, rng=rng, step=8)
+def test_half_gap_is_found(tx90l, poses, synthesise, rng):
+    """Drives that are softer the longer their gap stands open do not pull the stiffness down, and show the half gap."""
+    lines = np.arange(13, 320, 8)
+    plan = MultisinePlan(
+        name="test", poses=poses["default"], joints=(0, 1, 2), base_frequency_hz=0.25, lines=lines,
+        amplitude=np.full((3, len(lines)), 8.0), periods=4, settle_periods=2, realisations=4, signs=True,
+        reference_amplitude=0.0, reference_frequency_hz=2.125, kp=tx90l.controller.kp, kd=tx90l.controller.kd, rate_hz=4000.0,
+        torque="held", seed=0,
+    )  # fmt: skip
+    half_gap, responses = {1: 4e-5, 2: 6e-5}, []
+    for q in poses["default"]:
+        share = open_share(tx90l, q, None, plan).mean(axis=0)
+        soft = {
+            f"joint_{axis + 1}.drive.{key}": np.exp(-size * share[axis])
+            for axis, size in half_gap.items()
+            for key in ("stiffness", "damping")
+        }
+        softer = tx90l.with_values({name: factor * tx90l.value(name) for name, factor in soft.items()})
+        response = synthesise(softer, q[None], noise=0.01, rng=rng, step=8)[0]
+        responses.append(replace(response, pose=len(responses)))
     estimate = identify_stiffness(
-        tx90l, [*responses[:5], replace(soft[5])], rng=rng, inertias_known=True, tolerances=Tolerances.none()
+        tx90l, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none(), plan=plan
     ).estimate
-    low, high = estimate.interval(name) or (0.0, 0.0)
-    assert low < tx90l.value(name) < high
-    assert estimate.values["joint_3.drive.softening.pose_6"] == pytest.approx(0.05, abs=0.015)
+    for name in ("joint_2.drive.stiffness", "joint_3.drive.stiffness"):
+        low, high = estimate.interval(name) or (0.0, 0.0)
+        assert low < tx90l.value(name) < high
+    index = estimate.parameters.index("joint_3.drive.half_gap")
+    std = np.sqrt(estimate.covariance[index, index])
+    assert std < 1.5e-5
+    assert estimate.values["joint_3.drive.half_gap"] == pytest.approx(half_gap[2], abs=3 * std)

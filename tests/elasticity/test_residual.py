@@ -12,30 +12,9 @@ from flexcal.elasticity import (
     UniformWeighting,
     stage_one_parameters,
 )
-from flexcal.elasticity.prediction import batch_transfer
 from flexcal.elasticity.residual import PoseResidual, StageOneResidual
 from flexcal.elasticity.weighting import extrema
 from flexcal.errors import FlexcalError
-from flexcal.model.linearisation import linearise
-from flexcal.model.transfer import transfer_matrix
-
-
-def test_batched_transfer_is_the_transfer_matrix(tx90l, poses):
-    names = [
-        "joint_1.drive.stiffness",
-        "joint_2.bearing_x.damping",
-        "link_3.mass",
-        "link_2.com_y",
-        "joint_3.rotor_inertia",
-    ]
-    frequencies = np.linspace(3, 80, 20)
-    system = linearise(tx90l, poses["default"][1], derivatives=names)
-    expected = transfer_matrix(system, frequencies)
-    response, change = batch_transfer(system, names, 2j * np.pi * frequencies)
-    np.testing.assert_allclose(response, expected.response, rtol=1e-12)
-    for k, name in enumerate(names):
-        reference = expected.derivatives[name]
-        np.testing.assert_allclose(change[..., k], reference, rtol=1e-9, atol=1e-12 * np.abs(reference).max())
 
 
 @pytest.mark.parametrize("weighting", [CovarianceWeighting(), UniformWeighting(), PaperWeighting()])

@@ -1,4 +1,4 @@
-"""How long the backlash of a drive stands open in a frequency experiment, from the torque that its spring carries."""
+"""Backlash in a frequency experiment: how long a gap stands open, from the torque that its spring carries, and what that does."""
 
 from __future__ import annotations
 
@@ -6,32 +6,82 @@ import numpy as np
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.reference_motion import ReferenceMotion
-from flexcal.frequency import FrequencyResponse
+from flexcal.elasticity.sidebands import Sidebands
 from flexcal.model import RobotModel, static_equilibrium
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.equilibrium import elastic_axes
-from flexcal.model.linearisation import linearise
+from flexcal.model.linearisation import Linearisation, linearise
+
+SIDEBANDS = 6
+"""Multiples of the reference frequency that are balanced on either side of the excited line."""
+
+PHASES = 64
+"""Instants of the reference motion at which gaps are looked at."""
 
 
-def open_share(
-    robot: RobotModel, response: FrequencyResponse, plan: MultisinePlan, half_gap: np.ndarray | float
-) -> np.ndarray:
-    """Share of time (E,) for which gaps of ± `half_gap` (rad, (E,) or one for all) in each elastic drive is open under a plan in one pose.
+def open_share(robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan) -> np.ndarray:
+    """How likely a gap in each elastic drive is open along the reference motion, per rad of half gap, (phases, E).
 
-    The torque of a drive is gravity's and the reference motion's, plus the multisine's, close to Gaussian: a gap b in series with a
-    spring k is open while the torque passes zero, 2 b k times the density of the torque there. By this share an open gap lowers the
-    apparent stiffness (Gaussian equivalent gain of a dead band), to first order in the gap.
+    `q` (n,) rad is the mean motor position, `payload` in kg. The torque of a drive is gravity's and the reference motion's, plus the
+    multisine's, close to Gaussian: a gap ± b in series with a spring k is open while the torque passes zero, 2 b k times the density
+    of the torque there. By this share it lowers the drive's apparent stiffness and damping, to first order (the Gaussian equivalent
+    gain of a dead band).
     """
-    slow = _slow_torque(robot, response, ReferenceMotion.of(plan))
-    size = multisine_torque(robot, response, plan)
-    density = np.exp(-0.5 * (slow / size) ** 2) / (np.sqrt(2 * np.pi) * size)
+    slow = _slow_torque(robot, q, payload, ReferenceMotion.of(plan))
+    size = multisine_torque(robot, q, payload, plan)
     stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
-    return np.minimum(2 * half_gap * stiffness * density.mean(axis=0), 0.5)
+    return 2 * stiffness * np.exp(-0.5 * (slow / size) ** 2) / (np.sqrt(2 * np.pi) * size)
 
 
-def multisine_torque(robot: RobotModel, response: FrequencyResponse, plan: MultisinePlan) -> np.ndarray:
+def gap_shift(
+    robot: RobotModel,
+    system: Linearisation,
+    frequencies_hz: np.ndarray,
+    motion: ReferenceMotion,
+    share: np.ndarray,
+) -> np.ndarray:
+    """G with gaps that open at their phase of the motion less G with their mean softening, (L, E, E) rad/s² per N m.
+
+    `share` (phases, E) says how likely every drive of `robot` stands open; `system` is the softened robot.
+    """
+    count, size = system.inputs, len(system.mass)
+    gaps = np.flatnonzero(share.any(axis=0))
+    if not len(gaps):
+        return np.zeros((len(frequencies_hz), count, count), dtype=complex)
+    orders = np.arange(-SIDEBANDS, SIDEBANDS + 1)
+    bands = Sidebands.of(system, frequencies_hz, motion, orders)
+    twists = [k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
+    pull = np.zeros((size, len(gaps)))
+    pull[count + np.array(twists)[gaps], range(len(gaps))] = 1.0
+    pull[gaps, range(len(gaps))] = -1.0
+    drives = [robot.elastic[k] for k in gaps]
+    stiffness, damping = (np.array([getattr(d, key)[2] for d in drives]) for key in ("stiffness", "damping"))
+    impedance = stiffness + bands.s[:, :, None] * damping  # (L, k, g)
+    phases = 2 * np.pi * np.arange(len(share)) / len(share)
+    apart = orders[:, None] - orders[None, :]
+    pulses = np.exp(-1j * apart[:, :, None] * phases) @ share[:, gaps] / len(share)
+    pulses[apart == 0] = 0.0  # (k, l, g)
+    released = pulses * impedance[:, None]  # (L, k, l, g): torque at order k by the twist at order l
+    by_motors = bands.response(np.eye(size, count))[:, bands.middle]
+    by_pull = bands.response(pull)
+    width = len(orders) * len(gaps)
+    coupled = np.einsum("di,Lkdj,Lklj->Lkilj", pull, by_pull, released).reshape(-1, width, width)
+    driven = np.zeros((len(bands.s), len(orders), len(gaps), count), dtype=complex)
+    driven[:, bands.middle] = pull.T @ by_motors
+    twist = np.linalg.solve(np.eye(width) - coupled, driven.reshape(-1, width, count))
+    twist = twist.reshape(driven.shape)
+    torque = np.einsum("Llg,Llgc->Lgc", released[:, bands.middle], twist)
+    line = bands.s[:, bands.middle, None, None]
+    still = line * by_motors[:, :count]
+    moved = still + line * by_pull[:, bands.middle, :count] @ torque
+    return bands.acceleration(moved) - bands.acceleration(still)
+
+
+def multisine_torque(
+    robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan
+) -> np.ndarray:
     """Standard deviation (E,) N m of the torque in each elastic drive's spring under the multisine, position loop closed."""
-    system = linearise(robot, response.q_mean, response.payload)
+    system = linearise(robot, q, payload)
     count, size = system.inputs, len(system.mass)
     s = 2j * np.pi * plan.frequencies_hz[:, None, None]
     axes = list(plan.joints)
@@ -47,18 +97,18 @@ def multisine_torque(robot: RobotModel, response: FrequencyResponse, plan: Multi
 
 
 def _slow_torque(
-    robot: RobotModel, response: FrequencyResponse, motion: ReferenceMotion, phases: int = 64
+    robot: RobotModel, q: np.ndarray, payload: float | None, motion: ReferenceMotion
 ) -> np.ndarray:
     """Torque (phases, E) N m in each elastic drive's spring along the reference motion."""
     import pinocchio as pin
 
-    arm = ElasticArm(robot, response.payload)
-    rest = static_equilibrium(robot, response.q_mean, arm.payload)
-    still = arm.configuration(response.q_mean, rest.deflection[0])
+    arm = ElasticArm(robot, payload)
+    rest = static_equilibrium(robot, q, arm.payload)
+    still = arm.configuration(q, rest.deflection[0])
     axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
     omega = 2 * np.pi * motion.frequency_hz
     result = []
-    for angle in 2 * np.pi * np.arange(phases) / phases:
+    for angle in 2 * np.pi * np.arange(PHASES) / PHASES:
         at, velocity, acceleration = still.copy(), np.zeros(arm.model.nv), np.zeros(arm.model.nv)
         at[axes] += motion.amplitude * np.sin(angle)
         velocity[axes] = motion.amplitude * omega * np.cos(angle)

@@ -8,15 +8,17 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
+from flexcal.elasticity.experiment_effect import ExperimentEffect, experiment_effects
 from flexcal.elasticity.model_error import ModelError, Tolerances
 from flexcal.elasticity.naming import spring_names
 from flexcal.elasticity.parameters import stage_one_parameters
-from flexcal.elasticity.prediction import PoseModel, ResponseModel
-from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
+from flexcal.elasticity.prediction import ResponseModel
+from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
 from flexcal.estimation import Estimate, Parameters, Problem, solve
+from flexcal.estimation.solve import LOG_STD_LIMIT
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -62,37 +64,40 @@ def identify_stiffness(
 
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
     measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the
-    `plan`, the change of inertia along the reference motion is part of the model (without it the bearings' damping comes out too
-    large), and the softening of drives by backlash is predicted. `tolerances` are what the model leaves out (geometry, friction that
-    is not viscous, backlash), all of it in the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link
-    and payload inertias at the model's.
+    `plan`, what the reference motion does is part of the model: the arm's inertia changes along it, friction acts in pulses at its
+    reversals, gaps stand open while the torque of their drive passes zero. `tolerances` are what the model leaves out, all of it in
+    the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link and payload inertias at the model's.
 
     The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
     neighbouring lines, the first inflated by the reduced χ² where it exceeds 1. The damping of a spring whose stiffness is not
     identifiable is not either. Raises `FlexcalError` where responses do not fit the robot.
     """
-    parameters = stage_one_parameters(model, responses, inertias_known=inertias_known, plan=plan)
+    parameters = stage_one_parameters(model, responses, inertias_known=inertias_known, gaps=plan is not None)
     reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
     weighting = CovarianceWeighting() if weighting is None else weighting
     tolerances = Tolerances() if tolerances is None else tolerances
     search = MultiStart() if search is None else search
     x = search.find(model, responses, parameters, rng, progress)
-    measured = StageOneResidual.of(ResponseModel.of(model, responses, parameters), responses, weighting)
-    shifts = [np.zeros_like(response.response) for response in responses]
+    predicting = ResponseModel.of(model, responses, parameters)
+    measured = StageOneResidual.of(predicting, responses, weighting)
+    effects = [ExperimentEffect.none(response) for response in responses]
     estimate = None
-    rounds = ROUNDS if tolerances.any or reference is not None else 1
+    rounds = ROUNDS if tolerances.any or plan is not None else 1
     progress("fitting", 0.0)
     for number in range(rounds):
+        if plan is not None:
+            predicting = predicting.with_open_gaps(x, plan)
         if reference is not None:
-            shifts = reference_shifts(measured.model, x, reference)
-        residual = measured.shifted(shifts)
-        error = ModelError.of(residual, responses, x, tolerances) if tolerances.any else None
+            effects = experiment_effects(predicting, x, reference)
+        residual = measured.shifted(predicting, [effect.shift for effect in effects])
+        error = ModelError.of(residual, responses, x, effects, tolerances) if tolerances.any else None
         last = number == rounds - 1
-        estimate = _fit(residual, error, parameters, x, 1e-7 if last else 1e-3)
+        inflation = tolerances.inflation(responses)
+        estimate = _fit(residual, error, parameters, x, inflation, 1e-7 if last else 1e-3)
         x = estimate.parameters.coordinates()
         progress("fitting", (number + 1) / rounds)
     assert estimate is not None
-    predicted = tuple(g + shift for g, shift in zip(measured.model.responses(x), shifts, strict=True))
+    predicted = tuple(g + e.shift for g, e in zip(predicting.responses(x), effects, strict=True))
     pairs = list(zip(measured.poses, predicted, strict=True))
     errors = tuple(pose.errors(g) for pose, g in pairs)
     misfit = np.array(
@@ -104,24 +109,12 @@ def identify_stiffness(
     return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
 
 
-def reference_shifts(model: ResponseModel, x: np.ndarray, reference: ReferenceMotion) -> list[np.ndarray]:
-    """What the reference motion adds to the response of every pose at the coordinates x (p,), (L, E, E)."""
-    values = model.parameters.natural(x)
-    return [_shift(model.robot, pose, values, reference) for pose in model.poses]
-
-
-def _shift(robot: RobotModel, pose: PoseModel, values: np.ndarray, reference: ReferenceMotion) -> np.ndarray:
-    known, payload = pose.values(robot, values)
-    shift = reference_shift(robot.with_values(known), pose.q, payload, pose.frequencies_hz, reference)
-    late = np.array([values[number] if number >= 0 else 0.0 for number in pose.delays])
-    return shift * np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]
-
-
 def _fit(
     residual: StageOneResidual,
     error: ModelError | None,
     parameters: Parameters,
     x: np.ndarray,
+    inflation: float,
     tolerance: float,
 ) -> Estimate:
     def whiten(rows: np.ndarray) -> np.ndarray:
@@ -144,21 +137,27 @@ def _fit(
         robust = solve(
             problem, starts=fitted.parameters.coordinates()[None], covariance="sandwich", tolerance=tolerance
         )
-    return _widened(fitted, robust)
+    return _widened(fitted, robust, inflation)
 
 
-def _widened(fitted: Estimate, robust: Estimate | None) -> Estimate:
-    """The posterior with every standard deviation raised to the sandwich's, or by the reduced χ², where these are larger."""
-    from flexcal.estimation.solve import LOG_STD_LIMIT
+def _widened(fitted: Estimate, robust: Estimate | None, inflation: float) -> Estimate:
+    """The covariance for measurements whose variance is `inflation` times what weighs them.
 
-    std = np.sqrt(np.diag(fitted.covariance))
+    That is H + (f - 1) (H - H P H), with H the posterior and P the prior's information. Every standard deviation is then raised by
+    the sandwich's or the reduced χ², where these are larger than the weights say.
+    """
+    posterior = fitted.covariance
+    from_data = posterior - posterior @ fitted.parameters.prior_information() @ posterior
+    covariance = posterior + (inflation - 1.0) * from_data
+    std = np.sqrt(np.diag(posterior))
     factor = np.full(
         std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0))
     )
     if robust is not None:
         wider = np.sqrt(np.diag(robust.covariance))
         factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
-    std *= factor
+    covariance = covariance * np.outer(factor, factor)
+    std = np.sqrt(np.diag(covariance))
     small = {
         item.name: flag and (item.scale != "log" or bool(size <= LOG_STD_LIMIT))
         for flag, item, size in zip(fitted.identifiable, fitted.parameters, std, strict=True)
@@ -166,4 +165,4 @@ def _widened(fitted: Estimate, robust: Estimate | None) -> Estimate:
     known = tuple(
         flag and small.get(name.replace(".damping", ".stiffness"), True) for name, flag in small.items()
     )
-    return replace(fitted, covariance=fitted.covariance * np.outer(factor, factor), identifiable=known)
+    return replace(fitted, covariance=covariance, identifiable=known)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.elasticity.experiment_effect import ExperimentEffect
 from flexcal.elasticity.naming import pose_labels, viscous_name
 from flexcal.elasticity.prediction import Prediction, ResponseModel
 from flexcal.elasticity.residual import StageOneResidual
@@ -16,28 +17,42 @@ from flexcal.model.names import GEOMETRY
 
 @dataclass(frozen=True)
 class Tolerances:
-    """How far the robot may be from what the model assumes, 1σ.
+    """What the model does not hold, 1σ.
 
-    `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `friction`: deviation of the motor friction's
-    impedance from a viscous coefficient, relative to that coefficient; `backlash`: deviation of a gap's effect from the softening
-    of its drive, relative to that softening; both are complex random functions of frequency with knots every `octave`.
+    `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `strength` and `width` of the friction pulses of a
+    motor, relative, common to all poses and half as much in each; `friction`: other deviation of a motor's impedance from a viscous
+    coefficient, relative to that; `backlash`: deviation of a gap's effect from the softening of its drive, relative to that; these two
+    are complex random functions of frequency in every pose, with knots every `octave`. `distortion` is the share of the stochastic
+    nonlinear distortion that all realisations have in common, for reference motion and friction are the same in all: averaging over
+    realisations does not lower it.
     """
 
     length: float = 3e-4
     angle: float = 5e-4
-    friction: float = 0.1
-    backlash: float = 0.5
+    strength: float = 0.2
+    width: float = 0.3
+    friction: float = 0.05
+    backlash: float = 0.3
+    distortion: float = 0.2
     octave: float = 0.5
 
     @classmethod
     def none(cls) -> Tolerances:
         """The model is exact."""
-        return cls(0.0, 0.0, 0.0, 0.0)
+        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
 
     @property
     def any(self) -> bool:
         """Whether anything is left out."""
-        return max(self.length, self.angle, self.friction, self.backlash) > 0
+        return max(self.length, self.angle, self.strength, self.width, self.friction, self.backlash) > 0
+
+    def inflation(self, responses: Sequence[FrequencyResponse]) -> float:
+        """Variance of the responses over what it would be with independent realisations."""
+        shares = []
+        for response in responses:
+            distorted = np.mean(response.distortion_std**2) / np.mean(response.std**2)
+            shares.append(distorted * (len(response.realisations) - 1))
+        return 1.0 + self.distortion * float(np.mean(shares))
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +90,7 @@ class ModelError:
         residual: StageOneResidual,
         responses: Sequence[FrequencyResponse],
         x: np.ndarray,
+        effects: Sequence[ExperimentEffect],
         tolerances: Tolerances,
     ) -> ModelError:
         """To first order about the coordinates x (p,)."""
@@ -82,7 +98,8 @@ class ModelError:
         blocks, columns = [], []
         predictions = model.predict(x)
         shifts = geometric_shifts(model, x, tolerances)
-        values = dict(zip(model.parameters.names, model.parameters.natural(x), strict=True))
+        natural = model.parameters.natural(x)
+        values = dict(zip(model.parameters.names, natural, strict=True))
         labels = pose_labels(responses)
         for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
             nominal = predictions[k].response
@@ -90,15 +107,19 @@ class ModelError:
             change = friction_shifts(
                 nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave
             )
-            number = list(model.poses[k].softening.values())
+            number = list(model.poses[k].gaps.values())
             column = [list(predictions[k].columns).index(n) for n in number]
-            gap = tolerances.backlash * predictions[k].derivatives[..., column]
+            gap = tolerances.backlash * natural[number] * predictions[k].derivatives[..., column]
             change = np.concatenate(
                 [change, over_frequency(gap, response.frequencies_hz, tolerances.octave)], axis=-1
             )
             none = np.empty(0, dtype=int)
+            half = effects[k].by_friction.shape[-1] // 2
+            form = effects[k].by_friction * np.repeat([tolerances.strength, tolerances.width], half)
+            change = np.concatenate([change, 0.5 * form], axis=-1)
             blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
-            columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shifts[k], none))))
+            shared = np.concatenate([shifts[k], form], axis=-1)
+            columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shared, none))))
         return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
 
     def whiten(self, rows: np.ndarray) -> np.ndarray:

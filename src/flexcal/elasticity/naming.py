@@ -32,6 +32,6 @@ def viscous_name(joint: str, pose: str) -> str:
     return f"{joint}.viscous.{pose}"
 
 
-def softening_name(joint: str, pose: str) -> str:
-    """Name of the softening of a drive by its backlash in one pose."""
-    return f"{joint}.drive.softening.{pose}"
+def half_gap_name(joint: str) -> str:
+    """Name of the half gap of a drive as its frequency response shows it."""
+    return f"{joint}.drive.half_gap"

@@ -6,9 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.data import MultisinePlan
-from flexcal.elasticity.gap import open_share
-from flexcal.elasticity.naming import pose_labels, softening_name, spring_names, viscous_name
+from flexcal.elasticity.naming import half_gap_name, pose_labels, spring_names, viscous_name
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
@@ -21,16 +19,8 @@ SPRING_LOG_STD = 1.5
 FRICTION_LOG_STD = 1.5
 """Prior of the motor's viscous coefficient in one pose, 1σ of the logarithm about what the lowest lines show."""
 
-HALF_GAP = 3.5e-5
-"""Half gap (rad) of a drive with backlash that is assumed where the model has no estimate of it."""
-
-SOFTENING = 0.005
-SOFTENING_LOG_STD = 1.5
-"""Prior of the softening of a drive with backlash in one pose, median and 1σ of the logarithm, where the plan is not known."""
-
-PREDICTED_SOFTENING_LOG_STD = 0.7
-SMALLEST_SOFTENING = 1e-5
-"""The same about what `open_share` predicts from the plan: the gap's own spread, and the tail of a torque not quite Gaussian."""
+HALF_GAP_STD = 1e-4
+"""Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
 
 
 def stage_one_parameters(
@@ -38,16 +28,16 @@ def stage_one_parameters(
     responses: Sequence[FrequencyResponse],
     *,
     inertias_known: bool = False,
-    plan: MultisinePlan | None = None,
+    gaps: bool = False,
 ) -> Parameters:
     """Every parameter of stage 1 with its prior.
 
     Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
     in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
     prior 0 ± the sample time. Rotor inertias have the prior of robot.yaml; so have mass and centre of mass of every link that an
-    elastic joint moves, and the payload's mass, unless `inertias_known`. A drive with backlash has a softening in every pose: an
-    open gap lowers its apparent stiffness; with the `plan` its size is known beforehand to within a factor. Raises `FlexcalError`
-    where responses do not fit the robot.
+    elastic joint moves, and the payload's mass, unless `inertias_known`. With `gaps`, a drive
+    with backlash has its half gap: while it stands open, the drive appears softer. Raises `FlexcalError` where responses do not fit
+    the robot.
     """
     check_responses(model, responses)
     items = [
@@ -71,7 +61,19 @@ def stage_one_parameters(
             )
             for joint, value in zip(model.elastic, loss, strict=True)
         ]
-    return Parameters(items + _softening(model, responses, plan))
+    if gaps:
+        items += [
+            Parameter(
+                half_gap_name(joint.name),
+                "rad",
+                float(model.backlash[joint.index]),
+                lower=0.0,
+                prior_std=HALF_GAP_STD,
+            )
+            for joint in model.elastic
+            if joint.index in model.backlash_joints
+        ]
+    return Parameters(items)
 
 
 def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
@@ -130,23 +132,6 @@ def _inertial(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list
     if held is not None and held.mass > 0 and held.mass_std > 0 and any(r.payload != 0 for r in responses):
         std = held.mass_std / held.mass
         items.append(Parameter("payload.mass", "kg", held.mass, prior_std=std, scale="log"))
-    return items
-
-
-def _softening(
-    model: RobotModel, responses: Sequence[FrequencyResponse], plan: MultisinePlan | None
-) -> list[Parameter]:
-    items = []
-    for response, label in zip(responses, pose_labels(responses), strict=True):
-        share, std = np.full(len(model.elastic), SOFTENING), SOFTENING_LOG_STD
-        if plan is not None:
-            known = model.backlash[[joint.index for joint in model.elastic]]
-            share = open_share(model, response, plan, np.where(known > 0, known, HALF_GAP))
-            share, std = np.maximum(share, SMALLEST_SOFTENING), PREDICTED_SOFTENING_LOG_STD
-        for joint, value in zip(model.elastic, share, strict=True):
-            if joint.index in model.backlash_joints:
-                name = softening_name(joint.name, label)
-                items.append(Parameter(name, "1", float(value), prior_std=std, scale="log"))
     return items
 
 

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.elasticity.naming import pose_labels, softening_name, viscous_name
+from flexcal.data import MultisinePlan
+from flexcal.elasticity.gap import open_share
+from flexcal.elasticity.naming import half_gap_name, pose_labels, viscous_name
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.linearisation import Linearisation, linearise
+from flexcal.model.linearisation import linearise
+from flexcal.model.transfer import transfer_matrix
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,28 +30,34 @@ class Prediction:
 class PoseModel:
     """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
 
-    `robot_names` maps names of the robot's own values to parameter numbers, `softening` the names of drive stiffnesses to the
-    numbers of their softening in this pose; `delays` (E,) are the numbers of the axes' delays, -1 where there is none; `payload`
-    is the nominal payload mass in kg, None for the declared one.
+    `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
+    half gaps; `open_share` (phases, E) is how likely each stands open along the reference motion, per rad of half gap. `delays` (E,)
+    are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
     """
 
     frequencies_hz: np.ndarray
     q: np.ndarray
     payload: float | None
     robot_names: dict[str, int]
-    softening: dict[str, int]
+    gaps: dict[int, int]
+    open_share: np.ndarray
     delays: np.ndarray
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
         """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
         known = {name: float(natural[number]) for name, number in self.robot_names.items()}
-        for name, number in self.softening.items():
-            known[name] = known.get(name, robot.value(name)) * float(np.exp(-natural[number]))
+        for axis, softening in zip(self.gaps, self.softening(natural), strict=True):
+            for name in _drive(robot, axis):
+                known[name] = known.get(name, robot.value(name)) * float(np.exp(-softening))
         payload = self.payload
         if payload is not None and payload > 0 and "payload.mass" in known:
             payload *= known["payload.mass"] / float(robot.payload_mass[0])
             known["payload.mass"] = payload
         return known, payload
+
+    def softening(self, natural: np.ndarray) -> np.ndarray:
+        """Share (gaps,) by which open gaps lower stiffness and damping of their drives."""
+        return self.open_share.mean(axis=0)[list(self.gaps)] * natural[list(self.gaps.values())]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +65,7 @@ class ResponseModel:
     """Predicts every pose at estimation coordinates x (p,); what `parameters` do not hold stays at the value of `robot`.
 
     The linearisation point is the measured mean motor position; the rest position of the arm follows the parameters. The delay of
-    an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j).
+    an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j). Gaps count as closed until `with_open_gaps`.
     """
 
     robot: RobotModel
@@ -74,13 +83,13 @@ class ResponseModel:
             for joint in robot.elastic
             for label in labels
         }
+        gaps = {
+            axis: parameters.index(half_gap_name(joint.name))
+            for axis, joint in enumerate(robot.elastic)
+            if half_gap_name(joint.name) in parameters
+        }
         poses = []
         for response, label in zip(responses, labels, strict=True):
-            soft = {
-                f"{joint.name}.drive.stiffness": parameters.index(softening_name(joint.name, label))
-                for joint in robot.elastic
-                if softening_name(joint.name, label) in parameters
-            }
             names: dict[str, int] = {}
             for number, name in enumerate(parameters.names):
                 target, only = own.get(name, (name, label))
@@ -91,9 +100,27 @@ class ResponseModel:
             delays = [f"{joint.name}.delay" for joint in robot.elastic]
             at = np.array([parameters.index(d) if d in parameters else -1 for d in delays])
             poses.append(
-                PoseModel(response.frequencies_hz, response.q_mean, response.payload, names, soft, at)
+                PoseModel(
+                    response.frequencies_hz,
+                    response.q_mean,
+                    response.payload,
+                    names,
+                    gaps,
+                    np.zeros((1, len(robot.elastic))),
+                    at,
+                )
             )
         return cls(robot, parameters, tuple(poses))
+
+    def with_open_gaps(self, x: np.ndarray, plan: MultisinePlan) -> ResponseModel:
+        """Gaps stand open as the plan's torques have it at the coordinates x (p,)."""
+        natural = self.parameters.natural(x)
+        poses = []
+        for pose in self.poses:
+            known, payload = pose.values(self.robot, natural)
+            share = open_share(self.robot.with_values(known), pose.q, payload, plan)
+            poses.append(replace(pose, open_share=share))
+        return replace(self, poses=tuple(poses))
 
     def predict(self, x: np.ndarray) -> list[Prediction]:
         """Responses and derivatives of every pose."""
@@ -110,16 +137,20 @@ class ResponseModel:
     ) -> Prediction:
         known, payload = pose.values(self.robot, values)
         robot = self.robot.with_values(known)
-        names = tuple(dict.fromkeys((*pose.robot_names, *pose.softening))) if derivatives else ()
+        softened = {name: axis for axis in pose.gaps for name in _drive(robot, axis)}
+        names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
         system = linearise(robot, pose.q, payload, derivatives=names)
         s = 2j * np.pi * pose.frequencies_hz
-        response, change = batch_transfer(system, names, s)
+        moved = transfer_matrix(system, pose.frequencies_hz)
+        response, change = moved.response, moved.derivatives
         late = np.array([values[number] if number >= 0 else 0.0 for number in pose.delays])
         phase = np.exp(-s[:, None] * late)[:, None, :]
         response = response * phase
         if not derivatives:
             return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
-        change *= phase[..., None]
+        change = change * phase[..., None]
+        share = pose.open_share.mean(axis=0)
+        gap_changes = {axis: np.zeros_like(response) for axis in pose.gaps}
         numbers, blocks = [], []
         for k, name in enumerate(names):
             slope = known[name]  # ∂/∂ log of it
@@ -127,9 +158,11 @@ class ResponseModel:
                 numbers.append(pose.robot_names[name])
                 log = self.parameters[numbers[-1]].scale == "log"
                 blocks.append(change[..., k] * (slope if log else 1.0))
-            if name in pose.softening:
-                numbers.append(pose.softening[name])
-                blocks.append(change[..., k] * (-slope * slopes[numbers[-1]]))
+            if name in softened:
+                gap_changes[softened[name]] -= change[..., k] * slope * share[softened[name]]
+        for axis, gap_change in gap_changes.items():
+            numbers.append(pose.gaps[axis])
+            blocks.append(gap_change)
         for axis in np.flatnonzero(pose.delays >= 0):
             numbers.append(pose.delays[axis])
             late = np.zeros_like(response)
@@ -138,37 +171,6 @@ class ResponseModel:
         return Prediction(response, np.stack(blocks, axis=-1), np.array(numbers))
 
 
-def batch_transfer(
-    system: Linearisation, names: Sequence[str], s: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """G (L, E, E) at s (L,) rad/s, and its derivatives (L, E, E, c) by `names`, as `transfer_matrix` but all in three products.
-
-    With X = A⁻¹B, ∂G_ij = -s² Σ_ab X_ai X_bj (s² ∂M + s ∂D + ∂K)_ab. The products X X for a ≤ b and i ≤ j are formed once (both
-    are symmetric), and multiply each kind's derivatives, stacked, in one real matrix product.
-    """
-    count, size = system.inputs, len(system.mass)
-    at = s[:, None, None]
-    forces = np.broadcast_to(np.eye(size, count), (len(s), size, count))
-    moved = np.linalg.solve(at**2 * system.mass + at * system.damping + system.stiffness, forces)
-    response = at**2 * moved[:, :count]
-    if not names:
-        return response, np.empty((*response.shape, 0), dtype=complex)
-    parts = [np.array(kind) for kind in zip(*(system.derivatives[name] for name in names), strict=True)]
-    used = np.logical_or.reduce([np.any(part != 0, axis=0) for part in parts])
-    a, b = np.nonzero(np.triu(used))
-    i, j = np.triu_indices(count)
-    pairs = moved[:, a][:, :, i] * moved[:, b][:, :, j] + moved[:, b][:, :, i] * moved[:, a][:, :, j]
-    pairs *= np.where(a == b, 0.5, 1.0)[:, None]
-    table = np.ascontiguousarray(np.moveaxis(pairs, 1, 2)).reshape(-1, len(a))
-    table = np.vstack([table.real, table.imag])
-    upper = np.zeros((len(s), len(i), len(names)), dtype=complex)
-    for power, part in zip((4, 3, 2), parts, strict=True):
-        some = np.flatnonzero(np.any(part != 0, axis=(1, 2)))
-        product = table @ part[some][:, a, b].T
-        half = len(product) // 2
-        product = (product[:half] + 1j * product[half:]).reshape(len(s), len(i), len(some))
-        upper[:, :, some] -= s[:, None, None] ** power * product
-    change = np.empty((*response.shape, len(names)), dtype=complex)
-    change[:, i, j] = upper
-    change[:, j, i] = upper
-    return response, change
+def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:
+    drive = f"{robot.elastic[axis].name}.drive"
+    return f"{drive}.stiffness", f"{drive}.damping"

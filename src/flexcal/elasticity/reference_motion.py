@@ -12,29 +12,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.elasticity.prediction import batch_transfer
 from flexcal.model import RobotModel, static_equilibrium
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.linearisation import linearise
+from flexcal.model.transfer import transfer_matrix
 
 
 @dataclass(frozen=True)
 class ReferenceMotion:
     """All excited axes move by amplitude · sin(2π frequency_hz t), `amplitude` in rad, held by a controller of gains `kp`, `kd` (E,).
 
-    At the sidebands the controller's torque belongs to the system; at the excited line it is part of the measured torque.
+    `excitation` (E, L) N m are the cosine amplitudes of the multisine in each orthogonal experiment's share of an axis. At the
+    sidebands the controller's torque belongs to the system; at the excited line it is part of the measured torque.
     """
 
     amplitude: float
     frequency_hz: float
     kp: np.ndarray
     kd: np.ndarray
+    excitation: np.ndarray
 
     @classmethod
     def of(cls, plan: MultisinePlan) -> ReferenceMotion:
         """The reference motion of a plan."""
         axes = list(plan.joints)
-        return cls(plan.reference_amplitude, plan.reference_frequency_hz, plan.kp[axes], plan.kd[axes])
+        share = plan.amplitude / np.sqrt(len(axes))
+        return cls(plan.reference_amplitude, plan.reference_frequency_hz, plan.kp[axes], plan.kd[axes], share)
 
 
 def reference_shift(
@@ -52,7 +55,7 @@ def reference_shift(
     `sidebands` on either side are balanced; the motion is sampled at `phases` instants. The arm follows its motors rigidly.
     """
     rest = linearise(robot, q, payload)
-    still = batch_transfer(rest, (), 2j * np.pi * frequencies_hz)[0]
+    still = transfer_matrix(rest, frequencies_hz).response
     if motion.amplitude == 0.0:
         return np.zeros_like(still)
     mass, damping, stiffness = _harmonics(robot, q, payload, motion, sidebands, phases)

@@ -77,10 +77,10 @@ class StageOneResidual:
         """For measured responses, in the order of the model's poses."""
         return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
 
-    def shifted(self, shifts: Sequence[np.ndarray]) -> StageOneResidual:
-        """With known changes (L, n, n) of every pose's response added to what the model predicts."""
+    def shifted(self, model: ResponseModel, shifts: Sequence[np.ndarray]) -> StageOneResidual:
+        """The same measurements against `model`, with known changes (L, n, n) added to what it predicts in every pose."""
         poses = [replace(pose, shift=shift) for pose, shift in zip(self.poses, shifts, strict=True)]
-        return replace(self, poses=tuple(poses))
+        return StageOneResidual(model, tuple(poses))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """All rows (m,), pose by pose."""

@@ -12,8 +12,8 @@ from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model.robot_model import RobotModel
 
-NUISANCE = re.compile(r".*\.pose_[0-9]+")
-"""Names of what was estimated for one pose of an experiment: not the robot's own."""
+NUISANCE = re.compile(r".*\.(pose_[0-9]+|half_gap)")
+"""Names of what was estimated for an experiment: not the robot's own."""
 
 
 def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = None) -> RobotModel:

@@ -14,25 +14,50 @@ from flexcal.model.linearisation import Linearisation
 
 @dataclass(frozen=True, eq=False)
 class TransferMatrix:
-    """`response` (lines, E, E) in rad/s² per N m, and `derivatives` name → (lines, E, E)."""
+    """`response` (lines, E, E) in rad/s² per N m, and `derivatives` (lines, E, E, c) by the parameters `names` (c,)."""
 
     response: np.ndarray
-    derivatives: dict[str, np.ndarray]
+    names: tuple[str, ...]
+    derivatives: np.ndarray
 
 
 def transfer_matrix(system: Linearisation, frequencies_hz: np.ndarray) -> TransferMatrix:
-    """Evaluate G and its derivatives at `frequencies_hz` (lines,): ∂G = -s² Xᵀ (s² ∂M + s ∂D + ∂K) X with X = A⁻¹ B."""
-    s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)[:, None, None]
+    """Evaluate G and its derivatives by all of `system.derivatives` at `frequencies_hz` (lines,).
+
+    With X = A⁻¹B, ∂G_ij = -s² Σ_ab X_ai X_bj (s² ∂M + s ∂D + ∂K)_ab. The products X X for a ≤ b and i ≤ j are formed once (both
+    are symmetric), and multiply each kind's derivatives, stacked, in one real matrix product.
+    """
+    s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)
     count, size = system.inputs, len(system.mass)
+    at = s[:, None, None]
     forces = np.broadcast_to(np.eye(size, count), (len(s), size, count))
-    moved = np.linalg.solve(s**2 * system.mass + s * system.damping + system.stiffness, forces)
-    turned = np.swapaxes(moved, 1, 2)
-    derivatives = {}
-    for name, parts in system.derivatives.items():
-        change = np.zeros((len(s), count, count), dtype=complex)
-        for power, part in zip((4, 3, 2), parts, strict=True):
-            rows = np.flatnonzero(part.any(axis=1))
-            if len(rows):
-                change -= s**power * (turned[:, :, rows] @ (part[np.ix_(rows, rows)] @ moved[:, rows]))
-        derivatives[name] = change
-    return TransferMatrix(s**2 * moved[:, :count], derivatives)
+    moved = np.linalg.solve(at**2 * system.mass + at * system.damping + system.stiffness, forces)
+    names = tuple(system.derivatives)
+    return TransferMatrix(at**2 * moved[:, :count], names, _derivatives(system, names, s, moved))
+
+
+def _derivatives(
+    system: Linearisation, names: tuple[str, ...], s: np.ndarray, moved: np.ndarray
+) -> np.ndarray:
+    count = system.inputs
+    change = np.zeros((len(s), count, count, len(names)), dtype=complex)
+    if not names:
+        return change
+    parts = [np.array(kind) for kind in zip(*system.derivatives.values(), strict=True)]
+    used = np.logical_or.reduce([np.any(part != 0, axis=0) for part in parts])
+    a, b = np.nonzero(np.triu(used))
+    i, j = np.triu_indices(count)
+    pairs = moved[:, a][:, :, i] * moved[:, b][:, :, j] + moved[:, b][:, :, i] * moved[:, a][:, :, j]
+    pairs *= np.where(a == b, 0.5, 1.0)[:, None]
+    table = np.ascontiguousarray(np.moveaxis(pairs, 1, 2)).reshape(-1, len(a))
+    table = np.vstack([table.real, table.imag])
+    upper = np.zeros((len(s), len(i), len(names)), dtype=complex)
+    for power, part in zip((4, 3, 2), parts, strict=True):
+        some = np.flatnonzero(np.any(part != 0, axis=(1, 2)))
+        product = table @ part[some][:, a, b].T
+        half = len(product) // 2
+        product = (product[:half] + 1j * product[half:]).reshape(len(s), len(i), len(some))
+        upper[:, :, some] -= s[:, None, None] ** power * product
+    change[:, i, j] = upper
+    change[:, j, i] = upper
+    return change

@@ -1,0 +1,63 @@
+"""What the way of measuring adds to a frequency response: the slow motion under the excitation, and friction at its reversals."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.elasticity.friction_pulses import FrictionPulses
+from flexcal.elasticity.gap import gap_shift
+from flexcal.elasticity.prediction import PoseModel, ResponseModel
+from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
+from flexcal.frequency import FrequencyResponse
+from flexcal.model.linearisation import linearise
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentEffect:
+    """`shift` (L, E, E) is added to what the robot at rest would show; `by_friction` (L, E, E, 2 E) is its derivative by the
+    logarithm of the strength, then of the width, of the friction pulses of every motor.
+    """
+
+    shift: np.ndarray
+    by_friction: np.ndarray
+
+    @classmethod
+    def none(cls, response: FrequencyResponse) -> ExperimentEffect:
+        """At rest."""
+        shape = response.response.shape
+        return cls(np.zeros(shape, complex), np.zeros((*shape, 0), complex))
+
+
+def experiment_effects(
+    model: ResponseModel, x: np.ndarray, reference: ReferenceMotion
+) -> list[ExperimentEffect]:
+    """Of every pose at the coordinates x (p,).
+
+    What a motor's viscous coefficient in a pose exceeds that of robot.yaml by is taken for friction, where robot.yaml gives the joint
+    a Coulomb friction.
+    """
+    natural = model.parameters.natural(x)
+    return [_effect(model, pose, natural, reference) for pose in model.poses]
+
+
+def _effect(
+    model: ResponseModel, pose: PoseModel, natural: np.ndarray, reference: ReferenceMotion
+) -> ExperimentEffect:
+    known, payload = pose.values(model.robot, natural)
+    robot = model.robot.with_values(known)
+    axes = [joint.index for joint in robot.elastic]
+    excess = np.maximum(robot.viscous - np.nan_to_num(model.robot.viscous), 0.0)
+    strength = np.where(model.robot.coulomb > 0, excess, 0.0)[axes]
+    system = linearise(robot, pose.q, payload)
+    pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)
+    half_gap = np.zeros(len(axes))
+    half_gap[list(pose.gaps)] = natural[list(pose.gaps.values())]
+    opening = gap_shift(robot, system, pose.frequencies_hz, reference, pose.open_share * half_gap)
+    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference)
+    late = np.array([natural[number] if number >= 0 else 0.0 for number in pose.delays])
+    phase = np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]
+    return ExperimentEffect(
+        (moving + opening + pulses.shift()) * phase, pulses.shift_by_form() * phase[..., None]
+    )
