@@ -13,12 +13,17 @@ import argparse
 import json
 import tempfile
 from concurrent.futures import ProcessPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
 from flexcal.cell import CellConfig, draw_truth, write_truth
+from flexcal.elasticity import CovarianceWeighting, ResponseModel, Tolerances
+from flexcal.elasticity.experiment_effect import ExperimentEffect
+from flexcal.elasticity.model_error import ModelError
+from flexcal.elasticity.residual import StageOneResidual
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
 from flexcal.report.study import TwoStageStudy
@@ -56,17 +61,31 @@ def one_seed(
 def _springs(study: TwoStageStudy) -> dict[str, dict[str, Any]]:
     """Relative error, and error over standard deviation in the logarithm, of every spring parameter."""
     estimate, truth = study.stiffness.estimate, study.truth or {}
-    found = {}
+    found, bounds = {}, cramer_rao(study)
     for name in study.stiffness.springs:
         k = estimate.parameters.index(name)
         error = float(np.log(estimate.values[name] / truth[name]))
         found[name] = {
             "relative": estimate.values[name] / truth[name] - 1,
             "std": float(np.sqrt(estimate.covariance[k, k])),
+            "over_bound": float(np.sqrt(estimate.covariance[k, k]) / bounds[k]),
             "normalised": error / float(np.sqrt(estimate.covariance[k, k])),
             "identifiable": estimate.identifiable[k],
         }
     return found
+
+
+def cramer_rao(study: TwoStageStudy) -> np.ndarray:
+    """Standard deviations (p,) of stage 1 that noise, distortion and the priors of inertias and geometry allow."""
+    estimate, responses = study.stiffness.estimate, study.responses
+    x = estimate.parameters.coordinates()
+    model = ResponseModel.of(study.nominal, responses, estimate.parameters).with_open_gaps(x, study.plan)
+    residual = StageOneResidual.of(model, responses, CovarianceWeighting())
+    geometry = replace(Tolerances.none(), length=Tolerances.length, angle=Tolerances.angle)
+    still = [ExperimentEffect.none(response) for response in responses]
+    jacobian = ModelError.of(residual, responses, x, still, geometry).whiten(residual.linearise(x)[1])
+    information = jacobian.T @ jacobian + estimate.parameters.prior_information()
+    return np.sqrt(np.diag(np.linalg.inv(information)))
 
 
 def _geometry(study: TwoStageStudy) -> list[float]:
@@ -105,6 +124,8 @@ def summary(runs: list[dict[str, Any]]) -> str:
         lines.append(
             f"{label}: {len(z)} pairs, {100 * inside:.1f} % inside, mean normalised square {np.mean(np.square(z)):.2f}"
         )
+    ratios = [q["over_bound"] for r in runs for q in r["springs"].values() if q["identifiable"]]
+    lines.append(f"standard deviation over its Cramér-Rao bound: median {np.median(ratios):.2f}")
     for key in ("rank",):
         lines.append(f"{key}: {sorted({r['results']['identifiability'][key] for r in runs})}")
     lines.append(

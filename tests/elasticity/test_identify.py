@@ -203,8 +203,9 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
         torque="held", seed=0,
     )  # fmt: skip
     half_gap, responses = {1: 4e-5, 2: 6e-5}, []
+    dragging = replace(tx90l, viscous=tx90l.viscous * np.append(VISCOUS, np.ones(3)))
     for q in poses["default"]:
-        share = open_share(tx90l, q, None, plan).mean(axis=0)
+        share = open_share(dragging, q, None, plan).mean(axis=0)
         soft = {
             f"joint_{axis + 1}.drive.{key}": np.exp(-size * share[axis])
             for axis, size in half_gap.items()

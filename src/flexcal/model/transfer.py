@@ -49,8 +49,8 @@ def _derivatives(
     i, j = np.triu_indices(count)
     pairs = moved[:, a][:, :, i] * moved[:, b][:, :, j] + moved[:, b][:, :, i] * moved[:, a][:, :, j]
     pairs *= np.where(a == b, 0.5, 1.0)[:, None]
-    table = np.ascontiguousarray(np.moveaxis(pairs, 1, 2)).reshape(-1, len(a))
-    table = np.vstack([table.real, table.imag])
+    table = np.asarray(np.moveaxis(pairs, 1, 2)).reshape(len(s) * len(i), len(a))
+    table = np.vstack([np.real(table), np.imag(table)])
     upper = np.zeros((len(s), len(i), len(names)), dtype=complex)
     for power, part in zip((4, 3, 2), parts, strict=True):
         some = np.flatnonzero(np.any(part != 0, axis=(1, 2)))
