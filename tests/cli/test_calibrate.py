@@ -44,9 +44,9 @@ def test_rigid_fit_reaches_the_published_accuracy(run, ur5_folder: Path) -> None
     robot = ur5_folder / "robot.yaml"
     run("calibrate", robot, ur5_folder / "grid.csv", "--terms", "kinematic")
     measured = run("verify", robot, ur5_folder / "random.csv", "--json").document["verification"]["measured"]
-    assert measured["mean_mm"] <= 0.101 + 5e-4
-    assert measured["p90_mm"] <= 0.131 + 5e-4
-    assert measured["max_mm"] <= 0.159 + 5e-4
+    assert measured["mean_mm"] <= 0.101
+    assert measured["p90_mm"] <= 0.131
+    assert measured["max_mm"] <= 0.159
 
 
 def test_json_is_all_of_standard_output(ur5_folder: Path, some: Path) -> None:
@@ -246,6 +246,32 @@ def test_nominal_springs_are_said_to_be_nominal(run, tx90l_folder: Path, elastic
     estimates.unlink()
     write_estimates(estimates, "stiffness", found)
     assert "nominal one of robot.yaml" not in run("calibrate", robot, elastic_poses).out
+
+
+def test_a_secant_scale_frees_the_drives_from_what_stage_one_said(
+    run, tx90l_folder: Path, elastic_poses: Path
+) -> None:
+    """Stage 1 said, to 1 %, that the drives are 8 % stiffer than gravity finds them: with a scale of 10 % the poses decide."""
+    robot, estimates = tx90l_folder / "robot.yaml", tx90l_folder / "estimates.yaml"
+    model = RobotModel.from_yaml(robot, estimates=False)
+    drives = [f"joint_{i}.drive.stiffness" for i in (1, 2, 3)]
+    springs = [n for n in model.values if n.endswith("stiffness")]
+    tangent = {n: model.value(n) * (1.08 if n in drives else 1.0) for n in springs}
+    parameters = Parameters(Parameter(n, "N m/rad", tangent[n], scale="log") for n in springs)
+    found = Estimate(parameters, 1e-4 * np.eye(9), 9, (), (True,) * 9, 0.0, 0.0, 0, "converged", "", 0)
+    write_estimates(estimates, "stiffness", found)
+    tied = run("calibrate", robot, elastic_poses, "--json").document["parameters"]
+    free = run("calibrate", robot, elastic_poses, "--secant-scale", 0.1, "--json").document["parameters"]
+    for name in drives:
+        assert free[name]["std"] > 1.5 * tied[name]["std"], name
+    for name in ("joint_2.drive.stiffness", "joint_3.drive.stiffness"):
+        off = [abs(p[name]["estimate"] / model.value(name) - 1) for p in (tied, free)]
+        assert off[1] < 0.5 * off[0], name
+    blocks = read_estimates(estimates)
+    assert (
+        blocks["stiffness"].values == tangent
+    )  # both stay on file: the tangent of stage 1, the secant of stage 2
+    assert blocks["calibration"].provenance["option.secant_scale"] == "0.1"
 
 
 def test_marginalised_and_reestimated_springs_are_stored_alike(

@@ -15,7 +15,7 @@ from outline import Outline
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.report import TX90L_PAPER, TwoStageStudy, write_two_stage_report
-from flexcal.report.notation import millimetres
+from flexcal.report.notation import millimetres, significant
 
 MEBIBYTE = 1e6
 
@@ -98,6 +98,47 @@ def test_first_screen_answers_the_three_questions(html: str, study: TwoStageStud
     assert TX90L_PAPER.elastic is not None and millimetres(TX90L_PAPER.elastic.max) in screen
     for question in ("How accurate was it?", "How accurate is it?", "Can I trust it?"):
         assert question in screen
+
+
+def test_all_numbers_stand_beside_the_papers(html: str, study: TwoStageStudy) -> None:
+    """The paper, on hardware: 0.10 mm on its calibration poses, 0.23 mm at nine of ten fresh ones, 0.32 at worst, 0.70 rigid."""
+    table = html[html.index('id="table-numbers"') :]
+    rows = re.findall(r"<tr.*?</tr>", table[: table.index("</table>")], re.DOTALL)
+    cells = [re.sub(r"<[^>]*>", " ", row).split() for row in rows]
+    expected = (
+        (study.calibration.errors, "calibration poses, calibrated", ("0.10",)),
+        (study.rigid_verification[0].all, "rigid calibration", ("0.70",)),
+        (study.elastic_verification.all, "elastic calibration", ("0.23", "0.32")),
+    )
+    for ours, label, published in expected:
+        (row,) = [row for row in cells if label in " ".join(row)]
+        for number in (ours.mean, ours.p90, ours.max):
+            assert millimetres(number) in row, label
+        assert all(any(cell.startswith(number) for cell in row) for number in published), label
+    counts = html[html.index('id="table-counts"') :]
+    assert re.search(r"determined.*?29.*?30", re.sub(r"<[^>]*>", " ", counts), re.DOTALL)
+
+
+@pytest.mark.parametrize("kind", ["stiffness", "damping"])
+def test_table_1_has_every_interval_and_the_papers_value(html: str, study: TwoStageStudy, kind: str) -> None:
+    table = html[html.index(f'id="table-{kind}"') :]
+    table = table[: table.index("</table>")]
+    rows = [re.sub(r"<[^>]*>", " ", row) for row in re.findall(r"<tr.*?</tr>", table, re.DOTALL)][1:]
+    factor = 1e-3 if kind == "stiffness" else 1.0
+    assert "95 % interval" in table and len(rows) == len(study.springs(kind)) == 9
+    for name, row in zip(study.springs(kind), rows, strict=True):
+        interval = study.stiffness.estimate.interval(name)
+        if interval is None:
+            assert "not determined" in row
+        else:
+            assert " to ".join(significant(factor * end) for end in interval) in row
+        assert significant(factor * TX90L_PAPER.springs[name]) in row
+
+
+def test_the_poses_are_drawn_in_space(outline: Outline, study: TwoStageStudy) -> None:
+    traces = outline.figures()["figure-10"]["data"]
+    assert {trace["type"] for trace in traces} <= {"scatter3d", "cone"}
+    assert len(study.calibration.poses) == 40
 
 
 def test_what_is_not_determined_is_said_with_a_reason(outline: Outline, study: TwoStageStudy) -> None:

@@ -62,6 +62,8 @@ def test_results_have_the_fixed_names(demo: Path) -> None:
     assert len(document["identifiability"]["dropped"]) == 18
     for block in ("elastic", "elastic_unambiguous", "rigid", "measured"):
         assert set(document["verification"][block]) == {"poses", "mean_mm", "p90_mm", "max_mm"}
+    assert document["calibration"]["poses"] == 40
+    assert {document["verification"][b]["poses"] for b in ("elastic", "rigid", "measured")} == {150}
     stages = {"dynamics", "frequency", "stage1", "poses", "stage2", "verification", "report", "total"}
     assert set(document["seconds"]) == stages
 
@@ -73,6 +75,15 @@ def test_it_is_accurate(demo: Path) -> None:
     assert document["verification"]["elastic"]["max_mm"] < 0.20
     assert document["verification"]["rigid"]["p90_mm"] > 0.3
     assert document["calibration_fit"]["wrong_flanks"] == 0
+
+
+def test_no_verification_pose_was_used_for_the_fit(demo: Path) -> None:
+    joints = [f"q{i}" for i in range(1, 7)]
+    used, fresh = (
+        pl.read_csv(demo / f"{kind}_poses.csv").select(joints).to_numpy()
+        for kind in ("calibration", "verification")
+    )
+    assert np.abs(used[:, None] - fresh[None]).max(axis=2).min() > 1e-2
 
 
 def test_the_table_says_what_the_results_say(demo: Path) -> None:

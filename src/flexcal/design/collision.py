@@ -67,11 +67,12 @@ class CollisionChecker:
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """Every shape but the floor, the base's and the obstacles' included."""
+        place = {self._model.getJointId(name): i for i, name in enumerate(self.model.joint_names)} | {0: -1}
         return tuple(
             Shape(
                 o.name,
                 o.geometry,
-                o.parentJoint - 1,
+                place[o.parentJoint],
                 np.array(o.placement.rotation),
                 np.array(o.placement.translation),
             )
@@ -148,8 +149,8 @@ class CollisionChecker:
     def _configurations(self, q: np.ndarray) -> np.ndarray:
         """Pinocchio's configurations (samples, nq): an unbounded joint is a cosine and a sine there."""
         result = np.empty((len(q), self._model.nq))
-        for i in range(self.model.n):
-            joint = self._model.joints[i + 1]
+        for i, name in enumerate(self.model.joint_names):
+            joint = self._model.joints[self._model.getJointId(name)]
             if joint.nq == 1:
                 result[:, joint.idx_q] = q[:, i]
             else:

@@ -31,7 +31,10 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What flexcal takes from a URDF: movable joints depth first, the inertia each carries (fixed children merged), all frames."""
+    """What flexcal takes from a URDF: movable joints, the inertia each carries (fixed children merged), all frames.
+
+    Joints stand depth first, branches in the order of the file; Pinocchio sorts them by name.
+    """
 
     name: str
     joints: tuple[Joint, ...]
@@ -57,8 +60,10 @@ def read_urdf(path: Path) -> Description:
             raise InputError(f"{path}: not a valid URDF ({_first_complaint(said)}); correct it.") from problem
     if model.njoints < 2:
         raise InputError(f"{path}: the URDF has no movable joint; a robot needs at least one.")
+    order = [model.getJointId(name) for name in links if model.existJointName(name)]
+    place = {i: k for k, i in enumerate([0, *order], start=-1)}
     joints = []
-    for i in range(1, model.njoints):
+    for i in order:
         kind, axis = _kind_and_axis(model.joints[i])
         bounded = model.joints[i].nq == 1
         at, rate = model.joints[i].idx_q, model.joints[i].idx_v
@@ -68,7 +73,7 @@ def read_urdf(path: Path) -> Description:
             Joint(
                 name=model.names[i],
                 link=links[model.names[i]],
-                parent=model.parents[i] - 1,
+                parent=place[model.parents[i]],
                 kind=kind,
                 rotation=np.array(model.jointPlacements[i].rotation),
                 translation=np.array(model.jointPlacements[i].translation),
@@ -81,10 +86,11 @@ def read_urdf(path: Path) -> Description:
             )
         )
     inertias = tuple(
-        Inertia(float(y.mass), np.array(y.lever), np.array(y.inertia)) for y in list(model.inertias)[1:]
+        Inertia(float(y.mass), np.array(y.lever), np.array(y.inertia))
+        for y in (model.inertias[i] for i in order)
     )
     frames = {
-        f.name: Frame(f.parentJoint - 1, np.array(f.placement.rotation), np.array(f.placement.translation))
+        f.name: Frame(place[f.parentJoint], np.array(f.placement.rotation), np.array(f.placement.translation))
         for f in model.frames
     }
     return Description(model.name, tuple(joints), inertias, frames)

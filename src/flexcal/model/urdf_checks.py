@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from flexcal.model.urdf_xml import Element
@@ -13,7 +15,7 @@ _ROUNDING = 1e-9
 
 
 def carried_links(robot: Element) -> dict[str, str]:
-    """The link that each joint carries, of a URDF that is complete.
+    """The link that each joint carries, of a URDF that is complete; depth first, branches in the order of the file.
 
     Raises `InputError` with file, line and link or joint where it is incomplete, unreadable or asks for what flexcal does not have.
     """
@@ -52,7 +54,15 @@ def carried_links(robot: Element) -> dict[str, str]:
             raise link.error(
                 f"the link '{name}' is carried by itself; correct the joints' parents and children."
             )
-    return carried
+    return {joint: carried[joint] for joint in _beyond(roots[0], carried, parents)}
+
+
+def _beyond(link: str, carried: dict[str, str], parents: dict[str, str]) -> Iterator[str]:
+    """The joints beyond a link, each followed by those beyond the link that it carries."""
+    for joint, child in carried.items():
+        if parents[child] == link:
+            yield joint
+            yield from _beyond(child, carried, parents)
 
 
 def _named(robot: Element, tag: str) -> dict[str, Element]:
