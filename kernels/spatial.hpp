@@ -2,31 +2,45 @@
 #pragma once
 #include <array>
 #include <cmath>
+#include <type_traits>
 
 namespace flexcal {
 
-struct Vector3 {
-    double x, y, z;
+// S is double, or several samples side by side (lanes.hpp).
+template <class S>
+struct Vector {
+    S x, y, z;
 };
+using Vector3 = Vector<double>;
 
-inline Vector3 operator+(Vector3 a, Vector3 b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
-inline Vector3 operator-(Vector3 a, Vector3 b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
-inline Vector3 operator*(double s, Vector3 a) { return {s * a.x, s * a.y, s * a.z}; }
-inline double dot(Vector3 a, Vector3 b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-inline Vector3 cross(Vector3 a, Vector3 b) {
+template <class S>
+inline Vector<S> operator+(const Vector<S>& a, const Vector<S>& b) { return {a.x + b.x, a.y + b.y, a.z + b.z}; }
+template <class S>
+inline Vector<S> operator-(const Vector<S>& a, const Vector<S>& b) { return {a.x - b.x, a.y - b.y, a.z - b.z}; }
+template <class S>
+inline Vector<S> operator*(std::type_identity_t<S> s, const Vector<S>& a) { return {s * a.x, s * a.y, s * a.z}; }
+template <class S>
+inline S dot(const Vector<S>& a, const Vector<S>& b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
+template <class S>
+inline Vector<S> cross(const Vector<S>& a, const Vector<S>& b) {
     return {a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x};
 }
 inline Vector3 vector3(const double* p) { return {p[0], p[1], p[2]}; }
 
 // A rotation as its three columns: the images of x, y and z.
-struct Rotation {
-    Vector3 x, y, z;
+template <class S>
+struct RotationOf {
+    Vector<S> x, y, z;
 };
+using Rotation = RotationOf<double>;
 
-inline Vector3 operator*(const Rotation& r, Vector3 v) { return v.x * r.x + v.y * r.y + v.z * r.z; }
-inline Rotation operator*(const Rotation& a, const Rotation& b) { return {a * b.x, a * b.y, a * b.z}; }
+template <class S>
+inline Vector<S> operator*(const RotationOf<S>& r, const Vector<S>& v) { return v.x * r.x + v.y * r.y + v.z * r.z; }
+template <class S>
+inline RotationOf<S> operator*(const RotationOf<S>& a, const RotationOf<S>& b) { return {a * b.x, a * b.y, a * b.z}; }
 inline Rotation identity() { return {{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}; }
-inline Rotation transpose(const Rotation& r) {
+template <class S>
+inline RotationOf<S> transpose(const RotationOf<S>& r) {
     return {{r.x.x, r.y.x, r.z.x}, {r.x.y, r.y.y, r.z.y}, {r.x.z, r.y.z, r.z.z}};
 }
 
@@ -36,12 +50,13 @@ inline Rotation rotation(const double* m) {
 }
 
 // r · R_z(angle), r · R_y(angle), r · R_x(angle): turns about an axis of the rotated frame itself.
-inline void turn_z(Rotation& r, double angle) {
-    const double c = std::cos(angle), s = std::sin(angle);
-    const Vector3 x = c * r.x + s * r.y;
+template <class S>
+inline void turn_z(RotationOf<S>& r, S c, S s) {
+    const Vector<S> x = c * r.x + s * r.y;
     r.y = c * r.y - s * r.x;
     r.x = x;
 }
+inline void turn_z(Rotation& r, double angle) { turn_z(r, std::cos(angle), std::sin(angle)); }
 inline void turn_y(Rotation& r, double angle) {
     const double c = std::cos(angle), s = std::sin(angle);
     const Vector3 z = c * r.z + s * r.x;

@@ -9,6 +9,7 @@
 #include "bindings.hpp"
 #include "equilibrium.hpp"
 #include "kinematics.hpp"
+#include "regressor.hpp"
 
 namespace nb = nanobind;
 using namespace flexcal;
@@ -110,6 +111,22 @@ nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& 
     return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
 }
 
+Result torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq) {
+    const std::size_t n = tree.size(), samples = q.shape(0);
+    expect(geometry, {n, 6}, "geometry must be (n, 6)");
+    expect(gravity, {3}, "gravity must be (3,)");
+    expect(q, {samples, n}, "q must be (samples, n)");
+    expect(dq, {samples, n}, "dq must be (samples, n)");
+    expect(ddq, {samples, n}, "ddq must be (samples, n)");
+    Buffer regressor({n, inertial_size * n, samples});
+    {
+        nb::gil_scoped_release release;
+        torque_regressor(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(),
+                         static_cast<std::ptrdiff_t>(samples), regressor.data.get());
+    }
+    return regressor.release();
+}
+
 }  // namespace
 
 void bind_tree(nb::module_& m) {
@@ -122,5 +139,7 @@ void bind_tree(nb::module_& m) {
         .def("equilibrium", &equilibrium, nb::arg("axes"), nb::arg("stiffness"), nb::arg("geometry"), nb::arg("mass"), nb::arg("first_moment"),
              nb::arg("payload"), nb::arg("payload_joint"), nb::arg("payload_point"), nb::arg("gravity"), nb::arg("q"), nb::arg("sensitivities"),
              "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), its coupling with geometry "
-             "(samples, d, 6 n), largest last Newton step (rad).");
+             "(samples, d, 6 n), largest last Newton step (rad).")
+        .def("torque_regressor", &torques, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),
+             "Joint torques by mass, first moment and inertia of every link, (n, 10 n, samples).");
 }

@@ -36,6 +36,14 @@ class Tree:
         q: np.ndarray,
         sensitivities: bool,
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, float]: ...
+    def torque_regressor(
+        self,
+        geometry: np.ndarray,
+        gravity: np.ndarray,
+        q: np.ndarray,
+        dq: np.ndarray,
+        ddq: np.ndarray,
+    ) -> np.ndarray: ...
 
 def closed_loop(
     step: int,

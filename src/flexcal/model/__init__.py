@@ -6,6 +6,7 @@ from flexcal.model.inertia import Inertia
 from flexcal.model.joint import Joint
 from flexcal.model.kinematics import PointKinematics, point_kinematics
 from flexcal.model.point import Payload, Point
+from flexcal.model.regressor import inertial_names, inertial_parameters, torque_regressor
 from flexcal.model.robot_model import RobotModel
 
 __all__ = [
@@ -18,6 +19,9 @@ __all__ = [
     "PointKinematics",
     "RobotModel",
     "gravity_torque",
+    "inertial_names",
+    "inertial_parameters",
     "point_kinematics",
     "static_equilibrium",
+    "torque_regressor",
 ]

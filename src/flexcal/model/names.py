@@ -16,6 +16,7 @@ _UNITS = {
     "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad", "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
+    "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
 }  # fmt: skip
 
 
@@ -32,7 +33,8 @@ def unit_of(name: str) -> str:
 def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
 
-    Inertia entries (`<link>.Ixx`…, at the joint frame) are not here: they depend on mass and centre of mass too.
+    Inertia entries (`<link>.Ixx`…, at the joint frame) and first moments (`<link>.mc_x`…) are not here: they depend on mass and
+    centre of mass too.
     """
     table: dict[str, tuple[str, tuple[int, ...]]] = {}
     for s, name in enumerate(model.stations):

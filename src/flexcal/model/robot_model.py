@@ -23,6 +23,7 @@ from flexcal.model.point import Payload, Point
 from flexcal.model.posterior import NOTHING_ESTIMATED, Posterior
 
 _MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
+_FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +31,8 @@ class RobotModel:
     """An immutable robot: structure from the URDF, and one array a kind of parameter (n joints, SI units).
 
     Every number that can be identified has a name (FORMATS): `values` reads them all, `with_values` makes a changed robot. Setting a
-    link's mass scales its inertia about the centre of mass with it; setting `com_x`… moves that inertia rigidly.
+    link's mass scales its inertia about the centre of mass with it; setting `com_x`… or the first moment `mc_x`… (mass times centre of
+    mass, after the mass) moves that inertia rigidly.
     """
 
     config: RobotConfig
@@ -182,6 +184,12 @@ class RobotModel:
         for i, joint in enumerate(self.joints):
             at_joint = self.inertia[i] + parallel_axis(self.mass[i], self.com[i])
             table.update({f"{joint.link}.{key}": float(at_joint[index]) for key, index in _MOMENTS.items()})
+            table.update(
+                {
+                    f"{joint.link}.{key}": float(self.mass[i] * self.com[i, k])
+                    for key, k in _FIRST_MOMENTS.items()
+                }
+            )
         return MappingProxyType(table)
 
     def value(self, name: str) -> float:
@@ -212,6 +220,8 @@ class RobotModel:
                 link, _, key = name.rpartition(".")
                 moments.setdefault([j.link for j in self.joints].index(link), {})[key] = value
         for i, entries in moments.items():
+            for key in _FIRST_MOMENTS.keys() & entries.keys():
+                own("com")[i, _FIRST_MOMENTS[key]] = self._com_of(i, entries.pop(key), own("mass")[i])
             moved = parallel_axis(own("mass")[i], own("com")[i])
             at_joint = own("inertia")[i] + moved
             for key, value in entries.items():
@@ -219,6 +229,13 @@ class RobotModel:
                 at_joint[row, column] = at_joint[column, row] = value
             own("inertia")[i] = at_joint - moved
         return replace(self, **arrays)
+
+    def _com_of(self, link: int, first_moment: float, mass: float) -> float:
+        if mass == 0 and first_moment != 0:
+            raise FlexcalError(
+                f"the link '{self.joints[link].link}' has no mass, so it can have no first moment."
+            )
+        return first_moment / mass if mass != 0 else 0.0
 
     def with_estimate(self, estimate: Estimate) -> RobotModel:
         """A robot with the values of an estimate that are the robot's own, carrying their joint covariance."""

@@ -1,0 +1,43 @@
+"""Joint torques as a linear map of the links' inertial parameters (Eq. 2.20 of the thesis)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import joint_batch
+from flexcal.model.robot_model import RobotModel
+
+INERTIAL = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+"""The ten parameters of a link in the order of the columns: mass (kg), first moment (kg m) and inertia (kg m²) at the joint frame.
+
+Ixy, Ixz and Iyz are entries of the inertia matrix, as URDF has them: negative products of inertia.
+"""
+
+
+def inertial_names(model: RobotModel) -> tuple[str, ...]:
+    """Names of the 10 n columns, link by link in chain order."""
+    return tuple(f"{joint.link}.{key}" for joint in model.joints for key in INERTIAL)
+
+
+def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+    """W (samples, n, 10 n) with W · `inertial_parameters` = the torques that move the links, gravity included.
+
+    `q`, `dq`, `ddq` (samples, n) in rad, m and s. Rows are N m (N where prismatic); columns are named by `inertial_names`. Column
+    10 i + k of joint j is zero where link i is not beyond joint j. In memory the samples of one column follow each other, which is
+    what filters along time want. The model's geometric errors count; deflections and the payload do not.
+    Raises `FlexcalError` where the shapes differ or do not fit the robot.
+    """
+    q, dq, ddq = (joint_batch(model, values) for values in (q, dq, ddq))
+    if not q.shape == dq.shape == ddq.shape:
+        raise FlexcalError(
+            f"q, dq and ddq have shapes {q.shape}, {dq.shape} and {ddq.shape}; give as many samples of each."
+        )
+    by_joint = model.tree.torque_regressor(np.ascontiguousarray(model.geometry), model.gravity, q, dq, ddq)
+    return by_joint.transpose(2, 0, 1)
+
+
+def inertial_parameters(model: RobotModel) -> np.ndarray:
+    """The model's values of the columns, (10 n,)."""
+    values = model.values
+    return np.array([values[name] for name in inertial_names(model)])
