@@ -35,7 +35,12 @@ def documented(root: Path) -> dict[str, str]:
 
 
 def pattern(name: str) -> str:
-    name = re.escape(name).replace("<joint>", r"joint_\d").replace("<link>", r"link_\d")
+    name = (
+        re.escape(name)
+        .replace("<joint>", r"joint_\d")
+        .replace("<motor>", r"joint_\d")
+        .replace("<link>", r"link_\d")
+    )
     return name.replace("<name>", r"\w+").replace("<k>", r"\d+")
 
 
@@ -60,7 +65,8 @@ def produced(model: RobotModel) -> dict[str, str]:
 
 
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:
-    table, names = documented(root), produced(tx90l)
+    tx40 = RobotModel.from_yaml(root / "examples" / "tx40" / "robot.yaml", estimates=False)
+    table, names = documented(root), {name: unit_of(name) for name in tx40.values} | produced(tx90l)
     for name, unit in names.items():
         units = [known for written, known in table.items() if re.fullmatch(pattern(written), name)]
         assert units == [unit], name

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
 SPRINGS = ("bearing_x", "bearing_y", "drive")
+COUPLED = ("rotor_inertia", "viscous", "coulomb")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
 
 _UNITS = {
@@ -22,7 +23,7 @@ _UNITS = {
 
 def unit_of(name: str) -> str:
     """SI unit of a parameter name."""
-    last = name.rpartition(".")[2]
+    last = name.rpartition(".")[2].partition("_at_")[0]
     if last.startswith("transmission_"):
         return "rad"
     if last.startswith("I") and len(last) == 3:
@@ -59,6 +60,9 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
         table[f"{joint.link}.mass"] = ("mass", (i,))
         for k, key in enumerate("xyz"):
             table[f"{joint.link}.com_{key}"] = ("com", (i, k))
+    for c, entry in enumerate(model.config.drives.coupling):
+        for k, key in enumerate(COUPLED):
+            table[f"{entry.motor}.{key}_at_{entry.joint}"] = ("coupling", (c, k))
     for k, key in enumerate(GEOMETRY):
         table[f"tool.{key}"] = ("tool", (k,))
     for p, name in enumerate(model.points):

@@ -1,0 +1,74 @@
+"""Base parameters: what the torques determine at best, and what each stands for (Gautier 1991)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.observation import Observation
+from flexcal.estimation import Identifiability, analyse
+
+_KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z", "mass")
+"""Of a link, in the order in which a person keeps them: the mass and what lies along the axis are regrouped first."""
+_SEED = 1991
+_SAMPLES_PER_PARAMETER = 3
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameters:
+    """`found` names the kept columns of an observation and what absorbs the others; its rank is the structural rank."""
+
+    found: Identifiability
+
+    @property
+    def rank(self) -> int:
+        """Structural rank: the number of base parameters."""
+        return self.found.rank
+
+    @property
+    def expressions(self) -> tuple[str, ...]:
+        """Each base parameter written out, as "link_1.Izz + joint_1.rotor_inertia + 0.0506 link_3.mass"."""
+        return tuple(
+            _written(self.found.names[kept], row, self.found.names)
+            for kept, row in zip(self.found.kept, self.found.regrouping, strict=True)
+        )
+
+    @classmethod
+    def of(cls, observation: Observation) -> BaseParameters:
+        """By rank-revealing QR of the observation at random states, the same in every run.
+
+        Columns are tried in a fixed order, so that the choice depends on nothing but the robot: link by link from the base, inertia
+        before first moment before mass, then rotor inertias, then the other terms.
+        """
+        model, names = observation.model, observation.names
+        rng = np.random.default_rng(_SEED)
+        samples = _SAMPLES_PER_PARAMETER * len(names)
+        q = rng.uniform(-np.pi, np.pi, (samples, model.n))
+        dq, ddq = rng.uniform(-2.0, 2.0, (2, samples, model.n))
+        columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q)))
+        matrix = np.zeros((model.n * samples, len(names)))
+        for joint, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
+            matrix[joint * samples : (joint + 1) * samples, members] = block.T
+        prefer = [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
+        prefer += [name for name in names if name not in set(prefer)]
+        return cls(analyse(matrix, names, scale=_scale(matrix, names), prefer=prefer))
+
+
+def _scale(matrix: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
+    """One scale for all parameters of a kind: a column that is only the URDF's rounding stays as small as it is."""
+    kinds = [name.rpartition(".")[2].rstrip("xyz") for name in names]
+    norms = np.linalg.norm(matrix, axis=0)
+    largest = {kind: max(n for k, n in zip(kinds, norms, strict=True) if k == kind) for kind in set(kinds)}
+    return np.array([1.0 / (largest[kind] or 1.0) for kind in kinds])
+
+
+def _written(kept: str, row: np.ndarray, names: tuple[str, ...]) -> str:
+    text = kept
+    for name, coefficient in zip(names, row, strict=True):
+        if name == kept or abs(coefficient) < 1e-9:
+            continue
+        size = "" if np.isclose(abs(coefficient), 1.0, rtol=1e-9) else f"{abs(coefficient):.6g} "
+        text += f" {'-' if coefficient < 0 else '+'} {size}{name}"
+    return text

@@ -1,0 +1,108 @@
+"""What the drives add to the torques of the links, each term linear in its parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar, Protocol
+
+import numpy as np
+
+from flexcal.dynamics.motion import Motion
+from flexcal.model import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class Column:
+    """What torque (N,) one unit of the parameter `name` asks of one joint."""
+
+    name: str
+    joint: int
+    values: np.ndarray
+
+
+class DriveTerm(Protocol):
+    """A term of the torques, with one or more parameters of its own."""
+
+    def columns(self, model: RobotModel, motion: Motion) -> Iterator[Column]:
+        """Its columns, in a stable order; a parameter that several joints feel has one for each."""
+        ...
+
+
+class _PerJoint:
+    """One parameter a joint, which that joint alone feels."""
+
+    key: ClassVar[str]
+
+    def shape(self, motion: Motion) -> np.ndarray:
+        raise NotImplementedError
+
+    def columns(self, model: RobotModel, motion: Motion) -> Iterator[Column]:
+        shape = self.shape(motion)
+        for i, name in enumerate(model.joint_names):
+            yield Column(f"{name}.{self.key}", i, shape[:, i])
+
+
+@dataclass(frozen=True)
+class RotorInertia(_PerJoint):
+    """`<joint>.rotor_inertia` · q̈."""
+
+    key = "rotor_inertia"
+
+    def shape(self, motion: Motion) -> np.ndarray:
+        return motion.ddq
+
+
+@dataclass(frozen=True)
+class Viscous(_PerJoint):
+    """`<joint>.viscous` · q̇."""
+
+    key = "viscous"
+
+    def shape(self, motion: Motion) -> np.ndarray:
+        return motion.dq
+
+
+@dataclass(frozen=True)
+class Coulomb(_PerJoint):
+    """`<joint>.coulomb` · sign q̇."""
+
+    key = "coulomb"
+
+    def shape(self, motion: Motion) -> np.ndarray:
+        return np.sign(motion.dq)
+
+
+@dataclass(frozen=True)
+class TorqueOffset(_PerJoint):
+    """`<joint>.torque_offset`: Coulomb friction that differs by direction, and the offset of the torque measurement."""
+
+    key = "torque_offset"
+
+    def shape(self, motion: Motion) -> np.ndarray:
+        return np.ones_like(motion.dq)
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """Motors that also turn another joint (`drives: coupling:`): motor m turns at s = q_m + ratio · q_j.
+
+    `<m>.rotor_inertia_at_<j>` and `<m>.viscous_at_<j>` are what either joint feels of the other's motion, `<m>.coulomb_at_<j>` what both
+    feel of sign ṡ. What each joint feels of its own motion stands in its own rotor inertia and viscous friction.
+    """
+
+    def columns(self, model: RobotModel, motion: Motion) -> Iterator[Column]:
+        for entry in model.config.drives.coupling:
+            motor, joint, ratio = model.joint_index(entry.motor), model.joint_index(entry.joint), entry.ratio
+            sign = np.sign(motion.dq[:, motor] + ratio * motion.dq[:, joint])
+            for key, on_motor, on_joint in (
+                ("rotor_inertia", ratio * motion.ddq[:, joint], ratio * motion.ddq[:, motor]),
+                ("viscous", ratio * motion.dq[:, joint], ratio * motion.dq[:, motor]),
+                ("coulomb", sign, ratio * sign),
+            ):
+                yield Column(f"{entry.motor}.{key}_at_{entry.joint}", motor, on_motor)
+                yield Column(f"{entry.motor}.{key}_at_{entry.joint}", joint, on_joint)
+
+
+CLASSIC: tuple[DriveTerm, ...] = (RotorInertia(), Viscous(), Coulomb(), TorqueOffset(), Coupling())
+"""The terms that the structural rank counts (FORMATS)."""
