@@ -19,3 +19,17 @@ def motion(rng: np.random.Generator) -> Motion:
     """Forty random states of six joints, which no trajectory joins."""
     q, dq, ddq = rng.normal(size=(3, 40, 6))
     return Motion(np.arange(40.0), q, dq, ddq, np.zeros_like(q))
+
+
+@pytest.fixture(scope="session")
+def swing() -> Motion:
+    """Ten seconds of six joints on sums of sines at 200 Hz, with exact derivatives and no torque."""
+    rng = np.random.default_rng(7)
+    time = np.arange(2000) / 200
+    rate = 2 * np.pi * 0.1 * np.array([1, 2, 3, 5, 7])
+    size, phase = rng.normal(size=(5, 6)), rng.uniform(0, 2 * np.pi, (5, 6))
+    angle = time[:, None, None] * rate[:, None] + phase
+    q = np.sum(size * np.sin(angle), axis=1)
+    dq = np.sum(size * rate[:, None] * np.cos(angle), axis=1)
+    ddq = -np.sum(size * rate[:, None] ** 2 * np.sin(angle), axis=1)
+    return Motion(time, q, dq, ddq, np.zeros_like(q))

@@ -13,6 +13,10 @@ from flexcal.dynamics.drive_terms import (
 )
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.regression import RegressionData, Subsystem, Window, observe
+from flexcal.dynamics.triangle import Triangle
+from flexcal.dynamics.wls import weighted_least_squares
 
 __all__ = [
     "CLASSIC",
@@ -23,7 +27,14 @@ __all__ = [
     "DriveTerm",
     "Motion",
     "Observation",
+    "RegressionData",
     "RotorInertia",
+    "Subsystem",
     "TorqueOffset",
+    "Triangle",
     "Viscous",
+    "Window",
+    "observe",
+    "ordinary_least_squares",
+    "weighted_least_squares",
 ]

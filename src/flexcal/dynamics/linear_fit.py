@@ -1,0 +1,84 @@
+"""The weighted linear least squares that the estimators share, and the estimate it gives."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.triangle import Triangle, stacked
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
+from flexcal.model.names import unit_of
+
+
+def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
+    """Least squares of the subsystems, each divided by its `noise` (N m), with the base parameters as unknowns (Eqs. 2.29-2.31).
+
+    Parameters that are no base parameters stay at the model's value, zero where it has none, and the kept ones absorb them. A base
+    parameter that these data do not determine stays too and counts as dropped: the recording, not the robot, hides it. The covariance
+    is (WᵀW)⁻¹ σ̂² with σ̂² of Eq. 2.28 on the weighted system; it takes the errors for independent from row to row.
+    Raises `FlexcalError` with no more rows than parameters.
+    """
+    from scipy.linalg import solve_triangular
+
+    names = data.names
+    weighted = [
+        Triangle(s.triangle.factor / sigma, s.triangle.rows)
+        for s, sigma in zip(data.subsystems, noise, strict=True)
+    ]
+    system = stacked(weighted, [s.members for s in data.subsystems], len(names))
+    base = data.base.found
+    structural = [names[i] for i in base.kept]
+    seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
+    kept = [base.kept[i] for i in seen.kept]
+    start = data.observation.values()
+    right = system.right - system.matrix @ start
+    scale = 1.0 / np.linalg.norm(system.matrix[:, kept], axis=0)
+    factor = Triangle.of(system.matrix[:, kept] * scale, right).factor
+    triangle, target = factor[:-1, :-1], factor[:-1, -1]
+    found = start.copy()
+    found[kept] += scale * solve_triangular(triangle, target)
+    freedom = system.rows - len(kept)
+    if freedom <= 0:
+        raise FlexcalError(
+            f"{system.rows} equations do not determine {len(kept)} parameters; record for longer."
+        )
+    cost = float(factor[-1, -1] ** 2)
+    root = np.zeros((len(names), len(kept)))
+    root[kept] = scale[:, None] * solve_triangular(triangle, np.eye(len(kept))) * math.sqrt(cost / freedom)
+    return Estimate(
+        parameters=Parameters(
+            Parameter(name, unit_of(name), float(v)) for name, v in zip(names, found, strict=True)
+        ),
+        covariance=root @ root.T,
+        rank=len(kept),
+        dropped=_dropped(base.regrouping, names, base.kept, seen.dropped),
+        identifiable=tuple(i in set(kept) for i in range(len(names))),
+        cost=cost,
+        chi2=cost,
+        degrees_of_freedom=freedom,
+        status="converged",
+        message="linear least squares",
+        iterations=1,
+    )
+
+
+def _dropped(
+    regrouping: np.ndarray, names: Sequence[str], base: Sequence[int], hidden: Sequence[Dropped]
+) -> tuple[Dropped, ...]:
+    """What the robot regroups, in terms of the base parameters that the data determine, and what the data hide besides."""
+    onward = {entry.name: entry.absorbed_by for entry in hidden}
+    result: list[Dropped] = list(hidden)
+    for number, name in enumerate(names):
+        if number in base:
+            continue
+        shares: dict[str, float] = {}
+        for kept, coefficient in zip(base, regrouping[:, number], strict=True):
+            for heir, share in onward.get(names[kept], ((names[kept], 1.0),)):
+                shares[heir] = shares.get(heir, 0.0) + coefficient * share
+        absorbed = tuple((heir, share) for heir, share in shares.items() if share != 0.0)
+        result.append(Dropped(name, absorbed))
+    return tuple(result)

@@ -1,0 +1,79 @@
+"""A long least-squares system in the space of a short one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+_TOLERANCE = 1e-9
+"""A singular value below this, of columns of unit length, is taken as zero."""
+
+
+@dataclass(frozen=True, eq=False)
+class Triangle:
+    """R (k + 1, k + 1) of the QR of [W, Y], W (rows, k) and Y (rows,): all that least squares needs, in constant memory.
+
+    Triangles of the same columns add up: R of two systems is R of their R stacked. No product WᵀW is ever formed.
+    """
+
+    factor: np.ndarray
+    rows: int
+
+    @classmethod
+    def of(cls, matrix: np.ndarray, right: np.ndarray) -> Triangle:
+        """Of W (rows, k) and Y (rows,)."""
+        return cls(_triangular(np.column_stack([matrix, right])), len(right))
+
+    @classmethod
+    def empty(cls, columns: int) -> Triangle:
+        """Of no rows."""
+        return cls(np.zeros((columns + 1, columns + 1)), 0)
+
+    def __add__(self, other: Triangle) -> Triangle:
+        return Triangle(_triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
+
+    @property
+    def matrix(self) -> np.ndarray:
+        """(k + 1, k) that stands for W."""
+        return self.factor[:, :-1]
+
+    @property
+    def right(self) -> np.ndarray:
+        """(k + 1,) that stands for Y."""
+        return self.factor[:, -1]
+
+    def residual(self, parameters: np.ndarray) -> float:
+        """‖Y − W · parameters‖ for `parameters` (k,)."""
+        return float(np.linalg.norm(self.right - self.matrix @ parameters))
+
+    def noise(self) -> tuple[float, int]:
+        """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that."""
+        norms = np.linalg.norm(self.matrix, axis=0)
+        scaled = self.matrix / np.where(norms > 0, norms, 1.0)
+        directions, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+        seen = directions[:, sizes > _TOLERANCE]
+        rank = seen.shape[1]
+        left = self.right - seen @ (seen.T @ self.right)
+        freedom = self.rows - rank
+        return (float(np.linalg.norm(left) / np.sqrt(freedom)) if freedom > 0 else np.nan), rank
+
+
+def stacked(triangles: Iterable[Triangle], members: Iterable[np.ndarray], columns: int) -> Triangle:
+    """One system of all `columns` from triangles that know only their `members` of them."""
+    total = Triangle.empty(columns)
+    for triangle, numbers in zip(triangles, members, strict=True):
+        wide = np.zeros((len(triangle.factor), columns + 1))
+        wide[:, numbers] = triangle.matrix
+        wide[:, -1] = triangle.right
+        total = total + Triangle(wide, triangle.rows)
+    return total
+
+
+def _triangular(matrix: np.ndarray) -> np.ndarray:
+    factor = np.linalg.qr(matrix, mode="r")
+    size = matrix.shape[1]
+    padded = np.zeros((size, size))
+    padded[: min(size, len(factor))] = factor[:size]
+    return padded

@@ -1,0 +1,30 @@
+"""Weighted least squares: the equations of each joint and experiment by their own noise (Eqs. 2.29-2.31)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.dynamics.linear_fit import linear_fit
+from flexcal.dynamics.regression import RegressionData
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+
+
+def weighted_least_squares(data: RegressionData) -> Estimate:
+    """χ̂ with σ̂ of each subsystem from its own fit, by its rows less its rank (Eq. 2.28).
+
+    A subsystem that its own parameters fit exactly counts as if it had 1e-12 of its torque as noise. Raises `FlexcalError` where a
+    subsystem has no more rows than it determines parameters, and as `linear_fit` does.
+    """
+    noise = []
+    for s in data.subsystems:
+        sigma, rank = s.triangle.noise()
+        if np.isnan(sigma):
+            joint = data.observation.model.joint_names[s.joint]
+            raise FlexcalError(
+                f"{s.triangle.rows} equations of {joint} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
+                "record for longer, or decimate less."
+            )
+        size = float(np.linalg.norm(s.triangle.right)) / np.sqrt(s.triangle.rows)
+        noise.append(max(sigma, 1e-12 * size) or 1.0)
+    return linear_fit(data, noise)
