@@ -108,3 +108,16 @@ def response_table(responses: Sequence[Mapping[str, Any]]) -> Table:
 
 def _millimetres(value: float | None) -> str:
     return "–" if value is None else f"{value:.3f}"
+
+
+def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """One row a base parameter, written out: estimate, standard deviation, and that in per cent of the estimate."""
+    table = Table(title="base parameters", title_justify="left")
+    table.add_column("parameter")
+    for heading in ("estimate", "std", "%", "unit"):
+        table.add_column(heading, justify="right" if heading != "unit" else "left")
+    for row in rows:
+        std = "not seen" if row["std"] is None else f"{row['std']:.3g}"
+        percent = "" if row["std_percent"] is None else f"{row['std_percent']:.1f}"
+        table.add_row(row["name"], f"{row['estimate']:.5g}", std, percent, row["unit"])
+    return table

@@ -61,6 +61,19 @@ STEPS = (
         ),
     ),
     Step(
+        "Before that, where CAD does not know the masses well: inertias and friction, from recordings of exciting motion",
+        (
+            Verb(
+                ("identify", "dynamics"),
+                "identify_dynamics",
+                "IdentifyDynamics",
+                "joint logs to base parameters with intervals",
+                "flexcal identify dynamics robot.yaml exciting.parquet --hold-out last:0.3",
+                ("results.json",),
+            ),
+        ),
+    ),
+    Step(
         "1. Stiffness and damping, from frequency responses (not for a robot calibrated as rigid)",
         (
             Verb(

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 
 from flexcal.dynamics.motion import Motion
+from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 
 
@@ -106,3 +107,27 @@ class Coupling:
 
 CLASSIC: tuple[DriveTerm, ...] = (RotorInertia(), Viscous(), Coulomb(), TorqueOffset(), Coupling())
 """The terms that the structural rank counts (FORMATS)."""
+
+_FRICTION: dict[str, DriveTerm] = {
+    "viscous": Viscous(),
+    "coulomb": Coulomb(),
+    "torque_offset": TorqueOffset(),
+}
+
+
+def chosen(friction: str | tuple[str, ...]) -> tuple[DriveTerm, ...]:
+    """Rotor inertia, the named friction terms and the coupling; "auto" stands for the classic ones.
+
+    Raises `FlexcalError` that lists the terms for an unknown one.
+    """
+    if isinstance(friction, str):
+        return CLASSIC
+    for name in friction:
+        if name not in _FRICTION:
+            raise FlexcalError(f"there is no friction term '{name}'; there are {', '.join(_FRICTION)}.")
+    return (RotorInertia(), *(_FRICTION[name] for name in dict.fromkeys(friction)), Coupling())
+
+
+def friction_names(terms: Sequence[DriveTerm]) -> tuple[str, ...]:
+    """The names of the friction terms among `terms`."""
+    return tuple(name for name, term in _FRICTION.items() if term in terms)

@@ -1,0 +1,94 @@
+"""`flexcal identify dynamics`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot, require_files, require_robot
+from flexcal.errors import InputError
+
+
+@dataclass(frozen=True)
+class IdentifyDynamics:
+    """Fit link inertias, rotor inertias and friction to recordings of exciting motion.
+
+    Writes estimates.yaml beside robot.yaml. Parameters that no motion can tell apart stay as CAD has them, and the others absorb them:
+    the robot as a whole needs the measured torques, while a single mass or inertia need not be what a scale would show.
+    """
+
+    robot: Robot
+    logs: Annotated[
+        Positional[tuple[Path, ...]],
+        arg(metavar="LOGS...", help="joint logs (CSV or Parquet), one or several", help_behavior_hint=""),
+    ]
+    hold_out: Annotated[str, arg(metavar="last:SHARE", help_behavior_hint="(for example last:0.3)")] = ""
+    """Keep the last share of every log's time out of the fit, and predict its torques."""
+    validate: Annotated[tuple[Path, ...], arg(metavar="LOG", help_behavior_hint="")] = ()
+    """Logs that the fit does not see, whose torques it predicts."""
+    estimator: Literal["wls", "ols"] = "wls"
+    """wls: every joint and log by its own noise; ols: every equation alike."""
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the base parameters and the error of the torques."""
+        from flexcal.cli.tables import base_parameter_table
+        from flexcal.workflow.identify_dynamics import identify_robot_dynamics
+
+        require_robot(self.robot, *self.logs)
+        require_files(self.logs, "LOGS")
+        share = _share(self.hold_out)
+        if share and self.validate:
+            raise InputError("--hold-out and --validate exclude each other; give one of them.")
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_dynamics(
+                self.robot,
+                self.logs,
+                hold_out=share,
+                validate=self.validate,
+                estimator=self.estimator,
+                out=self.out,
+                progress=progress,
+            )
+        document = found.document()
+        console.show(base_parameter_table(document["base_parameters"]))
+        console.say(
+            f"{document['rank']} of {document['structural_rank']} base parameters from {document['equations']} equations; "
+            f"{document['masked_rows']} rows at standstill left out"
+        )
+        error = document["error_percent"]
+        console.say(f"torques missed by {error['train']:.2f} % of their norm in the fit")
+        if error["held_out"] is not None:
+            console.say(
+                f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
+            )
+        console.say(
+            "intervals take the errors for independent from row to row, which is too hopeful for real recordings"
+        )
+        console.say(f"wrote {found.estimates}")
+        again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
+        elastic = found.train.observation.model.elastic
+        console.finish(
+            document, f"flexcal design frequency {self.robot} --out frequency.yaml" if elastic else again
+        )
+
+
+def _share(text: str) -> float:
+    """The share of `last:SHARE`, 0 for none; raises `InputError` for anything else."""
+    if not text:
+        return 0.0
+    kind, _, number = text.partition(":")
+    try:
+        share = float(number)
+    except ValueError:
+        share = -1.0
+    if kind != "last" or not 0 < share < 1:
+        raise InputError(f"--hold-out is '{text}'; write for example last:0.3, a share between 0 and 1.")
+    return share

@@ -1,0 +1,171 @@
+"""Recordings of exciting motion to dynamic parameters, and estimates.yaml."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.data import Recording, provenance, read_estimates, read_recording, write_estimates
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    BaseParameters,
+    Motion,
+    Observation,
+    RegressionData,
+    Window,
+    drive_terms,
+    observe,
+    ordinary_least_squares,
+    weighted_least_squares,
+)
+from flexcal.errors import InputError
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+from flexcal.model.stored import with_blocks
+from flexcal.progress import Progress, silent
+from flexcal.workflow.results import dropped_parameters, quantities, write_results
+
+EstimatorName = Literal["wls", "ols"]
+
+_ESTIMATORS = {"wls": weighted_least_squares, "ols": ordinary_least_squares}
+
+
+@dataclass(frozen=True, eq=False)
+class RobotDynamics:
+    """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written."""
+
+    estimate: Estimate
+    train: RegressionData
+    held_out: RegressionData | None
+    friction_terms: tuple[str, ...]
+    seconds: float
+    estimates: Path
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+        x = self.estimate.parameters.coordinates()
+        error, per_joint = self.train.errors(x)
+        joints = self.train.observation.model.joint_names
+        percent: dict[str, Any] = {"train": 100 * error, "held_out": None}
+        if self.held_out is not None:
+            error, per_joint = self.held_out.errors(x)
+            percent["held_out"] = 100 * error
+        percent["per_joint"] = dict(zip(joints, 100 * per_joint, strict=True))
+        return {
+            "structural_rank": self.train.base.rank,
+            "rank": self.estimate.rank,
+            "equations": sum(s.triangle.rows for s in self.train.subsystems),
+            "masked_rows": self.train.masked,
+            "error_percent": percent,
+            "friction_terms": list(self.friction_terms),
+            "base_parameters": self._base_parameters(),
+            "parameters": quantities(self.estimate),
+            "dropped": dropped_parameters(self.estimate.dropped),
+            "seconds": self.seconds,
+            "estimates": self.estimates,
+        }
+
+    def _base_parameters(self) -> list[dict[str, Any]]:
+        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell."""
+        base, x = self.train.base, self.estimate.parameters.coordinates()
+        hidden = {entry.name for entry in self.estimate.dropped}
+        rows = []
+        for expression, kept, row in zip(
+            base.expressions, base.found.kept, base.found.regrouping, strict=True
+        ):
+            name, value = base.found.names[kept], float(row @ x)
+            std = None if name in hidden else self.estimate.std(name)
+            percent = None if std is None or value == 0 else 100 * std / abs(value)
+            unit = self.estimate.parameters[name].unit
+            rows.append(
+                {"name": expression, "unit": unit, "estimate": value, "std": std, "std_percent": percent}
+            )
+        return rows
+
+
+def identify_robot_dynamics(
+    robot: Path,
+    logs: Sequence[Path],
+    *,
+    hold_out: float = 0.0,
+    validate: Sequence[Path] = (),
+    estimator: EstimatorName = "wls",
+    out: Path | None = None,
+    progress: Progress = silent,
+) -> RobotDynamics:
+    """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
+
+    The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what the filters would carry over, and
+    predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks. With `out`, estimates and
+    results.json go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and where robot.yaml lacks the cut-off or
+    the decimation or declares a payload; nothing is written then.
+    """
+    begun = time.perf_counter()
+    bare = RobotModel.from_yaml(robot, estimates=False)
+    source = bare.path.parent / bare.config.estimates
+    blocks = read_estimates(source, without="dynamics") if source.exists() else {}
+    model = with_blocks(bare, blocks, source)
+    cutoff, decimation = _treatment(model)
+    terms = drive_terms.chosen(model.config.dynamics.friction)
+    observation = Observation(model, terms)
+    base = BaseParameters.of(observation)
+    mask = model.config.dynamics.mask_standstill
+    motions, early, late = [], [], []
+    for number, log in enumerate(logs):
+        recording = read_recording(log, model)
+        motions.append(Motion.of(recording, cutoff))
+        split, gone = _split(recording, hold_out, decimation)
+        early.append(Window(end=gone))
+        late.append(Window(start=split))
+        progress("reading", (number + 1) / len(logs))
+    train = observe(observation, base, motions, decimation, mask_standstill=mask, windows=early)
+    held_out = None
+    if hold_out > 0:
+        held_out = observe(observation, base, motions, decimation, mask_standstill=mask, windows=late)
+    elif validate:
+        others = [Motion.of(read_recording(log, model), cutoff) for log in validate]
+        held_out = observe(observation, base, others, decimation, mask_standstill=mask)
+    estimate = _ESTIMATORS[estimator](train)
+    options = {"estimator": estimator, "hold_out": hold_out}
+    origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
+    estimate = replace(estimate, provenance=origin)
+    target = source if out is None else out / "estimates.yaml"
+    seconds = time.perf_counter() - begun
+    found = RobotDynamics(estimate, train, held_out, drive_terms.friction_names(terms), seconds, target)
+    kept: dict[Block, Estimate] = {} if target == source else blocks
+    for block, other in kept.items():
+        write_estimates(target, block, other)
+    write_estimates(target, "dynamics", estimate)
+    if out is not None:
+        write_results(out, found.document())
+    return found
+
+
+def _treatment(model: RobotModel) -> tuple[float, Decimation]:
+    """Cut-off (Hz) and decimation as declared."""
+    declared = model.config.dynamics
+    if declared.cutoff_hz is None or declared.decimation is None:
+        raise InputError(
+            f"{model.path}: the cut-off and the decimation of the recordings are missing; declare them, for example "
+            "'dynamics: {cutoff_hz: 50, decimation: 10}'."
+        )
+    if model.payload is not None:
+        raise InputError(
+            f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
+        )
+    return declared.cutoff_hz, Decimation(declared.decimation)
+
+
+def _split(recording: Recording, hold_out: float, decimation: Decimation) -> tuple[float, float]:
+    """When the held-out part begins, and when the rows of the fit end, which its filters must not reach; inf without one."""
+    if hold_out == 0:
+        return math.inf, math.inf
+    split = recording.start + (1.0 - hold_out) * recording.duration
+    return split, float(np.nextafter(split - decimation.support * recording.time_step, -math.inf))
