@@ -3,28 +3,12 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
 from flexcal.model import RobotModel
-
-PUBLISHED = {  # thanhndv212/figaroh-examples, TX40_bp_5.csv: value and standard deviation of weighted least squares
-    "link_1.Izz": (1.242121, 0.0137),
-    "link_2.Izz": (1.075026, 0.0111),
-    "link_2.mc_x": (2.237742, 0.0548),
-    "link_2.Ixz": (-0.158627, 0.00666),
-    "link_3.mc_y": (-0.598359, 0.0126),
-    "link_4.mc_x": (-0.020836, 0.00506),
-    "joint_1.viscous": (8.08729, 0.0542),
-    "joint_2.coulomb": (8.134077, 0.143),
-    "joint_3.rotor_inertia": (0.097102, 0.00702),
-    "joint_4.coulomb": (2.490079, 0.0555),
-    "joint_5.rotor_inertia": (0.047978, 0.00407),
-    "joint_6.viscous": (0.647663, 0.0115),
-    "joint_6.viscous_at_joint_5": (0.616288, 0.0111),
-    "joint_6.coulomb_at_joint_5": (1.956284, 0.0761),
-}
 
 
 @pytest.fixture
@@ -39,14 +23,23 @@ def identified(folder: Path, capsys: pytest.CaptureFixture[str], *options: str) 
 
 
 def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Within 1.5 published standard deviations: filter and decimation there are others, and one column is missing."""
+    """All sixty within 1.6 published standard deviations, but for two of link 6, the weakest link.
+
+    Filter and decimation were others there, and the rotor inertia of joint 6 was left out; the standard
+    deviations have the same meaning.
+    """
     found = identified(tx40, capsys)
     assert (found["structural_rank"], found["rank"]) == (61, 61)
     assert found["error_percent"]["held_out"] is None
     base = {row["name"].split()[0]: row for row in found["base_parameters"]}
-    for name, (value, std) in PUBLISHED.items():
-        assert abs(base[name]["estimate"] - value) < 1.5 * std, name
-        assert 0.4 < base[name]["std"] / std < 2.5, name
+    lines = Path(__file__).with_name("tx40_published.csv").read_text().splitlines()[2:]
+    published = {name: (float(value), float(std)) for name, value, std in (line.split(",") for line in lines)}
+    assert set(base) - set(published) == {"joint_6.rotor_inertia"}
+    off = {name: abs(base[name]["estimate"] - value) / std for name, (value, std) in published.items()}
+    assert {name for name, size in off.items() if size > 1.6} == {"link_6.mc_x", "link_6.mc_y"}
+    assert max(off.values()) < 3.0
+    assert np.median(list(off.values())) < 0.6
+    assert all(0.6 < base[name]["std"] / std < 1.1 for name, (_, std) in published.items())
 
 
 def test_torques_that_the_fit_never_saw(
