@@ -170,6 +170,8 @@ def static_equilibrium(
 
 def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
     """Harmonic transmission error (samples, n), rad: Σ a_k sin(k q) + b_k cos(k q)."""
+    if not model.transmission.any():
+        return np.zeros(q.shape)
     phase = q[:, :, None] * np.array(model.harmonics)
     return (model.transmission[:, :, 0] * np.sin(phase) + model.transmission[:, :, 1] * np.cos(phase)).sum(
         axis=2
