@@ -78,7 +78,7 @@ def test_friction_pulses(tx90l, poses, motion):
     pulses = FrictionPulses.of(system, FREQUENCIES, motion, friction)
     assert (pulses.width > 5e-3).all() and (pulses.width < 0.1).all()
     width = np.full(3, 0.012)
-    shift = replace(pulses, width=width).shift()
+    shift = replace(pulses, width=width).shift
 
     def change(phase: float) -> tuple[np.ndarray, np.ndarray]:
         late = np.mod(phase, np.pi) - 0.5 * np.pi

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.calibration.geometry_fit import GeometryFit, columns_of
 from flexcal.estimation import Estimate, Parameters, Problem, solve
-from flexcal.estimation.solve import LOG_STD_LIMIT
+from flexcal.estimation.uncertainty import known_to_a_factor
 
 _RELINEARISATIONS = 10
 _SETTLED = 1e-4
@@ -104,16 +104,12 @@ def _joint(at: _Marginal, geometry: Estimate) -> Estimate:
     covariance = np.block([[geometry.covariance, -across.T], [-across, own]])
     rows = np.hstack([by_geometry, at.slopes]) / fit.sigma[:, None]
     effective = float(np.sum((rows @ covariance) * rows))
-    known = (
-        item.scale == "linear" or s <= LOG_STD_LIMIT
-        for item, s in zip(at.elastic, np.sqrt(np.diag(own)), strict=True)
-    )
     return replace(
         geometry,
         parameters=parameters,
         covariance=covariance,
         rank=geometry.rank + len(at.elastic),
-        identifiable=geometry.identifiable + tuple(bool(k) for k in known),
+        identifiable=geometry.identifiable + known_to_a_factor(at.elastic, own),
         chi2=float(np.sum((fit.residual(predicted) / fit.sigma) ** 2)),
         degrees_of_freedom=max(0, round(len(rows) - effective)),
     )

@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model import Equilibrium, PointKinematics, RobotModel, point_kinematics, static_equilibrium
-from flexcal.model.names import GEOMETRY, STATION
+from flexcal.model.names import GEOMETRY, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
 
@@ -84,7 +84,7 @@ class Prediction:
         owner, _, key = name.rpartition(".")
         if key == "stiffness":
             joint_name, _, spring = owner.rpartition(".")
-            axis = (self.model.joint_index(joint_name), ("bearing_x", "bearing_y", "drive").index(spring))
+            axis = (self.model.joint_index(joint_name), SPRINGS.index(spring))
             load = np.zeros(self.rest.compliance.shape[:2])
             stretch = self.rest.deflection[:, axis[0], axis[1]]
             if axis[1] == 2:

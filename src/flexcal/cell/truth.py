@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.cell.config import SpreadConfig
 from flexcal.estimates_file import BLOCKS, Block
 from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY, STATION, unit_of
+from flexcal.model.names import GEOMETRY, SPRINGS, STATION, unit_of
 from flexcal.model.stored import NUISANCE
 from flexcal.structuring import Keys, suggestion
 from flexcal.yaml_reader import YamlFile, read_yaml_file
@@ -52,7 +52,7 @@ def _draws(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) ->
         yield f"{model.joint_names[i]}.backlash", rng.uniform(*spread.backlash)
     for spring in model.elastic:
         for component in spring.components:
-            name = f"{spring.name}.{('bearing_x', 'bearing_y', 'drive')[component]}"
+            name = f"{spring.name}.{SPRINGS[component]}"
             yield f"{name}.stiffness", spring.stiffness[component] * np.exp(spread.stiffness * normal())
             yield f"{name}.damping", spring.damping[component] * np.exp(spread.damping * normal())
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import glob
-import hashlib
 import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from flexcal.data import sha256_of
 from flexcal.errors import InputError
 
 LEDGER = ".flexcal"
@@ -33,7 +33,7 @@ def outputs(out: Path | None, names: Sequence[str] = ()) -> Iterator[None]:
     before = _present(folder, patterns)
     try:
         for path in before:
-            if known.get(path.name) != _sha256(path):
+            if known.get(path.name) != sha256_of(path):
                 raise InputError(
                     f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
                     "give another --out, or move it away."
@@ -89,13 +89,8 @@ def _record(
     known: dict[str, str],
 ) -> None:
     """Add what was written anew, in one write, so that verbs which run at the same time do not lose each other's lines."""
-    written = {path.name: _sha256(path) for path in present if present[path] != before.get(path)}
+    written = {path.name: sha256_of(path) for path in present if present[path] != before.get(path)}
     lines = [f"{digest}  {name}\n" for name, digest in written.items() if known.get(name) != digest]
     if lines:
         with (folder / LEDGER).open("a", encoding="utf-8") as stream:
             stream.write("".join(lines))
-
-
-def _sha256(path: Path) -> str:
-    with path.open("rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()

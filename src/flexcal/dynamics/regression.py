@@ -89,6 +89,8 @@ def observe(
                 still = _still(block, motion, decimation)
                 masked += int(np.sum(keep & still))
                 keep &= ~still
+            if not keep.any():
+                continue
             torque = decimation.apply(block.torque.T)[:, keep]
             for joint, columns in enumerate(observation.columns(block)):
                 rows = decimation.apply(columns)[:, keep].T

@@ -59,5 +59,5 @@ def _effect(
     late = np.array([natural[number] if number >= 0 else 0.0 for number in pose.delays])
     phase = np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]
     return ExperimentEffect(
-        (moving + opening + pulses.shift()) * phase, pulses.shift_by_form() * phase[..., None]
+        (moving + opening + pulses.shift) * phase, pulses.shift_by_form() * phase[..., None]
     )

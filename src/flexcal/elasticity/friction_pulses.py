@@ -8,6 +8,7 @@ even multiples of the reference frequency, where the robot answers with its own 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -75,6 +76,7 @@ class FrictionPulses:
         moved = np.linalg.solve(np.eye(orders * count) + coupled, driven.reshape(lines, -1, count))
         return moved.reshape(self.mobility.shape)
 
+    @cached_property
     def shift(self) -> np.ndarray:
         """G with pulsed friction less G with its mean, (L, E, E) rad/s² per N m."""
         bands = self.sidebands
@@ -83,11 +85,11 @@ class FrictionPulses:
 
     def shift_by_form(self) -> np.ndarray:
         """∂ `shift` (L, E, E, 2 E) by the logarithm of every strength, then of every width, by forward differences."""
-        base, step = self.shift(), 0.05
+        base, step = self.shift, 0.05
         growth = np.exp(step * np.eye(len(self.width)))
         changed = [replace(self, strength=g * self.strength) for g in growth]
         changed += [replace(self, width=g * self.width) for g in growth]
-        return np.stack([(other.shift() - base) / step for other in changed], axis=-1)
+        return np.stack([(other.shift - base) / step for other in changed], axis=-1)
 
 
 def _reversal_velocity(moved: np.ndarray, orders: np.ndarray, excitation: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.elasticity.sidebands import Sidebands
-from flexcal.model import RobotModel, static_equilibrium
+from flexcal.model import RobotModel
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.equilibrium import elastic_axes
 from flexcal.model.linearisation import Linearisation, linearise
@@ -27,7 +27,14 @@ def open_share(robot: RobotModel, q: np.ndarray, payload: float | None, plan: Mu
     of the torque there. By this share it lowers the drive's apparent stiffness and damping, to first order (the Gaussian equivalent
     gain of a dead band).
     """
-    slow = _slow_torque(robot, q, payload, ReferenceMotion.of(plan))
+    import pinocchio as pin
+
+    arm = ElasticArm(robot, payload)
+    axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
+    states = ReferenceMotion.of(plan).states(robot, arm, q, PHASES)
+    slow = np.array(
+        [pin.rnea(arm.model, arm.data, s.configuration, s.velocity, s.acceleration)[axes] for s in states]
+    )
     size = multisine_torque(robot, q, payload, plan)
     stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
     return 2 * stiffness * np.exp(-0.5 * (slow / size) ** 2) / (np.sqrt(2 * np.pi) * size)
@@ -50,10 +57,7 @@ def gap_shift(
         return np.zeros((len(frequencies_hz), count, count), dtype=complex)
     orders = np.arange(-SIDEBANDS, SIDEBANDS + 1)
     bands = Sidebands.of(system, frequencies_hz, motion, orders)
-    twists = [k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
-    pull = np.zeros((size, len(gaps)))
-    pull[count + np.array(twists)[gaps], range(len(gaps))] = 1.0
-    pull[gaps, range(len(gaps))] = -1.0
+    pull = _pull(robot, system)[:, gaps]
     drives = [robot.elastic[k] for k in gaps]
     stiffness, damping = (np.array([getattr(d, key)[2] for d in drives]) for key in ("stiffness", "damping"))
     impedance = stiffness + bands.s[:, :, None] * damping  # (L, k, g)
@@ -81,37 +85,19 @@ def multisine_torque(
     robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan
 ) -> np.ndarray:
     """Standard deviation (E,) N m of the torque in each elastic drive's spring under the multisine, position loop closed."""
-    system = linearise(robot, q, payload)
-    count, size = system.inputs, len(system.mass)
-    s = 2j * np.pi * plan.frequencies_hz[:, None, None]
-    axes = list(plan.joints)
-    loop = np.zeros((len(s), size, size), dtype=complex)
-    loop[:, range(count), range(count)] = plan.kp[axes] + s[:, :, 0] * plan.kd[axes]
-    loop += s**2 * system.mass + s * system.damping + system.stiffness
-    moved = np.linalg.solve(loop, np.broadcast_to(np.eye(size, count), (len(s), size, count)))
-    twist = [count + k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
+    system, motion = linearise(robot, q, payload), ReferenceMotion.of(plan)
+    bands = Sidebands.of(system, plan.frequencies_hz, motion, np.array([0]))
+    pull = _pull(robot, system)
+    moved = bands.response(np.eye(len(system.mass), system.inputs))[:, 0]
     stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
-    torque = stiffness[:, None] * (moved[:, twist] - moved[:, :count])
-    power = np.abs(torque) ** 2 * (plan.amplitude.T[:, None, :] ** 2 / count)
+    power = np.abs(stiffness[:, None] * (pull.T @ moved)) ** 2 * motion.excitation.T[:, None, :] ** 2
     return np.sqrt(0.5 * power.sum(axis=(0, 2)))
 
 
-def _slow_torque(
-    robot: RobotModel, q: np.ndarray, payload: float | None, motion: ReferenceMotion
-) -> np.ndarray:
-    """Torque (phases, E) N m in each elastic drive's spring along the reference motion."""
-    import pinocchio as pin
-
-    arm = ElasticArm(robot, payload)
-    rest = static_equilibrium(robot, q, arm.payload)
-    still = arm.configuration(q, rest.deflection[0])
-    axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
-    omega = 2 * np.pi * motion.frequency_hz
-    result = []
-    for angle in 2 * np.pi * np.arange(PHASES) / PHASES:
-        at, velocity, acceleration = still.copy(), np.zeros(arm.model.nv), np.zeros(arm.model.nv)
-        at[axes] += motion.amplitude * np.sin(angle)
-        velocity[axes] = motion.amplitude * omega * np.cos(angle)
-        acceleration[axes] = -motion.amplitude * omega**2 * np.sin(angle)
-        result.append(pin.rnea(arm.model, arm.data, at, velocity, acceleration)[axes])
-    return np.array(result)
+def _pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
+    """Direction (d, E) in which each drive's spring is stretched: its twist less its motor."""
+    twists = [k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
+    pull = np.zeros((len(system.mass), system.inputs))
+    pull[range(system.inputs), range(system.inputs)] = -1.0
+    pull[system.inputs + np.array(twists), range(system.inputs)] = 1.0
+    return pull

@@ -18,7 +18,7 @@ from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
 from flexcal.estimation import Estimate, Parameters, Problem, solve
-from flexcal.estimation.solve import LOG_STD_LIMIT
+from flexcal.estimation.uncertainty import known_to_a_factor
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -82,6 +82,7 @@ def identify_stiffness(
     measured = StageOneResidual.of(predicting, responses, weighting)
     effects = [ExperimentEffect.none(response) for response in responses]
     estimate = None
+    inflation = tolerances.inflation(responses)
     rounds = ROUNDS if tolerances.any or plan is not None else 1
     progress("fitting", 0.0)
     for number in range(rounds):
@@ -92,7 +93,6 @@ def identify_stiffness(
         residual = measured.shifted(predicting, [effect.shift for effect in effects])
         error = ModelError.of(residual, responses, x, effects, tolerances) if tolerances.any else None
         last = number == rounds - 1
-        inflation = tolerances.inflation(responses)
         estimate = _fit(residual, error, parameters, x, inflation, 1e-7 if last else 1e-3)
         x = estimate.parameters.coordinates()
         progress("fitting", (number + 1) / rounds)
@@ -157,10 +157,10 @@ def _widened(fitted: Estimate, robust: Estimate | None, inflation: float) -> Est
         wider = np.sqrt(np.diag(robust.covariance))
         factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
     covariance = covariance * np.outer(factor, factor)
-    std = np.sqrt(np.diag(covariance))
+    sized = known_to_a_factor(fitted.parameters, covariance)
     small = {
-        item.name: flag and (item.scale != "log" or bool(size <= LOG_STD_LIMIT))
-        for flag, item, size in zip(fitted.identifiable, fitted.parameters, std, strict=True)
+        name: flag and size
+        for name, flag, size in zip(fitted.parameters.names, fitted.identifiable, sized, strict=True)
     }
     known = tuple(
         flag and small.get(name.replace(".damping", ".stiffness"), True) for name, flag in small.items()

@@ -7,7 +7,8 @@ fit at rest takes for damping of the bearings.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +17,15 @@ from flexcal.model import RobotModel, static_equilibrium
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class ArmState:
+    """Configuration, velocity and acceleration (nv,) of an `ElasticArm`."""
+
+    configuration: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -39,6 +49,19 @@ class ReferenceMotion:
         share = plan.amplitude / np.sqrt(len(axes))
         return cls(plan.reference_amplitude, plan.reference_frequency_hz, plan.kp[axes], plan.kd[axes], share)
 
+    def states(self, robot: RobotModel, arm: ElasticArm, q: np.ndarray, phases: int) -> Iterator[ArmState]:
+        """The arm at `phases` instants of a cycle, following its motors rigidly about rest at `q` (n,) rad."""
+        rest = static_equilibrium(robot, q, arm.payload)
+        still = arm.configuration(np.asarray(q, dtype=float), rest.deflection[0])
+        axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
+        omega = 2 * np.pi * self.frequency_hz
+        for angle in 2 * np.pi * np.arange(phases) / phases:
+            at, velocity, acceleration = still.copy(), np.zeros(arm.model.nv), np.zeros(arm.model.nv)
+            at[axes] += self.amplitude * np.sin(angle)
+            velocity[axes] = self.amplitude * omega * np.cos(angle)
+            acceleration[axes] = -self.amplitude * omega**2 * np.sin(angle)
+            yield ArmState(at, velocity, acceleration)
+
 
 def reference_shift(
     robot: RobotModel,
@@ -58,10 +81,13 @@ def reference_shift(
     still = transfer_matrix(rest, frequencies_hz).response
     if motion.amplitude == 0.0:
         return np.zeros_like(still)
-    mass, damping, stiffness = _harmonics(robot, q, payload, motion, sidebands, phases)
     constant = (rest.mass.copy(), rest.damping, rest.stiffness.copy())
     count, size = rest.inputs, len(rest.mass)
-    at_rest = _arm_matrices(robot, q, payload, motion, 0.0, moving=False)
+    arm = ElasticArm(robot, payload)
+    sampled = [_arm_matrices(arm, state) for state in motion.states(robot, arm, q, phases)]
+    mass, damping, stiffness = _harmonics(sampled, sidebands)
+    still_arm = next(replace(motion, amplitude=0.0).states(robot, arm, q, 1))
+    at_rest = _arm_matrices(arm, still_arm)
     constant[0][count:, count:] -= at_rest[0]
     constant[2][count:, count:] -= at_rest[2]
     orders = np.arange(-sidebands, sidebands + 1)
@@ -90,46 +116,24 @@ def reference_shift(
 
 
 def _harmonics(
-    robot: RobotModel,
-    q: np.ndarray,
-    payload: float | None,
-    motion: ReferenceMotion,
-    sidebands: int,
-    phases: int,
+    sampled: list[tuple[np.ndarray, np.ndarray, np.ndarray]], sidebands: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Fourier coefficients (2 sidebands + 1, d, d) of M, D and K of the arm, from order -sidebands."""
-    angles = 2 * np.pi * np.arange(phases) / phases
-    sampled = [_arm_matrices(robot, q, payload, motion, angle, moving=True) for angle in angles]
+    """Fourier coefficients (2 sidebands + 1, d, d) of M, D and K of the arm over one cycle, from order -sidebands."""
+    angles = 2 * np.pi * np.arange(len(sampled)) / len(sampled)
     orders = np.arange(-sidebands, sidebands + 1)
-    turn = np.exp(-1j * np.outer(orders, angles)) / phases
+    turn = np.exp(-1j * np.outer(orders, angles)) / len(sampled)
     mass, damping, stiffness = (
         np.tensordot(turn, np.array(kind), axes=1) for kind in zip(*sampled, strict=True)
     )
     return mass, damping, stiffness
 
 
-def _arm_matrices(
-    robot: RobotModel,
-    q: np.ndarray,
-    payload: float | None,
-    motion: ReferenceMotion,
-    angle: float,
-    *,
-    moving: bool,
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """M, ∂τ/∂q̇ and ∂τ/∂q (d, d) of the elastic coordinates at one phase of the motion, springs left out."""
+def _arm_matrices(arm: ElasticArm, state: ArmState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """M, ∂τ/∂q̇ and ∂τ/∂q (d, d) of the elastic coordinates in one state, springs left out."""
     import pinocchio as pin
 
-    arm = ElasticArm(robot, payload)
-    rest = static_equilibrium(robot, q, arm.payload)
-    at = arm.configuration(np.asarray(q, dtype=float), rest.deflection[0])
-    velocity, acceleration = np.zeros(arm.model.nv), np.zeros(arm.model.nv)
-    if moving:
-        axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
-        omega = 2 * np.pi * motion.frequency_hz
-        at[axes] += motion.amplitude * np.sin(angle)
-        velocity[axes] = motion.amplitude * omega * np.cos(angle)
-        acceleration[axes] = -motion.amplitude * omega**2 * np.sin(angle)
-    by_q, by_v, _ = pin.computeRNEADerivatives(arm.model, arm.data, at, velocity, acceleration)
+    by_q, by_v, _ = pin.computeRNEADerivatives(
+        arm.model, arm.data, state.configuration, state.velocity, state.acceleration
+    )
     index = np.ix_(arm.elastic, arm.elastic)
-    return arm.mass_matrix(at), np.array(by_v)[index], np.array(by_q)[index]
+    return arm.mass_matrix(state.configuration), np.array(by_v)[index], np.array(by_q)[index]

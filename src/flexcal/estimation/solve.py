@@ -15,11 +15,7 @@ from flexcal.estimation.loss import OUTLIER_WEIGHT, Loss, Squares, loss_named
 from flexcal.estimation.objective import Objective
 from flexcal.estimation.parameter import Parameters
 from flexcal.estimation.problem import Problem
-from flexcal.estimation.uncertainty import sandwich, uncertainty
-
-LOG_STD_LIMIT = 0.5
-"""A parameter on a log scale with a larger posterior standard deviation is not identifiable: its 95 % interval is wider
-than a factor e either way."""
+from flexcal.estimation.uncertainty import known_to_a_factor, sandwich, uncertainty
 
 _SAME_OPTIMUM = 1e-3
 
@@ -134,8 +130,4 @@ def _refitted(
 
 def _identifiable(parameters: Parameters, found: Identifiability, covariance: np.ndarray) -> tuple[bool, ...]:
     kept = set(found.kept)
-    limits = [LOG_STD_LIMIT if item.scale == "log" else np.inf for item in parameters]
-    return tuple(
-        i in kept and bool(std <= limit)
-        for i, (std, limit) in enumerate(zip(np.sqrt(np.diag(covariance)), limits, strict=True))
-    )
+    return tuple(i in kept and known for i, known in enumerate(known_to_a_factor(parameters, covariance)))

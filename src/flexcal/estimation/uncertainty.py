@@ -11,6 +11,11 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation.identifiability import Identifiability, analyse
 from flexcal.estimation.levenberg_marquardt import Optimum
 from flexcal.estimation.objective import Objective
+from flexcal.estimation.parameter import Parameters
+
+LOG_STD_LIMIT = 0.5
+"""A parameter on a log scale with a larger posterior standard deviation is not identifiable: its 95 % interval is wider
+than a factor e either way."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +50,15 @@ def uncertainty(
         effective=len(kept) - float(np.sum((objective.prior_rows @ root) ** 2)),
         chi2=float(np.sum(weights * optimum.residual**2)),
         rows=float(np.sum(weights)),
+    )
+
+
+def known_to_a_factor(parameters: Parameters, covariance: np.ndarray) -> tuple[bool, ...]:
+    """For every parameter whether `covariance` (p, p) leaves it within `LOG_STD_LIMIT`; always so on a linear scale."""
+    stds = np.sqrt(np.diag(covariance))
+    return tuple(
+        item.scale == "linear" or bool(std <= LOG_STD_LIMIT)
+        for item, std in zip(parameters, stds, strict=True)
     )
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.elastic_arm import ElasticArm, moved_inertia
 from flexcal.model.equilibrium import Equilibrium, elastic_axes, static_equilibrium
+from flexcal.model.names import SPRINGS
 from flexcal.model.robot_model import RobotModel
 
 
@@ -118,8 +119,8 @@ def _derivatives(
     for name in names:
         owner, _, key = name.rpartition(".")
         joint_name, _, spring = owner.rpartition(".")
-        if key in ("stiffness", "damping") and spring in ("bearing_x", "bearing_y", "drive"):
-            axis = (robot.joint_index(joint_name), ("bearing_x", "bearing_y", "drive").index(spring))
+        if key in ("stiffness", "damping") and spring in SPRINGS:
+            axis = (robot.joint_index(joint_name), SPRINGS.index(spring))
             pattern = springs[axis][0]
             if key == "damping":
                 result[name] = (zero, pattern, zero)

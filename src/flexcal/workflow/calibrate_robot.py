@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -20,9 +20,8 @@ from flexcal.calibration import (
     select_terms,
 )
 from flexcal.calibration.geometry_fit import LossName
-from flexcal.data import PoseSet, provenance, read_estimates, read_poses, write_estimates
+from flexcal.data import PoseSet, provenance, read_estimates, read_poses
 from flexcal.errors import FlexcalError
-from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
@@ -31,6 +30,7 @@ from flexcal.report.calibration import CalibrationStudy, write_calibration_repor
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.results import identifiability_block, quantities, write_results
+from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 AUTO = "auto"
 
@@ -145,10 +145,10 @@ def calibrate_robot(
     }
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(selected.estimate, provenance=origin)
-    target = source if out is None else out / "estimates.yaml"
+    target = source if out is None else out / ESTIMATES
     before = nominal_errors(model, poses)
     result = RobotCalibration(ErrorStatistics.of(before), rigid, selection, selected, estimate, target)
-    _store(target, blocks if target != source else {}, estimate)
+    store_block(source, target, blocks, "calibration", estimate)
     if out is not None:
         document = result.document()
         write_results(out, document)
@@ -185,9 +185,3 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
         )
     full = [t for term in asked for t in (harmonics if term == "transmission" else (term,))]
     return tuple(dict.fromkeys(["kinematic", *full]))
-
-
-def _store(path: Path, others: Mapping[Block, Estimate], estimate: Estimate) -> None:
-    for block, other in others.items():
-        write_estimates(path, block, other)
-    write_estimates(path, "calibration", estimate)

@@ -11,7 +11,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.data import Recording, provenance, read_estimates, read_recording, write_estimates
+from flexcal.data import Recording, provenance, read_estimates, read_recording
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     BaseParameters,
@@ -25,12 +25,12 @@ from flexcal.dynamics import (
     weighted_least_squares,
 )
 from flexcal.errors import InputError
-from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
+from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 EstimatorName = Literal["wls", "ols"]
 
@@ -136,13 +136,10 @@ def identify_robot_dynamics(
     options = {"estimator": estimator, "hold_out": hold_out}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
-    target = source if out is None else out / "estimates.yaml"
+    target = source if out is None else out / ESTIMATES
     seconds = time.perf_counter() - begun
     found = RobotDynamics(estimate, train, held_out, drive_terms.friction_names(terms), seconds, target)
-    kept: dict[Block, Estimate] = {} if target == source else blocks
-    for block, other in kept.items():
-        write_estimates(target, block, other)
-    write_estimates(target, "dynamics", estimate)
+    store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, found.document())
     return found

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.data import provenance, read_estimates, write_estimates
+from flexcal.data import provenance, read_estimates
 from flexcal.elasticity import (
     CovarianceWeighting,
     MultiStart,
@@ -21,7 +21,6 @@ from flexcal.elasticity import (
     Weighting,
     identify_stiffness,
 )
-from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY
@@ -29,6 +28,7 @@ from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
+from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 WeightingName = Literal["covariance", "paper", "uniform"]
 SearchName = Literal["multi-start", "population"]
@@ -126,12 +126,9 @@ def identify_robot_stiffness(
         [robot, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
     )
     estimate = replace(result.estimate, provenance=origin)
-    target = source if out is None else out / "estimates.yaml"
+    target = source if out is None else out / ESTIMATES
     found = RobotStiffness(result, plan is not None, estimate, target)
-    others: dict[Block, Estimate] = {} if target == source else blocks
-    for block, other in others.items():
-        write_estimates(target, block, other)
-    write_estimates(target, "stiffness", estimate)
+    store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
         write_results(out, found.document())
     return found
