@@ -195,8 +195,8 @@ def test_a_parameter_that_nothing_depends_on():
     assert estimate.values["p1"] == 0.5
 
 
-@pytest.mark.parametrize(("prior_std", "identifiable"), [(0.4, True), (0.6, False)])
-def test_a_log_parameter_is_identifiable_within_a_factor_e(prior_std, identifiable):
+@pytest.mark.parametrize(("prior_std", "identifiable"), [(0.25, True), (0.26, False)])
+def test_a_log_parameter_is_identifiable_within_a_factor_of_two(prior_std, identifiable):
     parameters = Parameters([Parameter("k", "N m/rad", 1e5, prior_std=prior_std, scale="log")])
     estimate = solve(Problem(parameters, lambda x: (np.ones(5), np.zeros((5, 1)))))
     assert estimate.rank == 1
@@ -204,7 +204,8 @@ def test_a_log_parameter_is_identifiable_within_a_factor_e(prior_std, identifiab
     if identifiable:
         low, high = estimate.interval("k")
         assert low * high == pytest.approx(1e10)
-        assert estimate.std("k") == pytest.approx(0.4e5)
+        assert high < 2e5
+        assert estimate.std("k") == pytest.approx(0.25e5)
 
 
 def test_sandwich_sees_noise_that_the_whitening_missed():

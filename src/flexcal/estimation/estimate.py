@@ -31,8 +31,8 @@ class Estimate:
 
     `parameters` carry the estimates as values; `covariance` (p, p) is in estimation coordinates, with zero rows and columns
     for `dropped` parameters: given their fixed values, predictions inside the model's reach have exactly this uncertainty.
-    `identifiable` is False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.5
-    (95 % interval wider than a factor e either way). `cost` is the minimised objective, prior included. `chi2` is the data's
+    `identifiable` is False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.255
+    (not known to a factor of two). `cost` is the minimised objective, prior included. `chi2` is the data's
     whitened residual sum of squares, prior rows excluded and with robust weights where a robust loss is used;
     `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
     `outliers` are labels of groups, or row numbers where the problem has no groups.
