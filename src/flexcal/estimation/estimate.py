@@ -12,6 +12,9 @@ from flexcal.estimation.parameter import Parameters
 
 NORMAL_QUANTILE = 1.959963984540054
 
+_NOISE_UNKNOWN = 0.1
+"""What chi2 may exceed its expectation by, relative, because the noise level is hardly better known."""
+
 
 @dataclass(frozen=True)
 class Dropped:
@@ -61,6 +64,14 @@ class Estimate:
     def reduced_chi2(self) -> float:
         """chi2 / degrees of freedom: near one when model and noise are right; NaN without degrees of freedom."""
         return self.chi2 / self.degrees_of_freedom if self.degrees_of_freedom > 0 else math.nan
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether chi2 is more than noise explains: chance, three standard deviations of its distribution, and 10 % for noise that is
+        itself known to 5 %."""
+        if self.degrees_of_freedom <= 0:
+            return False
+        return self.reduced_chi2 > 1.0 + max(_NOISE_UNKNOWN, 3.0 * math.sqrt(2.0 / self.degrees_of_freedom))
 
     @property
     def converged(self) -> bool:
