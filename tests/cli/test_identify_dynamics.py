@@ -4,6 +4,7 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from cli_files import copied
 
@@ -106,3 +107,23 @@ def test_two_ways_to_validate_exclude_each_other(tx40: Path, capsys: pytest.Capt
     log = str(tx40 / "exciting.parquet")
     arguments = [str(tx40 / "robot.yaml"), log, "--hold-out", "last:0.3", "--validate", log]
     assert "exclude each other" in refusal(arguments, capsys)
+
+
+def test_bodies_that_could_be_built(tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """sdp finds them, wls says that it has not; the URDF gets them."""
+    held = ("--hold-out", "last:0.3", "--out", str(tmp_path / "out"))
+    linear, found = (identified(tx40, capsys, *held, "--estimator", name) for name in ("wls", "sdp"))
+    assert linear["bodiless_links"] and found["bodiless_links"] == []
+    assert found["error_percent"]["held_out"] < linear["error_percent"]["held_out"] + 0.05
+    arguments = [str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")]
+    assert main(["identify", "dynamics", *arguments, "--estimator", "wls"]) == 0
+    assert "no body can have the inertials of link_1" in capsys.readouterr().out
+    assert main(["identify", "dynamics", *arguments, "--estimator", "sdp"]) == 0
+    assert "no body can have" not in capsys.readouterr().out
+    urdf = tmp_path / "identified.urdf"
+    assert main(["export", "urdf", str(tx40 / "robot.yaml"), "--out", str(urdf), "--json"]) == 0
+    remarks = json.loads(capsys.readouterr().out)["remarks"]
+    assert len(remarks) == 1 and "stay in estimates.yaml" in remarks[0]
+    robot = RobotModel.from_yaml(tx40 / "robot.yaml")
+    inertias = pin.buildModelFromUrdf(str(urdf)).inertias
+    assert [i.mass for i in list(inertias)[1:]] == pytest.approx(list(robot.mass), rel=1e-12)

@@ -18,7 +18,8 @@ class IdentifyDynamics:
     """Fit link inertias, rotor inertias and friction to recordings of exciting motion.
 
     Writes estimates.yaml beside robot.yaml. Parameters that no motion can tell apart stay as CAD has them, and the others absorb them:
-    the robot as a whole needs the measured torques, while a single mass or inertia need not be what a scale would show.
+    the robot as a whole needs the measured torques, while a single mass or inertia need not be what a scale would show. With
+    --estimator sdp every link is a body that could be built, as near to CAD as the torques allow: springs and a URDF need that.
     """
 
     robot: Robot
@@ -30,8 +31,8 @@ class IdentifyDynamics:
     """Keep the last share of every log's time out of the fit, and predict its torques."""
     validate: Annotated[tuple[Path, ...], arg(metavar="LOG", help_behavior_hint="")] = ()
     """Logs that the fit does not see, whose torques it predicts."""
-    estimator: Literal["wls", "ols"] = "wls"
-    """wls: every joint and log by its own noise; ols: every equation alike."""
+    estimator: Literal["wls", "ols", "sdp"] = "wls"
+    """wls: every joint and log by its own noise; ols: every equation alike; sdp: as wls, among robots that can be built."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
     json: Json = False
@@ -72,6 +73,11 @@ class IdentifyDynamics:
         console.say(
             "intervals take the errors for independent from row to row, which is too hopeful for real recordings"
         )
+        if found.bodiless:
+            console.say(
+                f"no body can have the inertials of {', '.join(found.bodiless)}: they give torques, but carry no springs and "
+                "fit in no URDF; --estimator sdp finds bodies"
+            )
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
         elastic = found.train.observation.model.elastic

@@ -11,6 +11,7 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.feasible import feasible_least_squares
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
@@ -34,6 +35,7 @@ __all__ = [
     "Triangle",
     "Viscous",
     "Window",
+    "feasible_least_squares",
     "observe",
     "ordinary_least_squares",
     "weighted_least_squares",

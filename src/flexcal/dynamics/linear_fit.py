@@ -25,11 +25,7 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
     from scipy.linalg import solve_triangular
 
     names = data.names
-    weighted = [
-        Triangle(s.triangle.factor / sigma, s.triangle.rows)
-        for s, sigma in zip(data.subsystems, noise, strict=True)
-    ]
-    system = stacked(weighted, [s.members for s in data.subsystems], len(names))
+    system = weighted_system(data, noise)
     base = data.base.found
     structural = [names[i] for i in base.kept]
     seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
@@ -64,6 +60,15 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
         message="linear least squares",
         iterations=1,
     )
+
+
+def weighted_system(data: RegressionData, noise: Sequence[float]) -> Triangle:
+    """All subsystems as one system of all columns, each divided by its `noise` (N m)."""
+    weighted = [
+        Triangle(s.triangle.factor / sigma, s.triangle.rows)
+        for s, sigma in zip(data.subsystems, noise, strict=True)
+    ]
+    return stacked(weighted, [s.members for s in data.subsystems], len(data.names))
 
 
 def _dropped(

@@ -20,6 +20,7 @@ from flexcal.dynamics import (
     RegressionData,
     Window,
     drive_terms,
+    feasible_least_squares,
     observe,
     ordinary_least_squares,
     weighted_least_squares,
@@ -27,14 +28,19 @@ from flexcal.dynamics import (
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
+from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
-EstimatorName = Literal["wls", "ols"]
+EstimatorName = Literal["wls", "ols", "sdp"]
 
-_ESTIMATORS = {"wls": weighted_least_squares, "ols": ordinary_least_squares}
+_ESTIMATORS = {
+    "wls": weighted_least_squares,
+    "ols": ordinary_least_squares,
+    "sdp": feasible_least_squares,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,6 +53,12 @@ class RobotDynamics:
     friction_terms: tuple[str, ...]
     seconds: float
     estimates: Path
+
+    @property
+    def bodiless(self) -> tuple[str, ...]:
+        """The links whose inertials no body can have: right for torques, useless for springs and for a URDF."""
+        links = (joint.link for joint in self.train.observation.model.joints)
+        return tuple(link for link in links if not is_body(self.estimate.values, link))
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -65,6 +77,7 @@ class RobotDynamics:
             "masked_rows": self.train.masked,
             "error_percent": percent,
             "friction_terms": list(self.friction_terms),
+            "bodiless_links": list(self.bodiless),
             "base_parameters": self._base_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
