@@ -122,7 +122,7 @@ def test_without_noise_the_truth_comes_back(tx40: RobotModel, swing: Motion) -> 
 def test_the_optimum_is_that_of_a_general_optimiser(
     robot: str, every: int, noise: float, swing: Motion, request: pytest.FixtureRequest
 ) -> None:
-    """BFGS on log-Cholesky factors from CAD; what the prior may take is 0.01 of the sum of squares."""
+    """BFGS on log-Cholesky factors from CAD; the prior may move ‖y‖, the root of the rise, by 0.05 and a thousandth."""
     model: RobotModel = request.getfixturevalue(robot)
     data, _ = simulated(model, swing, every=every, noise=noise)
     linear, found = weighted_least_squares(data), feasible_least_squares(data)
@@ -140,7 +140,8 @@ def test_the_optimum_is_that_of_a_general_optimiser(
         cost, coordinates.start(), jac=True, method="BFGS", options={"maxiter": 5000, "gtol": 1e-3}
     )
     assert found.cost > linear.cost + 0.5
-    assert -0.05 < found.cost - best.fun < 0.0101
+    push, least = np.sqrt(found.cost - linear.cost), np.sqrt(best.fun - linear.cost)
+    assert -0.005 < push - least < 0.05 + 0.001 * least
 
 
 @pytest.fixture(scope="module")

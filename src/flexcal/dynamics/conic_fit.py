@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.dynamics.cone import Cone
 from flexcal.errors import FlexcalError
 
-_TOLERANCE = 0.1
-"""How far the prior may move any base parameter from the optimum of the data, in standard deviations."""
-_RELATIVE_TOLERANCE = 1e-6
+_TOLERANCE, _RELATIVE_TOLERANCE = 0.05, 1e-3
+"""How far the prior may move base parameters from the optimum of the data: in standard deviations, and as a share of what
+feasibility moves them."""
 _RESOLUTION, _FINEST = 1e-9, 1e-4
 """What the solver can resolve of the size of the problem, and the smallest unit that it bears: data without noise ask for less."""
 _SLACK = 1e-5
@@ -36,25 +36,24 @@ class ConicFit:
     def solve(self) -> tuple[np.ndarray, float]:
         """The parameters (p,), and by how much the sum of squares rises.
 
-        First ‖y‖ is minimised, a second-order cone program with semidefinite constraints (Sousa & Cortesão 2014); then the distance to the
-        references in standard deviations, while ‖y‖² stays within 0.01 (and a share of 1e-6) of that minimum. A projection y* onto a
-        convex set has ‖y - y*‖² ≤ ‖y‖² - ‖y*‖², so no base parameter leaves the optimum by more than 0.1 of its standard deviation.
+        First ‖y‖ is minimised, a second-order cone program with semidefinite constraints (Sousa & Cortesão 2014); then, no farther than
+        0.05 from that y*, the distance to the references in standard deviations. So the prior moves no base parameter by more than 0.05
+        of its standard deviation (to which come a thousandth of ‖y*‖ and, for data without noise, 1e-9 of `size`).
         Raises `FlexcalError` where the solver does not get there.
         """
         seen, plane = self.root.shape[1], np.column_stack([self.root, self.unseen])
         length = np.eye(seen, plane.shape[1]), np.zeros(seen)
         first = self._nearest(plane, length, self.size, self.size, np.inf)
-        least = float(np.sum(first[:seen] ** 2))
-        allowed = (1.0 + _RELATIVE_TOLERANCE) * least + _TOLERANCE**2 + (_RESOLUTION * self.size) ** 2
-        radius = float(np.sqrt(allowed))
-        prior = self._prior(plane)
-        second = self._nearest(
-            plane, prior, float(np.linalg.norm(prior[1])), max(radius, _FINEST * self.size), radius
-        )
-        found = self.least + plane @ second
+        pushed = float(np.linalg.norm(first[:seen]))
+        radius = _TOLERANCE + _RELATIVE_TOLERANCE * pushed + _RESOLUTION * self.size
+        optimum = replace(self, least=self.least + self.root @ first[:seen])
+        prior = optimum._prior(plane)
+        far, unit = float(np.linalg.norm(prior[1])), max(radius, _FINEST * self.size)
+        second = optimum._nearest(plane, prior, far, unit, radius)
+        found = optimum.least + plane @ second
         if min(cone.smallest(found) - cone.floor for cone in self.cones) < -_SLACK:
             raise _failure("not accurate enough")
-        return found, float(np.sum(second[:seen] ** 2))
+        return found, float(np.sum((first + second)[:seen] ** 2))
 
     def _prior(self, plane: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Matrix and right side, whose difference at (y, z) is the distance to the references in standard deviations."""
