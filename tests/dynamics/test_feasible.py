@@ -98,6 +98,16 @@ def simulated(
     ), values
 
 
+def with_torques(data: RegressionData, parameters: np.ndarray) -> RegressionData:
+    """The same motion with the torques of other parameters, without noise."""
+    subsystems = []
+    for s in data.subsystems:
+        factor = s.triangle.factor.copy()
+        factor[:, -1] = s.triangle.matrix @ parameters[s.members]
+        subsystems.append(replace(s, triangle=replace(s.triangle, factor=factor)))
+    return replace(data, subsystems=tuple(subsystems))
+
+
 def bodies(model: RobotModel, estimate: Estimate) -> list[bool]:
     return [is_body(estimate.values, joint.link) for joint in model.joints]
 
@@ -113,6 +123,20 @@ def test_without_noise_the_truth_comes_back(tx40: RobotModel, swing: Motion) -> 
     error = base_values(data, found.parameters.coordinates()) - base_values(data, truth)
     assert np.abs(error).max() < 1e-7
     assert all(bodies(tx40, found))
+
+
+def test_where_cad_is_right_every_single_parameter_comes_back(rods: RobotModel, swing: Motion) -> None:
+    """The prior fills what no torque shows with CAD's own, and leaves to the rotors what CAD does not explain."""
+    data, _ = simulated(rods, swing)
+    truth = data.observation.values()
+    truth[20:] = np.linspace(0.2, 1.0, len(truth) - 20)
+    found = feasible_least_squares(with_torques(data, truth)).parameters.coordinates()
+    assert np.abs(found - truth).max() < 1e-3
+
+
+def test_no_torque_at_all_is_no_traceback(rods: RobotModel, swing: Motion) -> None:
+    data, truth = simulated(rods, swing)
+    assert all(bodies(rods, feasible_least_squares(with_torques(data, 0 * truth))))
 
 
 @pytest.mark.parametrize(

@@ -41,7 +41,7 @@ def feasible_least_squares(data: RegressionData) -> Estimate:
         _root(system.matrix, kept),
         unseen,
         cones,
-        float(np.linalg.norm(system.right)),
+        float(np.linalg.norm(system.right)) or 1.0,
     )
     found, rise = fit.solve()
     parameters = Parameters(

@@ -23,6 +23,8 @@ _TIGHTEST = 1e-3
 """A prior that takes CAD for exact still leaves this relative standard deviation."""
 _STEEL = 8000.0
 """kg/m³; CAD that gives a link less extent than a ball of steel of its mass has is taken for that ball."""
+_UNKNOWN_STD = 100.0
+"""Relative standard deviation of a drive parameter that nothing is known of: next to none, which keeps the problem well posed."""
 _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.05
 """kg and m, of a link of which neither URDF nor the other links tell anything."""
 
@@ -33,8 +35,8 @@ def feasible_set(observation: Observation, system: Triangle) -> tuple[Cone, ...]
     A link's pseudo-inertia is positive definite (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018), with CAD as its reference and the
     prior's relative standard deviation of the mass; the CAD mass bounds its mass. Without one the reference is a ball as heavy as the
     average link and as wide as this one is long. Rotor inertia and viscous friction are positive, as matrices where motors turn with
-    two joints; Coulomb friction is positive. A drive parameter that robot.yaml does not give has the size as reference at which it alone
-    would best explain the torques; one that the data do not depend on is left out.
+    two joints; Coulomb friction is positive. A drive parameter that robot.yaml does not give has hardly a prior, and as reference the
+    size at which it alone would be as large as the torques; one that the data do not depend on is left out.
     """
     return (*_links(observation.model), *_drives(observation, system))
 
@@ -70,16 +72,15 @@ def _guessed(model: RobotModel, link: int) -> Inertia:
 
 def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
     model, names = observation.model, observation.names
-    columns, sizes = system.matrix, np.linalg.norm(system.matrix, axis=0)
+    torque, sizes = float(np.linalg.norm(system.right)) or 1.0, np.linalg.norm(system.matrix, axis=0)
     seen = {name for name, size in zip(names, sizes, strict=True) if size > 0}
 
     def reference(name: str) -> tuple[float, float]:
         """Size and relative standard deviation."""
         known = model.values.get(name, math.nan)
         if known > 0:
-            return known, model.prior.rotor_inertia if name.endswith(".rotor_inertia") else 1.0
-        number = names.index(name)
-        return float(abs(columns[:, number] @ system.right) / sizes[number] ** 2), 1.0
+            return known, model.prior.rotor_inertia if name.endswith(".rotor_inertia") else _UNKNOWN_STD
+        return torque / float(sizes[names.index(name)]), _UNKNOWN_STD
 
     for key in ("rotor_inertia", "viscous"):
         for joints, shared in _groups(model, [f"{joint}.{key}" in seen for joint in model.joint_names]):
@@ -96,7 +97,7 @@ def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
     for name in names:
         key = name.rpartition(".")[2]
         if name in seen and (key == "coulomb" or key.startswith("coulomb_at_")):
-            yield _scalar(names.index(name), reference(name)[0], _DRIVE_FLOOR, 1.0)
+            yield _scalar(names.index(name), reference(name)[0], _DRIVE_FLOOR, _UNKNOWN_STD)
 
 
 def _groups(model: RobotModel, seen: list[bool]) -> Iterator[tuple[list[str], list[tuple[str, str, float]]]]:
