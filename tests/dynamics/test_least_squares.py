@@ -18,7 +18,7 @@ from flexcal.dynamics import (
     Window,
     observe,
     ordinary_least_squares,
-    regression,
+    rows,
     weighted_least_squares,
 )
 from flexcal.errors import FlexcalError
@@ -129,7 +129,7 @@ def test_blocks_and_experiments_add_up(
     rng = np.random.default_rng(1)
     noisy = replace(clean, torque=clean.torque + NOISE * rng.normal(size=clean.torque.shape))
     whole = ordinary_least_squares(observe(observation, base, [noisy], Decimation(4)))
-    monkeypatch.setattr(regression, "_BLOCK", 100)
+    monkeypatch.setattr(rows, "_BLOCK", 100)
     data = observe(observation, base, [noisy], Decimation(4))
     assert data.subsystems[0].triangle.rows == whole_rows(noisy, Decimation(4))
     assert ordinary_least_squares(data).parameters.coordinates() == pytest.approx(
@@ -157,7 +157,7 @@ def test_standstill_is_left_out_and_counted(
         observe(observation, base, [held], Decimation(1), mask_standstill=False).subsystems[0].triangle.rows
         == 2500
     )
-    with pytest.raises(FlexcalError, match="no equation is left of experiment 1"):
+    with pytest.raises(FlexcalError, match="no equation is left of the motion"):
         observe(observation, base, [held], Decimation(1), windows=[Window(start=10.5)])
 
 

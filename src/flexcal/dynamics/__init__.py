@@ -14,7 +14,8 @@ from flexcal.dynamics.drive_terms import (
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
-from flexcal.dynamics.regression import RegressionData, Subsystem, Window, observe
+from flexcal.dynamics.regression import RegressionData, Subsystem, observe
+from flexcal.dynamics.rows import Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 

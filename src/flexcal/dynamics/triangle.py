@@ -24,7 +24,13 @@ class Triangle:
     @classmethod
     def of(cls, matrix: np.ndarray, right: np.ndarray) -> Triangle:
         """Of W (rows, k) and Y (rows,)."""
-        return cls(_triangular(np.column_stack([matrix, right])), len(right))
+        return cls(triangular(np.column_stack([matrix, right])), len(right))
+
+    @classmethod
+    def padded(cls, factor: np.ndarray, rows: int) -> Triangle:
+        """Of a factor (·, k + 1) with no more than k + 1 rows, which stands for so many `rows`."""
+        size = factor.shape[1]
+        return cls(np.vstack([factor, np.zeros((size - len(factor), size))]), rows)
 
     @classmethod
     def empty(cls, columns: int) -> Triangle:
@@ -32,7 +38,7 @@ class Triangle:
         return cls(np.zeros((columns + 1, columns + 1)), 0)
 
     def __add__(self, other: Triangle) -> Triangle:
-        return Triangle(_triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
+        return Triangle(triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
 
     @property
     def matrix(self) -> np.ndarray:
@@ -71,9 +77,7 @@ def stacked(triangles: Iterable[Triangle], members: Iterable[np.ndarray], column
     return total
 
 
-def _triangular(matrix: np.ndarray) -> np.ndarray:
+def triangular(matrix: np.ndarray) -> np.ndarray:
+    """R (k, k) of the QR of a matrix (·, k), with rows of zeros where that has fewer rows."""
     factor = np.linalg.qr(matrix, mode="r")
-    size = matrix.shape[1]
-    padded = np.zeros((size, size))
-    padded[: min(size, len(factor))] = factor[:size]
-    return padded
+    return np.vstack([factor, np.zeros((matrix.shape[1] - len(factor), matrix.shape[1]))])
