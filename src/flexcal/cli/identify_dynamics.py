@@ -38,7 +38,7 @@ class IdentifyDynamics:
 
     def run(self) -> None:
         """Fit, and print the base parameters and the error of the torques."""
-        from flexcal.cli.tables import base_parameter_table
+        from flexcal.cli.tables import base_parameter_table, friction_table
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
         require_robot(self.robot, *self.logs)
@@ -60,9 +60,12 @@ class IdentifyDynamics:
         document = found.document()
         console.show(base_parameter_table(document["base_parameters"]))
         console.say(
-            f"{document['rank']} of {document['structural_rank']} base parameters from {document['equations']} equations; "
+            f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
+        if document["friction_tried"]:
+            console.show(friction_table(document["friction_tried"]))
+        console.say(f"friction: {', '.join(found.friction.labels)}")
         error = document["error_percent"]
         console.say(f"torques missed by {error['train']:.2f} % of their norm in the fit")
         if error["held_out"] is not None:
@@ -72,6 +75,8 @@ class IdentifyDynamics:
         console.say(
             "intervals take the errors for independent from row to row, which is too hopeful for real recordings"
         )
+        for remark in document["warnings"]:
+            console.say(remark)
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
         elastic = found.train.observation.model.elastic

@@ -11,6 +11,17 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.friction_choice import Candidate, Trial
+from flexcal.dynamics.friction_library import (
+    AsymmetricCoulomb,
+    LoadCoulomb,
+    Presliding,
+    Stribeck,
+    SublinearViscous,
+    WarmUp,
+)
+from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
+from flexcal.dynamics.friction_terms import FRICTION_TERMS
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
@@ -21,21 +32,32 @@ from flexcal.dynamics.wls import weighted_least_squares
 
 __all__ = [
     "CLASSIC",
+    "FRICTION_TERMS",
+    "AsymmetricCoulomb",
     "BaseParameters",
+    "Candidate",
     "Column",
     "Coulomb",
     "Coupling",
     "DriveTerm",
+    "FrictionSelection",
+    "LoadCoulomb",
     "Motion",
     "Observation",
+    "Presliding",
     "RegressionData",
     "RotorInertia",
+    "Stribeck",
+    "SublinearViscous",
     "Subsystem",
     "TorqueOffset",
+    "Trial",
     "Triangle",
     "Viscous",
+    "WarmUp",
     "Window",
     "observe",
     "ordinary_least_squares",
+    "select_friction",
     "weighted_least_squares",
 ]

@@ -32,9 +32,13 @@ class Batch:
 
 @dataclass(frozen=True, eq=False)
 class ExperimentSystem:
-    """All that estimators need of one experiment; `masked` are the rows left out because the robot stood still."""
+    """All that estimators need of one experiment; `masked` are the rows left out because the robot stood still.
+
+    A batch without gaps has `batch_rows` rows.
+    """
 
     batches: tuple[Batch, ...]
+    batch_rows: int
     masked: int
 
 
@@ -72,7 +76,7 @@ def experiment_system(
         raise FlexcalError(
             f"no equation is left of {experiment.name}: it is too short for its filters, or the robot stands still in it."
         )
-    return ExperimentSystem(tuple(found), masked)
+    return ExperimentSystem(tuple(found), length, masked)
 
 
 class _Growing:

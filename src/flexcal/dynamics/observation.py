@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 
-from flexcal.dynamics.drive_terms import Column, DriveTerm
+from flexcal.dynamics.drive_terms import Column, DriveTerm, Memory
 from flexcal.dynamics.motion import Motion
 from flexcal.model import RobotModel, inertial_names, torque_regressor
 from flexcal.model.regressor import INERTIAL
@@ -43,7 +44,7 @@ class Observation:
     def _at_rest(self) -> list[Column]:
         state = np.zeros((1, self.model.n))
         still = Motion(np.zeros(1), state, state, state, state)
-        return [column for term in self.terms for column in term.columns(self.model, still)]
+        return [column for term in self.terms for column in term.columns(self.model, still, {})]
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
@@ -60,17 +61,29 @@ class Observation:
         ]
         return inertial, np.array(drives, dtype=int)
 
-    def stacked(self, motion: Motion) -> np.ndarray:
-        """The columns of all joints below each other (Σ members, N), at every sample of the motion."""
+    def stacked(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        """The columns of all joints below each other (Σ members, N), at every sample of the motion.
+
+        The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without.
+        """
         inertial, drives = self._places
         links = torque_regressor(self.model, motion.q, motion.dq, motion.ddq).transpose(1, 2, 0)
         counts = inertial >= 0
         found = np.empty((sum(len(members) for members in self.members), len(motion)))
         found[inertial[counts]] = links[counts]
-        values = (column.values for term in self.terms for column in term.columns(self.model, motion))
+        values = (column.values for column in self._drive_columns(motion, {} if memory is None else memory))
         for place, column in zip(drives, values, strict=True):
             found[place] = column
         return found
+
+    def follow(self, motion: Motion, memory: Memory) -> None:
+        """Bring `memory` up to the end of a motion whose columns are not needed."""
+        for _ in self._drive_columns(motion, memory):
+            pass
+
+    def _drive_columns(self, motion: Motion, memory: Memory) -> Iterator[Column]:
+        for term in self.terms:
+            yield from term.columns(self.model, motion, memory)
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
         """For every joint its columns (members, N) at every sample of the motion."""

@@ -14,7 +14,10 @@ from flexcal.dynamics.experiment_system import BATCHES, Batch, ExperimentSystem,
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
+from flexcal.model.regressor import INERTIAL
 
+_SILENT = 1e-9
+"""A column smaller than this beside the largest of its kind is zero."""
 _ALL_BATCHES = 512
 """Batches of all experiments together, at most, unless there are more experiments."""
 
@@ -46,6 +49,20 @@ class RegressionData:
     def names(self) -> tuple[str, ...]:
         """Names of all columns."""
         return self.observation.names
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Names of the drives' columns that these equations leave at zero, or at rounding beside the largest of their kind."""
+        size = np.zeros(len(self.names))
+        for s in self.subsystems:
+            size[s.members] = np.hypot(size[s.members], np.linalg.norm(s.triangle.matrix, axis=0))
+        links = len(INERTIAL) * self.observation.model.n
+        kinds = [name.rpartition(".")[2] for name in self.names]
+        largest: dict[str, float] = {}
+        for kind, norm in zip(kinds, size, strict=True):
+            largest[kind] = max(largest.get(kind, 0.0), norm)
+        drives = list(zip(self.names, kinds, size, strict=True))[links:]
+        return tuple(name for name, kind, norm in drives if norm <= _SILENT * largest[kind])
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all joints stacked, and of each (n,)."""

@@ -10,6 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from flexcal.data.filtering import Decimation, DecimationStream
+from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 
@@ -55,7 +56,8 @@ class Rows:
     """M equations of every joint that follow each other.
 
     `columns` has for every joint W transposed (members, M); `torque` is (n, M). `number` (M,) counts the rows of the experiment, whatever
-    is left out; `time` (M,) is s, and `still` (M,) tells where no joint moves faster than a hundredth of its top speed.
+    is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth of
+    its top speed.
     """
 
     number: np.ndarray
@@ -87,17 +89,19 @@ def rows(
     slowest = _STANDSTILL * experiment.top_speed
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
+    memory: Memory = {}
     reach = math.inf
     for start, piece in _pieces(experiment.blocks(), decimation.factor * max(1, _BLOCK // decimation.factor)):
         if len(piece) > 1:
             reach = (decimation.support + 1) * float(piece.time[1] - piece.time[0])
         if piece.time[-1] < window.start - reach:
+            observation.follow(piece, memory)
             continue
         if piece.time[0] > window.end + reach:
             return
         still = (np.abs(piece.dq) <= slowest).all(axis=1)
         centres.push(start, piece.time, still)
-        columns = stream.push(np.vstack([observation.stacked(piece), piece.torque.T]))
+        columns = stream.push(np.vstack([observation.stacked(piece, memory), piece.torque.T]))
         number, time, still = centres.pop(columns.shape[1])
         found = Rows(number, time, still, np.split(columns[: ends[-1]], ends[:-1]), columns[ends[-1] :])
         inside = (time >= window.start) & (time < window.end)
@@ -106,28 +110,34 @@ def rows(
 
 
 class _Centres:
-    """Time and standstill of the samples that decimated rows stand for, until their rows are complete."""
+    """Time and standstill of the samples that decimated rows stand for, until their rows are complete.
+
+    A row stands still where the robot does anywhere in the main lobe of its filter, one row to either side: what friction is at rest, no
+    sign of a velocity tells, and the row holds a part of it.
+    """
 
     def __init__(self, decimation: Decimation) -> None:
         self._decimation = decimation
-        self._next: int | None = None
-        self._number = 0
+        self._number: int | None = None
+        self._first = decimation.support
         self._held = np.zeros((2, 0))
 
     def push(self, start: int, time: np.ndarray, still: np.ndarray) -> None:
-        factor = self._decimation.factor
-        if self._next is None:
-            self._number = start // factor
-            self._next = start + self._decimation.support
-        at = np.arange(self._next, start + len(time), factor)
-        self._next += factor * len(at)
-        self._held = np.hstack([self._held, [time[at - start], still[at - start]]])
+        if self._number is None:
+            self._number = start // self._decimation.factor
+        self._held = np.hstack([self._held, [time, still]])
 
     def pop(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        (time, still), self._held = self._held[:, :count], self._held[:, count:]
-        number = np.arange(self._number, self._number + count)
-        self._number += count
-        return number, time, still.astype(bool)
+        factor, size = self._decimation.factor, self._held.shape[1]
+        centres = self._first + factor * np.arange(count)
+        time, still = self._held
+        before = np.concatenate([[0.0], np.cumsum(still)])
+        low, high = np.maximum(centres - factor + 1, 0), np.minimum(centres + factor, size)
+        number = (self._number or 0) + np.arange(count)
+        self._number = (self._number or 0) + count
+        spent = min(size, max(0, self._first + factor * (count - 1)))
+        self._held, self._first = self._held[:, spent:], self._first + factor * count - spent
+        return number, time[centres], before[high] > before[low]
 
 
 def _pieces(motions: Iterable[Motion], size: int) -> Iterator[tuple[int, Motion]]:

@@ -59,6 +59,7 @@ class RobotModel:
     viscous: np.ndarray
     coulomb: np.ndarray
     torque_offset: np.ndarray
+    friction: np.ndarray
     coupling: np.ndarray
     delay: np.ndarray
     ratio: np.ndarray

@@ -14,14 +14,16 @@ import numpy as np
 from flexcal.data import Recording, provenance, read_estimates, read_recording
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
+    CLASSIC,
     BaseParameters,
+    FrictionSelection,
     Motion,
     Observation,
     RegressionData,
     Window,
-    drive_terms,
     observe,
     ordinary_least_squares,
+    select_friction,
     weighted_least_squares,
 )
 from flexcal.errors import InputError
@@ -29,6 +31,7 @@ from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -42,9 +45,10 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written."""
 
     estimate: Estimate
+    structural_rank: int
     train: RegressionData
     held_out: RegressionData | None
-    friction_terms: tuple[str, ...]
+    friction: FrictionSelection
     seconds: float
     estimates: Path
 
@@ -59,12 +63,18 @@ class RobotDynamics:
             percent["held_out"] = 100 * error
         percent["per_joint"] = dict(zip(joints, 100 * per_joint, strict=True))
         return {
-            "structural_rank": self.train.base.rank,
+            "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
             "equations": sum(s.triangle.rows for s in self.train.subsystems),
             "masked_rows": self.train.masked,
             "error_percent": percent,
-            "friction_terms": list(self.friction_terms),
+            "friction_terms": list(self.friction.names),
+            "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
+            "friction_tried": [
+                {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
+                for t in self.friction.trials
+            ],
+            "warnings": list(dynamics_remarks(self.train, self.estimate)),
             "base_parameters": self._base_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
@@ -113,9 +123,6 @@ def identify_robot_dynamics(
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
     cutoff, decimation = _treatment(model)
-    terms = drive_terms.chosen(model.config.dynamics.friction)
-    observation = Observation(model, terms)
-    base = BaseParameters.of(observation)
     mask = model.config.dynamics.mask_standstill
     motions, early, late = [], [], []
     for number, log in enumerate(logs):
@@ -125,6 +132,11 @@ def identify_robot_dynamics(
         early.append(Window(end=gone))
         late.append(Window(start=split))
         progress("reading", (number + 1) / len(logs))
+    friction = select_friction(
+        model, model.config.dynamics.friction, motions, decimation, mask_standstill=mask, windows=early
+    )
+    observation = Observation(model, friction.terms)
+    base = BaseParameters.of(observation)
     train = observe(observation, base, motions, decimation, mask_standstill=mask, windows=early)
     held_out = None
     if hold_out > 0:
@@ -133,12 +145,13 @@ def identify_robot_dynamics(
         others = [Motion.of(read_recording(log, model), cutoff) for log in validate]
         held_out = observe(observation, base, others, decimation, mask_standstill=mask)
     estimate = _ESTIMATORS[estimator](train)
-    options = {"estimator": estimator, "hold_out": hold_out}
+    options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
     seconds = time.perf_counter() - begun
-    found = RobotDynamics(estimate, train, held_out, drive_terms.friction_names(terms), seconds, target)
+    rank = BaseParameters.of(Observation(model, CLASSIC)).rank
+    found = RobotDynamics(estimate, rank, train, held_out, friction, seconds, target)
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, found.document())
