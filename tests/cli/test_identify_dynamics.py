@@ -25,8 +25,8 @@ def identified(folder: Path, capsys: pytest.CaptureFixture[str], *options: str) 
 def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """All sixty within 1.6 published standard deviations, but for two of link 6, the weakest link.
 
-    Filter and decimation were others there, and the rotor inertia of joint 6 was left out; the standard
-    deviations have the same meaning.
+    Filter and decimation were others there, and the rotor inertia of joint 6 was left out. The published standard
+    deviations take the errors for independent from row to row, which makes them too small.
     """
     found = identified(tx40, capsys)
     assert (found["structural_rank"], found["rank"]) == (61, 61)
@@ -39,7 +39,8 @@ def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) ->
     assert {name for name, size in off.items() if size > 1.6} == {"link_6.mc_x", "link_6.mc_y"}
     assert max(off.values()) < 3.0
     assert np.median(list(off.values())) < 0.6
-    assert all(0.6 < base[name]["std"] / std < 1.1 for name, (_, std) in published.items())
+    ratio = [base[name]["std"] / std for name, (_, std) in published.items()]
+    assert min(ratio) > 0.85 and 1.4 < np.median(ratio) < 2.2
 
 
 def test_torques_that_the_fit_never_saw(

@@ -69,9 +69,6 @@ class IdentifyDynamics:
             console.say(
                 f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
             )
-        console.say(
-            "intervals take the errors for independent from row to row, which is too hopeful for real recordings"
-        )
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
         elastic = found.train.observation.model.elastic

@@ -95,7 +95,7 @@ def rows(
             continue
         if piece.time[0] > window.end + reach:
             return
-        still = (np.abs(piece.dq) <= slowest).all(axis=1)
+        still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
         centres.push(start, piece.time, still)
         columns = stream.push(np.vstack([observation.stacked(piece), piece.torque.T]))
         number, time, still = centres.pop(columns.shape[1])
