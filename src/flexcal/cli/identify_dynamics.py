@@ -72,9 +72,6 @@ class IdentifyDynamics:
             console.say(
                 f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
             )
-        console.say(
-            "intervals take the errors for independent from row to row, which is too hopeful for real recordings"
-        )
         for remark in document["warnings"]:
             console.say(remark)
         console.say(f"wrote {found.estimates}")

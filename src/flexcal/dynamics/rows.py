@@ -99,7 +99,7 @@ def rows(
             continue
         if piece.time[0] > window.end + reach:
             return
-        still = (np.abs(piece.dq) <= slowest).all(axis=1)
+        still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
         centres.push(start, piece.time, still)
         columns = stream.push(np.vstack([observation.stacked(piece, memory), piece.torque.T]))
         number, time, still = centres.pop(columns.shape[1])
