@@ -11,21 +11,27 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
+from flexcal.dynamics.joint_log import JointLog
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
-from flexcal.dynamics.regression import RegressionData, Subsystem, observe
-from flexcal.dynamics.rows import Window
+from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
+from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 
 __all__ = [
     "CLASSIC",
     "BaseParameters",
+    "Batch",
     "Column",
     "Coulomb",
     "Coupling",
     "DriveTerm",
+    "Experiment",
+    "ExperimentSystem",
+    "JointLog",
     "Motion",
     "Observation",
     "RegressionData",
@@ -35,6 +41,8 @@ __all__ = [
     "Triangle",
     "Viscous",
     "Window",
+    "batches_each",
+    "experiment_system",
     "observe",
     "ordinary_least_squares",
     "weighted_least_squares",
