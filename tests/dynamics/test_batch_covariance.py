@@ -110,7 +110,7 @@ def test_it_is_the_block_bootstrap_of_a_real_recording(
     found = weighted_least_squares(data)
     reported = np.array([found.std(name) for name in base.found.kept_names], dtype=float)
     parts = [part.where(~part.still) for part in rows(observation, motion, Decimation(100), Window())]
-    sigma = [s.triangle.noise()[0] for s in data.subsystems]
+    sigma = [sigma for sigma, _ in data.noise()]
     wide = np.zeros((sum(map(len, parts)), 6, len(observation.names)))
     for joint, members in enumerate(observation.members):
         wide[:, joint, members] = np.hstack([part.columns[joint] for part in parts]).T / sigma[joint]

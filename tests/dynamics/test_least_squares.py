@@ -108,10 +108,10 @@ def test_the_identified_robot_needs_the_measured_torques(
 def test_weighted_intervals_cover(
     observation: Observation, base: BaseParameters, clean: Motion, truth: np.ndarray, rng: np.random.Generator
 ) -> None:
-    """White noise that differs by joint, sixty recordings: 95 % intervals hold 95 % of 61 parameters, and beat unweighted ones."""
+    """White noise that differs by joint, twenty-four recordings: 95 % intervals hold 95 % of 61 parameters, and beat unweighted ones."""
     inside, ratios = [], []
     clean = Motion(*(part[::4] for part in (clean.time, clean.q, clean.dq, clean.ddq, clean.torque)))
-    for _ in range(60):
+    for _ in range(24):
         noisy = replace(clean, torque=clean.torque + NOISE * rng.normal(size=clean.torque.shape))
         data = observe(observation, base, [noisy], Decimation(1))
         found, plain = weighted_least_squares(data), ordinary_least_squares(data)

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_files, require_robot
+from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
 
@@ -32,6 +32,8 @@ class IdentifyDynamics:
     """Logs that the fit does not see, whose torques it predicts."""
     estimator: Literal["wls", "ols"] = "wls"
     """wls: every joint and log by its own noise; ols: every equation alike."""
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Logs that are read at once, each in a process of its own."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
     json: Json = False
@@ -43,6 +45,7 @@ class IdentifyDynamics:
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
         share = _share(self.hold_out)
         if share and self.validate:
             raise InputError("--hold-out and --validate exclude each other; give one of them.")
@@ -55,6 +58,7 @@ class IdentifyDynamics:
                 validate=self.validate,
                 estimator=self.estimator,
                 out=self.out,
+                jobs=self.jobs,
                 progress=progress,
             )
         document = found.document()

@@ -11,6 +11,7 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
 from flexcal.dynamics.friction_choice import Candidate, Trial
 from flexcal.dynamics.friction_library import (
     AsymmetricCoulomb,
@@ -22,11 +23,12 @@ from flexcal.dynamics.friction_library import (
 )
 from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
+from flexcal.dynamics.joint_log import JointLog
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
-from flexcal.dynamics.regression import RegressionData, Subsystem, observe
-from flexcal.dynamics.rows import Window
+from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
+from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 
@@ -35,12 +37,16 @@ __all__ = [
     "FRICTION_TERMS",
     "AsymmetricCoulomb",
     "BaseParameters",
+    "Batch",
     "Candidate",
     "Column",
     "Coulomb",
     "Coupling",
     "DriveTerm",
+    "Experiment",
+    "ExperimentSystem",
     "FrictionSelection",
+    "JointLog",
     "LoadCoulomb",
     "Motion",
     "Observation",
@@ -56,6 +62,8 @@ __all__ = [
     "Viscous",
     "WarmUp",
     "Window",
+    "batches_each",
+    "experiment_system",
     "observe",
     "ordinary_least_squares",
     "select_friction",

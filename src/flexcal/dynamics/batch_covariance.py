@@ -16,7 +16,7 @@ _LEVERAGE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class BatchCovariance:
-    """`covariance` (k, k) of the k kept parameters, and its own degrees of `freedom`; the errors count as dependent over `window` batches."""
+    """`covariance` (k, k) of the kept parameters, its degrees of `freedom`, and over how many batches errors hang together: `window`."""
 
     covariance: np.ndarray
     freedom: float

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,11 +35,12 @@ class Batch:
 class ExperimentSystem:
     """All that estimators need of one experiment; `masked` are the rows left out because the robot stood still.
 
-    A batch without gaps has `batch_rows` rows.
+    A batch without gaps has `batch_rows` rows. The rows lie within `duration` (s).
     """
 
     batches: tuple[Batch, ...]
     batch_rows: int
+    duration: float
     masked: int
 
 
@@ -60,10 +62,14 @@ def experiment_system(
     found: list[Batch] = []
     masked = 0
     current: _Growing | None = None
+    first, last = math.inf, -math.inf
     for block in rows(observation, experiment, decimation, window):
         if mask_standstill:
             masked += int(block.still.sum())
             block = block.where(~block.still)
+        if len(block):
+            first = min(first, float(block.time[0]))
+            last = float(block.time[-1])
         for part in _split(block, length):
             number = int(part.number[0]) // length
             if current is None or current.number != number:
@@ -76,7 +82,7 @@ def experiment_system(
         raise FlexcalError(
             f"no equation is left of {experiment.name}: it is too short for its filters, or the robot stands still in it."
         )
-    return ExperimentSystem(tuple(found), length, masked)
+    return ExperimentSystem(tuple(found), length, last - first, masked)
 
 
 class _Growing:

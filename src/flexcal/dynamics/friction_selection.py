@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.cross_validation import folds
 from flexcal.dynamics.drive_terms import CLASSIC, DriveTerm
-from flexcal.dynamics.experiment_system import experiment_system
+from flexcal.dynamics.experiment_system import ExperimentSystem
 from flexcal.dynamics.friction_choice import (
     Candidate,
     Trial,
@@ -19,10 +19,10 @@ from flexcal.dynamics.friction_choice import (
 )
 from flexcal.dynamics.friction_terms import LIBRARY, Scale, plain_terms, variants
 from flexcal.dynamics.observation import Observation
-from flexcal.dynamics.regression import batches_each, observe
-from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.wls import weighted_least_squares
 from flexcal.model import RobotModel
+from flexcal.model.regressor import INERTIAL
 
 _CLASSIC = ("viscous", "coulomb", "torque_offset")
 
@@ -46,40 +46,25 @@ class FrictionSelection:
 def select_friction(
     model: RobotModel,
     friction: str | tuple[str, ...],
-    experiments: Sequence[Experiment],
+    equations: Callable[[Observation], Sequence[ExperimentSystem]],
     decimation: Decimation,
-    *,
-    mask_standstill: bool,
-    windows: Sequence[Window],
 ) -> FrictionSelection:
     """The terms that `friction` names; the shapes of those of the library, and with "auto" which of them, by cross-validation.
 
-    Only rows inside the `windows` (one an experiment) are looked at. Raises `FlexcalError` for an unknown term, and as `observe` does.
+    `equations` gives those of the fit for any observation, after `decimation`; nothing else is looked at. Raises `FlexcalError` for an
+    unknown term, and as `weighted_least_squares` does.
     """
     names = _CLASSIC if isinstance(friction, str) else friction
     plain = CLASSIC if isinstance(friction, str) else plain_terms(names)
     library = LIBRARY if friction == "auto" else tuple(name for name in LIBRARY if name in names)
     if not library:
         return FrictionSelection(plain, names, (), ())
-    bare = Observation(model, plain)
-    base = BaseParameters.of(bare)
-    data = observe(bare, base, experiments, decimation, mask_standstill=mask_standstill, windows=windows)
-    first = weighted_least_squares(data).parameters.coordinates()
-    scale = Scale.of(model, experiments, windows, first[: 10 * model.n])
+    scale = _scale(model, equations)
     candidates = [candidate for name in library for candidate in variants(name, scale)]
     wide = Observation(model, (*plain, *candidates))
-    systems = [
-        experiment_system(
-            wide,
-            experiment,
-            decimation,
-            window,
-            mask_standstill=mask_standstill,
-            batches=batches_each(len(experiments)),
-        )
-        for experiment, window in zip(experiments, windows, strict=True)
-    ]
-    fixed = [wide.names.index(bare.names[i]) for i in base.found.kept]
+    systems = equations(wide)
+    base = BaseParameters.of(Observation(model, plain)).found
+    fixed = [wide.names.index(name) for name in base.kept_names]
     reach = -(-2 * decimation.support // decimation.factor)
     blocks = folds(systems, wide.members, len(wide.names), fixed, reach)
     groups = {candidate: candidate_columns(wide, candidate) for candidate in candidates}
@@ -95,3 +80,11 @@ def select_friction(
         choice.chosen,
         choice.trials,
     )
+
+
+def _scale(model: RobotModel, equations: Callable[[Observation], Sequence[ExperimentSystem]]) -> Scale:
+    classic = Observation(model, CLASSIC)
+    systems = equations(classic)
+    data = RegressionData.of(classic, BaseParameters.of(classic), systems)
+    found = weighted_least_squares(data).parameters.coordinates()
+    return Scale.of(systems, classic, found[: len(INERTIAL) * model.n])

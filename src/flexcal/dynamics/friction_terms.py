@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Coulomb, Coupling, DriveTerm, RotorInertia, TorqueOffset, Viscous
+from flexcal.dynamics.experiment_system import ExperimentSystem
 from flexcal.dynamics.friction_choice import Candidate
 from flexcal.dynamics.friction_library import (
     AsymmetricCoulomb,
@@ -17,10 +19,9 @@ from flexcal.dynamics.friction_library import (
     SublinearViscous,
     WarmUp,
 )
-from flexcal.dynamics.motor_axis import motor_axes
-from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.motor_axis import MotorAxis, motor_axes
+from flexcal.dynamics.observation import Observation
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
 
 _PLAIN: dict[str, DriveTerm] = {
     "viscous": Viscous(),
@@ -32,49 +33,49 @@ LIBRARY = ("sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_
 """What is tried beyond the classic terms; an asymmetric Coulomb friction is not, as it is a torque offset."""
 FRICTION_TERMS = (*_PLAIN, *LIBRARY)
 
-_SHARES_OF_TOP_SPEED = (0.003, 0.01, 0.03, 0.1, 0.3)
-_SHARES_OF_RANGE = (0.0001, 0.0003, 0.001, 0.003, 0.01, 0.03)
+_SHARES_OF_SPEED = (0.01, 0.03, 0.1, 0.3, 1.0)
+_SHARES_OF_STROKE = (0.001, 0.003, 0.01, 0.03, 0.1)
 _SHARES_OF_DURATION = (0.1, 0.2, 0.4, 0.8)
 
 
 @dataclass(frozen=True, eq=False)
 class Scale:
-    """What shapes of terms are measured by: top speed and range of the motor axes (n,), duration (s), inertials of the links (10 n,)."""
+    """What shapes of terms are measured by.
 
-    top_speed: np.ndarray
-    range: np.ndarray
+    `speed` and `stroke` (n,) are those of the motor axes: the root mean square of ṡ, and its square over that of s̈; `duration` (s) is
+    that of the longest recording; `inertials` (10 n,) are the links'. An axis that does not move counts as if both were 1.
+    """
+
+    speed: np.ndarray
+    stroke: np.ndarray
     duration: float
     inertials: np.ndarray
 
     @classmethod
     def of(
-        cls,
-        model: RobotModel,
-        experiments: Sequence[Experiment],
-        windows: Sequence[Window],
-        inertials: np.ndarray,
+        cls, systems: Sequence[ExperimentSystem], observation: Observation, inertials: np.ndarray
     ) -> Scale:
-        """Of what the experiments show inside their windows; an axis that does not move counts as if it moved by 1."""
-        axes = motor_axes(model)
-        speed, low, high = np.zeros(model.n), np.full(model.n, np.inf), np.full(model.n, -np.inf)
-        duration = 0.0
-        for experiment, window in zip(experiments, windows, strict=True):
-            begun = None
-            for block in experiment.blocks():
-                inside = (block.time >= window.start) & (block.time < window.end)
-                if inside.any():
-                    time = block.time[inside]
-                    begun = time[0] if begun is None else begun
-                    duration = max(duration, float(time[-1] - begun))
-                    position = np.stack([axis.of(block.q[inside]) for axis in axes])
-                    velocity = np.stack([axis.of(block.dq[inside]) for axis in axes])
-                    speed = np.maximum(speed, np.abs(velocity).max(axis=1))
-                    low, high = (
-                        np.minimum(low, position.min(axis=1)),
-                        np.maximum(high, position.max(axis=1)),
-                    )
-        span = high - low
-        return cls(np.where(speed > 0, speed, 1.0), np.where(span > 0, span, 1.0), duration, inertials)
+        """Of the equations of an observation with the classic terms, nothing else is needed."""
+        axes = motor_axes(observation.model)
+        speed, push = (
+            np.array([_size(systems, observation, axis, kind) for axis in axes])
+            for kind in ("viscous", "rotor_inertia")
+        )
+        moves = (speed > 0) & (push > 0)
+        stroke = np.where(moves, speed**2, 1.0) / np.where(moves, push, 1.0)
+        return cls(np.where(moves, speed, 1.0), stroke, max(s.duration for s in systems), inertials)
+
+
+def _size(systems: Sequence[ExperimentSystem], observation: Observation, axis: MotorAxis, kind: str) -> float:
+    """Root mean square of ṡ or s̈ of an axis: what its column of that `kind` and those of its coupling sum to at its own joint."""
+    own = f"{axis.name}.{kind}"
+    members = observation.members[axis.joint]
+    chosen = [own, *(name for name in observation.names if name.startswith(f"{own}_at_"))]
+    columns = np.searchsorted(members, [observation.names.index(name) for name in chosen])
+    square = sum(
+        np.sum(batch.factors[axis.joint][:, columns].sum(axis=1) ** 2) for s in systems for batch in s.batches
+    )
+    return math.sqrt(square / sum(batch.rows for s in systems for batch in s.batches))
 
 
 def variants(name: str, scale: Scale) -> tuple[Candidate, ...]:
@@ -86,13 +87,13 @@ def variants(name: str, scale: Scale) -> tuple[Candidate, ...]:
             return (Candidate(name, "", LoadCoulomb(scale.inertials)),)
         case "stribeck":
             return tuple(
-                Candidate(name, f"{share:g} of the top speed", Stribeck(tuple(share * scale.top_speed)))
-                for share in _SHARES_OF_TOP_SPEED
+                Candidate(name, f"{share:g} of the speed", Stribeck(tuple(share * scale.speed)))
+                for share in _SHARES_OF_SPEED
             )
         case "presliding":
             return tuple(
-                Candidate(name, f"{share:g} of the range", Presliding(tuple(share * scale.range)))
-                for share in _SHARES_OF_RANGE
+                Candidate(name, f"{share:g} of the stroke", Presliding(tuple(share * scale.stroke)))
+                for share in _SHARES_OF_STROKE
             )
         case _:
             times = [share * scale.duration for share in _SHARES_OF_DURATION]

@@ -64,6 +64,22 @@ class RegressionData:
         drives = list(zip(self.names, kinds, size, strict=True))[links:]
         return tuple(name for name, kind, norm in drives if norm <= _SILENT * largest[kind])
 
+    def noise(self) -> list[tuple[float, int]]:
+        """σ̂ of every subsystem from its own fit, by its rows less its rank (Eq. 2.28), and that rank; NaN without more rows.
+
+        Base parameters alone are fitted, and a column counts by its size at all joints: at one of them it may be the URDF's rounding.
+        """
+        sizes = np.zeros(len(self.names))
+        for s in self.subsystems:
+            sizes[s.members] += np.sum(s.triangle.matrix**2, axis=0)
+        scale = 1.0 / np.sqrt(np.where(sizes > 0, sizes, 1.0))
+        kept = set(self.base.found.kept)
+        found = []
+        for s in self.subsystems:
+            columns = np.array([i for i, number in enumerate(s.members) if number in kept])
+            found.append(s.triangle.part(columns).noise(scale[s.members[columns]]))
+        return found
+
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all joints stacked, and of each (n,)."""
         n = self.observation.model.n

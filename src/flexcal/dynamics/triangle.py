@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _TOLERANCE = 1e-9
-"""A singular value below this, of columns of unit length, is taken as zero."""
+"""A singular value of comparable columns below this is taken as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +54,19 @@ class Triangle:
         """‖Y − W · parameters‖ for `parameters` (k,)."""
         return float(np.linalg.norm(self.right - self.matrix @ parameters))
 
-    def noise(self) -> tuple[float, int]:
-        """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that."""
-        norms = np.linalg.norm(self.matrix, axis=0)
-        scaled = self.matrix / np.where(norms > 0, norms, 1.0)
-        directions, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    def part(self, columns: np.ndarray) -> Triangle:
+        """With the numbered `columns` of W alone."""
+        return Triangle(self.factor[:, [*columns, -1]], self.rows)
+
+    def noise(self, scale: np.ndarray | None = None) -> tuple[float, int]:
+        """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that.
+
+        `scale` (k,) makes the columns compare; without it each gets unit length.
+        """
+        if scale is None:
+            norms = np.linalg.norm(self.matrix, axis=0)
+            scale = 1.0 / np.where(norms > 0, norms, 1.0)
+        directions, sizes, _ = np.linalg.svd(self.matrix * scale, full_matrices=False)
         seen = directions[:, sizes > _TOLERANCE]
         rank = seen.shape[1]
         left = self.right - seen @ (seen.T @ self.right)

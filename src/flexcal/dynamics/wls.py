@@ -17,8 +17,7 @@ def weighted_least_squares(data: RegressionData) -> Estimate:
     subsystem has no more rows than it determines parameters, and as `linear_fit` does.
     """
     noise = []
-    for s in data.subsystems:
-        sigma, rank = s.triangle.noise()
+    for s, (sigma, rank) in zip(data.subsystems, data.noise(), strict=True):
         if np.isnan(sigma):
             joint = data.observation.model.joint_names[s.joint]
             raise FlexcalError(

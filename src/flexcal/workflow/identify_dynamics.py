@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
-from flexcal.data import Recording, provenance, read_estimates, read_recording
+from flexcal.data import provenance, read_estimates
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
+    ExperimentSystem,
     FrictionSelection,
-    Motion,
     Observation,
     RegressionData,
-    Window,
-    observe,
+    batches_each,
     ordinary_least_squares,
     select_friction,
     weighted_least_squares,
@@ -32,6 +28,7 @@ from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
+from flexcal.workflow.log_systems import LogSystem, Treatment, log_systems
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -108,42 +105,50 @@ def identify_robot_dynamics(
     validate: Sequence[Path] = (),
     estimator: EstimatorName = "wls",
     out: Path | None = None,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> RobotDynamics:
     """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
 
-    The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what the filters would carry over, and
-    predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks. With `out`, estimates and
-    results.json go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and where robot.yaml lacks the cut-off or
-    the decimation or declares a payload; nothing is written then.
+    Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
+    of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
+    and the other blocks. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where the logs do not fit the
+    robot, and where robot.yaml lacks the cut-off or the decimation or declares a payload; nothing is written then.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
-    cutoff, decimation = _treatment(model)
-    mask = model.config.dynamics.mask_standstill
-    motions, early, late = [], [], []
-    for number, log in enumerate(logs):
-        recording = read_recording(log, model)
-        motions.append(Motion.of(recording, cutoff))
-        split, gone = _split(recording, hold_out, decimation)
-        early.append(Window(end=gone))
-        late.append(Window(start=split))
-        progress("reading", (number + 1) / len(logs))
-    friction = select_friction(
-        model, model.config.dynamics.friction, motions, decimation, mask_standstill=mask, windows=early
-    )
+    treatment = _treatment(model)
+
+    def systems(observation: Observation) -> list[LogSystem]:
+        return log_systems(
+            logs,
+            observation,
+            treatment,
+            hold_out=hold_out,
+            batches=batches_each(len(logs)),
+            jobs=jobs,
+            progress=progress,
+        )
+
+    def equations(observation: Observation) -> list[ExperimentSystem]:
+        return [system.early for system in systems(observation)]
+
+    declared = model.config.dynamics.friction
+    friction = select_friction(model, declared, equations, treatment.decimation)
     observation = Observation(model, friction.terms)
     base = BaseParameters.of(observation)
-    train = observe(observation, base, motions, decimation, mask_standstill=mask, windows=early)
-    held_out = None
-    if hold_out > 0:
-        held_out = observe(observation, base, motions, decimation, mask_standstill=mask, windows=late)
-    elif validate:
-        others = [Motion.of(read_recording(log, model), cutoff) for log in validate]
-        held_out = observe(observation, base, others, decimation, mask_standstill=mask)
+    found = systems(observation)
+    train = RegressionData.of(observation, base, [system.early for system in found])
+    late = [system.late for system in found if system.late is not None]
+    if validate:
+        others = log_systems(
+            validate, observation, treatment, hold_out=0.0, batches=1, jobs=jobs, progress=progress
+        )
+        late = [system.early for system in others]
+    held_out = RegressionData.of(observation, base, late) if late else None
     estimate = _ESTIMATORS[estimator](train)
     options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
@@ -151,15 +156,15 @@ def identify_robot_dynamics(
     target = source if out is None else out / ESTIMATES
     seconds = time.perf_counter() - begun
     rank = BaseParameters.of(Observation(model, CLASSIC)).rank
-    found = RobotDynamics(estimate, rank, train, held_out, friction, seconds, target)
+    result = RobotDynamics(estimate, rank, train, held_out, friction, seconds, target)
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
-        write_results(out, found.document())
-    return found
+        write_results(out, result.document())
+    return result
 
 
-def _treatment(model: RobotModel) -> tuple[float, Decimation]:
-    """Cut-off (Hz) and decimation as declared."""
+def _treatment(model: RobotModel) -> Treatment:
+    """Cut-off and decimation as declared."""
     declared = model.config.dynamics
     if declared.cutoff_hz is None or declared.decimation is None:
         raise InputError(
@@ -170,12 +175,4 @@ def _treatment(model: RobotModel) -> tuple[float, Decimation]:
         raise InputError(
             f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
         )
-    return declared.cutoff_hz, Decimation(declared.decimation)
-
-
-def _split(recording: Recording, hold_out: float, decimation: Decimation) -> tuple[float, float]:
-    """When the held-out part begins, and when the rows of the fit end, which its filters must not reach; inf without one."""
-    if hold_out == 0:
-        return math.inf, math.inf
-    split = recording.start + (1.0 - hold_out) * recording.duration
-    return split, float(np.nextafter(split - decimation.support * recording.time_step, -math.inf))
+    return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
