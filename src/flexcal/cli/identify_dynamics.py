@@ -73,6 +73,10 @@ class IdentifyDynamics:
             console.say(
                 f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
             )
+        essential = document["essential_parameters"]
+        console.say(
+            f"{len(essential['parameters'])} essential parameters alone miss {essential['error_percent']['train']:.2f} %"
+        )
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
         elastic = found.train.observation.model.elastic

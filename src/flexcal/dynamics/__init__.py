@@ -11,6 +11,7 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
 from flexcal.dynamics.joint_log import JointLog
 from flexcal.dynamics.motion import Motion
@@ -29,6 +30,7 @@ __all__ = [
     "Coulomb",
     "Coupling",
     "DriveTerm",
+    "EssentialParameters",
     "Experiment",
     "ExperimentSystem",
     "JointLog",
@@ -42,6 +44,7 @@ __all__ = [
     "Viscous",
     "Window",
     "batches_each",
+    "essential_parameters",
     "experiment_system",
     "observe",
     "ordinary_least_squares",

@@ -12,10 +12,12 @@ from flexcal.data import provenance, read_estimates
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     BaseParameters,
+    EssentialParameters,
     Observation,
     RegressionData,
     batches_each,
     drive_terms,
+    essential_parameters,
     ordinary_least_squares,
     weighted_least_squares,
 )
@@ -40,6 +42,7 @@ class RobotDynamics:
     estimate: Estimate
     train: RegressionData
     held_out: RegressionData | None
+    essential: EssentialParameters
     friction_terms: tuple[str, ...]
     seconds: float
     estimates: Path
@@ -62,14 +65,32 @@ class RobotDynamics:
             "error_percent": percent,
             "friction_terms": list(self.friction_terms),
             "base_parameters": self._base_parameters(),
+            "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
             "seconds": self.seconds,
             "estimates": self.estimates,
         }
 
+    def _essential_parameters(self) -> dict[str, Any]:
+        """What stays of the base parameters, with value and standard deviation, and the error of the torques with it alone."""
+        found = self.essential
+        percent = {"train": 100 * self.train.errors(found.parameters)[0], "held_out": None}
+        if self.held_out is not None:
+            percent["held_out"] = 100 * self.held_out.errors(found.parameters)[0]
+        stay = zip(found.names, found.values, found.std, strict=True)
+        return {
+            "parameters": [{"name": name, "estimate": value, "std": std} for name, value, std in stay],
+            "eliminated": list(found.eliminated),
+            "error_percent": percent,
+        }
+
     def _base_parameters(self) -> list[dict[str, Any]]:
-        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell."""
+        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell.
+
+        `essential` is its value where the others are left out, None where it is left out itself.
+        """
+        essential = dict(zip(self.essential.names, self.essential.values, strict=True))
         base, x = self.train.base, self.estimate.parameters.coordinates()
         hidden = {entry.name for entry in self.estimate.dropped}
         rows = []
@@ -81,7 +102,14 @@ class RobotDynamics:
             percent = None if std is None or value == 0 else 100 * std / abs(value)
             unit = self.estimate.parameters[name].unit
             rows.append(
-                {"name": expression, "unit": unit, "estimate": value, "std": std, "std_percent": percent}
+                {
+                    "name": expression,
+                    "unit": unit,
+                    "estimate": value,
+                    "std": std,
+                    "std_percent": percent,
+                    "essential": essential.get(name),
+                }
             )
         return rows
 
@@ -135,8 +163,11 @@ def identify_robot_dynamics(
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
+    essential = essential_parameters(train, estimate)
     seconds = time.perf_counter() - begun
-    found = RobotDynamics(estimate, train, held_out, drive_terms.friction_names(terms), seconds, target)
+    found = RobotDynamics(
+        estimate, train, held_out, essential, drive_terms.friction_names(terms), seconds, target
+    )
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, found.document())
