@@ -63,6 +63,11 @@ def test_torques_that_the_fit_never_saw(
     assert error["train"] < error["held_out"] < 6.95
     assert set(error["per_joint"]) == {f"joint_{i}" for i in range(1, 7)}
     assert found["masked_rows"] > 0
+    essential = found["essential_parameters"]
+    assert 20 <= len(essential["parameters"]) <= 35
+    assert len(essential["parameters"]) + len(essential["eliminated"]) == 61
+    assert error["train"] < essential["error_percent"]["train"] < 1.05 * error["train"]
+    assert essential["error_percent"]["held_out"] < error["held_out"] + 0.2
     assert found["friction_terms"] == ["viscous", "coulomb", "torque_offset"]
     assert (found["friction_tried"], found["friction_shapes"], found["warnings"]) == ([], {}, [])
     assert not (tx40 / "estimates.yaml").exists()

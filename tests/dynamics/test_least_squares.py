@@ -16,6 +16,7 @@ from flexcal.dynamics import (
     RegressionData,
     Triangle,
     Window,
+    essential_parameters,
     observe,
     ordinary_least_squares,
     rows,
@@ -173,6 +174,8 @@ def test_a_joint_that_never_moves_is_named_and_the_rest_identified(
     hidden = {entry.name for entry in found.dropped}
     assert {"joint_6.viscous", "joint_6.coulomb", "joint_6.rotor_inertia"} <= hidden
     assert found.interval("joint_6.viscous") is None
+    essential = essential_parameters(data, found)
+    assert hidden.isdisjoint(essential.names + essential.eliminated)
     assert abs(found.values["joint_3.viscous"] - truth[observation.names.index("joint_3.viscous")]) < 1e-8
 
 

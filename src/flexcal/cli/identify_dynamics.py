@@ -76,6 +76,10 @@ class IdentifyDynamics:
             console.say(
                 f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
             )
+        essential = document["essential_parameters"]
+        console.say(
+            f"{len(essential['parameters'])} essential parameters alone miss {essential['error_percent']['train']:.2f} %"
+        )
         for remark in document["warnings"]:
             console.say(remark)
         console.say(f"wrote {found.estimates}")

@@ -111,15 +111,17 @@ def _millimetres(value: float | None) -> str:
 
 
 def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """One row a base parameter, written out: estimate, standard deviation, and that in per cent of the estimate."""
+    """One row a base parameter, written out: estimate, standard deviation, that in per cent of the estimate, and what is essential."""
     table = Table(title="base parameters", title_justify="left")
     table.add_column("parameter")
-    for heading in ("estimate", "std", "%", "unit"):
-        table.add_column(heading, justify="right" if heading != "unit" else "left")
+    for heading in ("estimate", "std", "%", "essential"):
+        table.add_column(heading, justify="right")
+    table.add_column("unit")
     for row in rows:
         std = "not seen" if row["std"] is None else f"{row['std']:.3g}"
         percent = "" if row["std_percent"] is None else f"{row['std_percent']:.1f}"
-        table.add_row(row["name"], f"{row['estimate']:.5g}", std, percent, row["unit"])
+        essential = "" if row["essential"] is None else f"{row['essential']:.5g}"
+        table.add_row(row["name"], f"{row['estimate']:.5g}", std, percent, essential, row["unit"])
     return table
 
 

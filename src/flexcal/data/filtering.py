@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -89,6 +89,7 @@ def _decimated(columns: np.ndarray, stage: int) -> np.ndarray:
     return found
 
 
+@cache
 def _shifted_filter(stage: int) -> np.ndarray:
     length = 2 * _REACH * stage + 1
     taps = np.sinc(np.arange(-_REACH * stage, _REACH * stage + 1) / stage) * np.hamming(length)

@@ -11,6 +11,7 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
 from flexcal.dynamics.friction_choice import Candidate, Trial
 from flexcal.dynamics.friction_library import (
@@ -43,6 +44,7 @@ __all__ = [
     "Coulomb",
     "Coupling",
     "DriveTerm",
+    "EssentialParameters",
     "Experiment",
     "ExperimentSystem",
     "FrictionSelection",
@@ -63,6 +65,7 @@ __all__ = [
     "WarmUp",
     "Window",
     "batches_each",
+    "essential_parameters",
     "experiment_system",
     "observe",
     "ordinary_least_squares",

@@ -74,7 +74,7 @@ def experiment_system(
             number = int(part.number[0]) // length
             if current is None or current.number != number:
                 found += [] if current is None else [current.batch()]
-                current = _Growing(number, len(part.columns))
+                current = _Growing(number, len(part.systems))
             if not current.add(part):
                 raise FlexcalError(f"the equations of {experiment.name} are not finite.")
     found += [] if current is None else [current.batch()]
@@ -96,8 +96,8 @@ class _Growing:
 
     def add(self, part: Rows) -> bool:
         """False where a number is not finite."""
-        for joint, (held, columns) in enumerate(zip(self._held, part.columns, strict=True)):
-            held.append(np.vstack([columns, part.torque[joint]]).T)
+        for held, system in zip(self._held, part.systems, strict=True):
+            held.append(system.T)
         self._rows += len(part)
         self._waiting += len(part)
         finite = all(bool(np.isfinite(held[-1]).all()) for held in self._held)

@@ -14,7 +14,7 @@ from flexcal.dynamics.motion import Motion, filtered_motion
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 
-_ROWS = 50_000
+_ROWS = 20_000
 """Rows of the file that are in memory at once."""
 
 

@@ -47,32 +47,46 @@ class Observation:
         return [column for term in self.terms for column in term.columns(self.model, still, {})]
 
     @cached_property
-    def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Row among `stacked` of every entry (joint, inertial parameter) that counts, and of every drive column in its order."""
-        starts = np.cumsum([0, *(len(members) for members in self.members)])
-        inertial = np.full((self.model.n, len(INERTIAL) * self.model.n), -1)
-        for joint, members in enumerate(self.members):
-            links = members[members < inertial.shape[1]]
-            inertial[joint, links] = starts[joint] + np.arange(len(links))
+    def _links(self) -> list[slice | np.ndarray]:
+        """For every joint which inertial columns it can feel."""
+        found: list[slice | np.ndarray] = []
+        for members in self.members:
+            numbers = members[members < len(INERTIAL) * self.model.n]
+            joined = numbers[-1] - numbers[0] + 1 == len(numbers)
+            found.append(slice(numbers[0], numbers[-1] + 1) if joined else numbers)
+        return found
+
+    @cached_property
+    def _drives(self) -> np.ndarray:
+        """Row among `systems` of every drive column, in the order in which the terms give them."""
         number = {name: i for i, name in enumerate(self.names)}
-        drives = [
+        starts = np.cumsum([0, *self.widths])
+        rows = [
             starts[column.joint] + np.searchsorted(self.members[column.joint], number[column.name])
             for column in self._at_rest
         ]
-        return inertial, np.array(drives, dtype=int)
+        return np.array(rows, dtype=int)
 
-    def stacked(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """The columns of all joints below each other (Σ members, N), at every sample of the motion.
+    @property
+    def widths(self) -> list[int]:
+        """For every joint the number of its columns, and one for its torque."""
+        return [len(members) + 1 for members in self.members]
+
+    def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        """For every joint its columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
 
         The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without.
         """
-        inertial, drives = self._places
         links = torque_regressor(self.model, motion.q, motion.dq, motion.ddq).transpose(1, 2, 0)
-        counts = inertial >= 0
-        found = np.empty((sum(len(members) for members in self.members), len(motion)))
-        found[inertial[counts]] = links[counts]
+        found = np.empty((sum(self.widths), len(motion)))
+        start = 0
+        for joint, (felt, width) in enumerate(zip(self._links, self.widths, strict=True)):
+            part = links[joint, felt]
+            found[start : start + len(part)] = part
+            start += width
+            found[start - 1] = motion.torque[:, joint]
         values = (column.values for column in self._drive_columns(motion, {} if memory is None else memory))
-        for place, column in zip(drives, values, strict=True):
+        for place, column in zip(self._drives, values, strict=True):
             found[place] = column
         return found
 
@@ -87,8 +101,8 @@ class Observation:
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
         """For every joint its columns (members, N) at every sample of the motion."""
-        ends = np.cumsum([len(members) for members in self.members])
-        return np.split(self.stacked(motion), ends[:-1])
+        systems = np.split(self.systems(motion), np.cumsum(self.widths)[:-1])
+        return [system[:-1] for system in systems]
 
     def values(self) -> np.ndarray:
         """The model's values of all columns (p,), zero where it knows none."""

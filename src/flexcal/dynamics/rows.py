@@ -55,26 +55,35 @@ class Window:
 class Rows:
     """M equations of every joint that follow each other.
 
-    `columns` has for every joint W transposed (members, M); `torque` is (n, M). `number` (M,) counts the rows of the experiment, whatever
-    is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth of
-    its top speed.
+    `systems` has for every joint W and, last, Y transposed (members + 1, M). `number` (M,) counts the rows of the experiment, whatever
+    is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth
+    of its top speed.
     """
 
     number: np.ndarray
     time: np.ndarray
     still: np.ndarray
-    columns: list[np.ndarray]
-    torque: np.ndarray
+    systems: list[np.ndarray]
 
     def __len__(self) -> int:
         return len(self.number)
+
+    @property
+    def columns(self) -> list[np.ndarray]:
+        """For every joint W transposed (members, M)."""
+        return [system[:-1] for system in self.systems]
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Y of all joints (n, M)."""
+        return np.array([system[-1] for system in self.systems])
 
     def where(self, keep: np.ndarray) -> Rows:
         """The rows that `keep` (M,) marks."""
         if keep.all():
             return self
-        columns = [block[:, keep] for block in self.columns]
-        return Rows(self.number[keep], self.time[keep], self.still[keep], columns, self.torque[:, keep])
+        systems = [system[:, keep] for system in self.systems]
+        return Rows(self.number[keep], self.time[keep], self.still[keep], systems)
 
 
 def rows(
@@ -84,8 +93,7 @@ def rows(
 
     Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
     """
-    widths = [len(members) for members in observation.members]
-    ends = np.cumsum(widths)
+    ends = np.cumsum(observation.widths)
     slowest = _STANDSTILL * experiment.top_speed
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
@@ -101,9 +109,9 @@ def rows(
             return
         still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
         centres.push(start, piece.time, still)
-        columns = stream.push(np.vstack([observation.stacked(piece, memory), piece.torque.T]))
-        number, time, still = centres.pop(columns.shape[1])
-        found = Rows(number, time, still, np.split(columns[: ends[-1]], ends[:-1]), columns[ends[-1] :])
+        systems = stream.push(observation.systems(piece, memory))
+        number, time, still = centres.pop(systems.shape[1])
+        found = Rows(number, time, still, np.split(systems, ends[:-1]))
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)

@@ -13,11 +13,13 @@ from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
+    EssentialParameters,
     ExperimentSystem,
     FrictionSelection,
     Observation,
     RegressionData,
     batches_each,
+    essential_parameters,
     ordinary_least_squares,
     select_friction,
     weighted_least_squares,
@@ -45,6 +47,7 @@ class RobotDynamics:
     structural_rank: int
     train: RegressionData
     held_out: RegressionData | None
+    essential: EssentialParameters
     friction: FrictionSelection
     seconds: float
     estimates: Path
@@ -73,14 +76,32 @@ class RobotDynamics:
             ],
             "warnings": list(dynamics_remarks(self.train, self.estimate)),
             "base_parameters": self._base_parameters(),
+            "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
             "seconds": self.seconds,
             "estimates": self.estimates,
         }
 
+    def _essential_parameters(self) -> dict[str, Any]:
+        """What stays of the base parameters, with value and standard deviation, and the error of the torques with it alone."""
+        found = self.essential
+        percent = {"train": 100 * self.train.errors(found.parameters)[0], "held_out": None}
+        if self.held_out is not None:
+            percent["held_out"] = 100 * self.held_out.errors(found.parameters)[0]
+        stay = zip(found.names, found.values, found.std, strict=True)
+        return {
+            "parameters": [{"name": name, "estimate": value, "std": std} for name, value, std in stay],
+            "eliminated": list(found.eliminated),
+            "error_percent": percent,
+        }
+
     def _base_parameters(self) -> list[dict[str, Any]]:
-        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell."""
+        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell.
+
+        `essential` is its value where the others are left out, None where it is left out itself.
+        """
+        essential = dict(zip(self.essential.names, self.essential.values, strict=True))
         base, x = self.train.base, self.estimate.parameters.coordinates()
         hidden = {entry.name for entry in self.estimate.dropped}
         rows = []
@@ -92,7 +113,14 @@ class RobotDynamics:
             percent = None if std is None or value == 0 else 100 * std / abs(value)
             unit = self.estimate.parameters[name].unit
             rows.append(
-                {"name": expression, "unit": unit, "estimate": value, "std": std, "std_percent": percent}
+                {
+                    "name": expression,
+                    "unit": unit,
+                    "estimate": value,
+                    "std": std,
+                    "std_percent": percent,
+                    "essential": essential.get(name),
+                }
             )
         return rows
 
@@ -154,9 +182,10 @@ def identify_robot_dynamics(
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
+    essential = essential_parameters(train, estimate)
     seconds = time.perf_counter() - begun
     rank = BaseParameters.of(Observation(model, CLASSIC)).rank
-    result = RobotDynamics(estimate, rank, train, held_out, friction, seconds, target)
+    result = RobotDynamics(estimate, rank, train, held_out, essential, friction, seconds, target)
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, result.document())
