@@ -32,10 +32,10 @@ def with_friction(folder: Path, friction: str) -> Path:
 
 
 def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All sixty within 1.6 published standard deviations, but for two of link 6, the weakest link.
+    """All sixty near what is published, in its standard deviations, but for Coulomb and viscous friction.
 
-    Filter and decimation were others there, and the rotor inertia of joint 6 was left out. The published standard
-    deviations take the errors for independent from row to row, which makes them too small.
+    Filter and rows near standstill were others there, and the rotor inertia of joint 6 was left out (tests/dynamics has both as they
+    were). The published standard deviations take the errors for independent from row to row, which makes them too small.
     """
     found = identified(with_friction(tx40, "classic"), capsys)
     assert (found["structural_rank"], found["rank"]) == (61, 61)
@@ -45,11 +45,25 @@ def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) ->
     published = {name: (float(value), float(std)) for name, value, std in (line.split(",") for line in lines)}
     assert set(base) - set(published) == {"joint_6.rotor_inertia"}
     off = {name: abs(base[name]["estimate"] - value) / std for name, (value, std) in published.items()}
-    assert {name for name, size in off.items() if size > 1.6} == {"link_6.mc_x", "link_6.mc_y"}
-    assert max(off.values()) < 3.0
-    assert np.median(list(off.values())) < 0.6
+    friction = {name for name in off if name.rpartition(".")[2].startswith(("coulomb", "viscous"))}
+    assert max(off[name] for name in off.keys() - friction) < 3.0
+    assert max(off[name] for name in friction) < 5.0
+    assert np.median(list(off.values())) < 0.8
     ratio = [base[name]["std"] / std for name, (_, std) in published.items()]
     assert min(ratio) > 0.85 and 1.4 < np.median(ratio) < 2.2
+
+
+def test_rotor_inertia_of_the_motor_that_two_joints_feel(
+    tx40: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Within 5 % of what its maker's file says, 0.00964 seen across and 0.0105 at joint 6 itself (figaroh-examples, TX40_config.yaml)."""
+    for friction in ("classic", "auto"):
+        found = identified(with_friction(tx40, friction), capsys)["parameters"]
+        assert found["joint_6.rotor_inertia_at_joint_5"]["estimate"] == pytest.approx(0.00964, rel=0.05)
+        assert found["joint_6.rotor_inertia"]["estimate"] == pytest.approx(0.0105, rel=0.05)
+        (tx40 / "robot.yaml").write_text(
+            (tx40 / "robot.yaml").read_text().replace(f", friction: {friction}", "")
+        )
 
 
 def test_torques_that_the_fit_never_saw(
@@ -111,9 +125,10 @@ def test_every_declared_term_is_in_the_estimate(tx40: Path, capsys: pytest.Captu
     assert hidden == {"joint_1.rotor_inertia", "joint_2.rotor_inertia"} | {
         f"joint_{i}.coulomb_asymmetry" for i in range(1, 7)
     }
-    assert found["warnings"] == [
-        f"no recording tells joint_{i}.coulomb_asymmetry from joint_{i}.torque_offset" for i in range(1, 7)
-    ]
+    for i in range(1, 7):
+        own = f"no recording tells joint_{i}.coulomb_asymmetry from "
+        (remark,) = (text for text in found["warnings"] if text.startswith(own))
+        assert f"joint_{i}.torque_offset" in remark
     assert set(found["friction_shapes"]) == {"stribeck", "presliding", "warm_up"}
 
 

@@ -94,7 +94,7 @@ class WarmUp(_PerMotor):
 
 
 @dataclass(frozen=True, eq=False)
-class LoadCoulomb(_PerMotor):
+class LoadCoulomb:
     """`<joint>.load_coulomb` · |load| sign ṡ: teeth that are pressed together.
 
     The load is what the links alone ask of the joint, by `inertials` (10 n,) as a fit without this term found them: the measured
@@ -102,11 +102,13 @@ class LoadCoulomb(_PerMotor):
     """
 
     inertials: np.ndarray
-    key = "load_coulomb"
 
-    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
-        links = torque_regressor(model, motion.q, motion.dq, motion.ddq)
-        return np.abs(links[:, axis.joint] @ self.inertials) * np.sign(axis.of(motion.dq))
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        load = np.abs(torque_regressor(model, motion.q, motion.dq, motion.ddq) @ self.inertials)
+        for axis in motor_axes(model):
+            torque = load[:, axis.joint] * np.sign(axis.of(motion.dq))
+            for joint, ratio in axis.shares:
+                yield Column(f"{axis.name}.load_coulomb", joint, ratio * torque)
 
 
 def dahl(position: np.ndarray, travel: float, start: float) -> np.ndarray:
