@@ -23,6 +23,8 @@ _TIGHTEST = 1e-3
 """A prior that takes CAD for exact still leaves this relative standard deviation."""
 _STEEL = 8000.0
 """kg/m³; CAD that gives a link less extent than a ball of steel of its mass has is taken for that ball."""
+_SILENT = 1e-9
+"""A column smaller than this beside the largest of its kind is zero."""
 _UNKNOWN_STD = 100.0
 """Relative standard deviation of a drive parameter that nothing is known of: next to none, which keeps the problem well posed."""
 _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.05
@@ -36,7 +38,7 @@ def feasible_set(observation: Observation, system: Triangle) -> tuple[Cone, ...]
     prior's relative standard deviation of the mass; the CAD mass bounds its mass. Without one the reference is a ball as heavy as the
     average link and as wide as this one is long. Rotor inertia and viscous friction are positive, as matrices where motors turn with
     two joints; Coulomb friction is positive. A drive parameter that robot.yaml does not give has hardly a prior, and as reference the
-    size at which it alone would be as large as the torques; one that the data do not depend on is left out.
+    least size at which one of its kind would be as large as all torques; one that the data do not depend on is left out.
     """
     return (*_links(observation.model), *_drives(observation, system))
 
@@ -73,14 +75,17 @@ def _guessed(model: RobotModel, link: int) -> Inertia:
 def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
     model, names = observation.model, observation.names
     torque, sizes = float(np.linalg.norm(system.right)) or 1.0, np.linalg.norm(system.matrix, axis=0)
-    seen = {name for name, size in zip(names, sizes, strict=True) if size > 0}
+    largest: dict[str, float] = {}
+    for name, size in zip(names, sizes, strict=True):
+        largest[_kind(name)] = max(largest.get(_kind(name), 0.0), float(size))
+    seen = {name for name, size in zip(names, sizes, strict=True) if size > _SILENT * largest[_kind(name)]}
 
     def reference(name: str) -> tuple[float, float]:
         """Size and relative standard deviation."""
         known = model.values.get(name, math.nan)
         if known > 0:
             return known, model.prior.rotor_inertia if name.endswith(".rotor_inertia") else _UNKNOWN_STD
-        return torque / float(sizes[names.index(name)]), _UNKNOWN_STD
+        return torque / largest[_kind(name)], _UNKNOWN_STD
 
     for key in ("rotor_inertia", "viscous"):
         for joints, shared in _groups(model, [f"{joint}.{key}" in seen for joint in model.joint_names]):
@@ -95,7 +100,7 @@ def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
             size, std = np.diag([size for size, _ in known]), max(std for _, std in known)
             yield Cone(np.array(members), np.array(basis), size, _DRIVE_FLOOR, std)
     for name in names:
-        key = name.rpartition(".")[2]
+        key = _kind(name)
         if name in seen and (key == "coulomb" or key.startswith("coulomb_at_")):
             yield _scalar(names.index(name), reference(name)[0], _DRIVE_FLOOR, _UNKNOWN_STD)
 
@@ -114,6 +119,10 @@ def _groups(model: RobotModel, seen: list[bool]) -> Iterator[tuple[list[str], li
             if entry.motor in group and entry.joint in group
         ]
         yield group, inside
+
+
+def _kind(name: str) -> str:
+    return name.rpartition(".")[2]
 
 
 def _scalar(member: int, reference: float, floor: float, std: float, *, sign: float = 1.0) -> Cone:

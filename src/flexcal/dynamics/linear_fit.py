@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from flexcal.dynamics.batch_covariance import batch_covariance
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.triangle import Triangle, stacked
 from flexcal.errors import FlexcalError
@@ -19,7 +19,7 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
 
     Parameters that are no base parameters stay at the model's value, zero where it has none, and the kept ones absorb them. A base
     parameter that these data do not determine stays too and counts as dropped: the recording, not the robot, hides it. The covariance
-    is (WᵀW)⁻¹ σ̂² with σ̂² of Eq. 2.28 on the weighted system; it takes the errors for independent from row to row.
+    is that of `batch_covariance`, in place of (WᵀW)⁻¹ σ̂² (Eq. 2.30), which takes the errors for independent from row to row.
     Raises `FlexcalError` with no more rows than parameters.
     """
     from scipy.linalg import solve_triangular
@@ -43,13 +43,15 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
             f"{system.rows} equations do not determine {len(kept)} parameters; record for longer."
         )
     cost = float(factor[-1, -1] ** 2)
-    root = np.zeros((len(names), len(kept)))
-    root[kept] = scale[:, None] * solve_triangular(triangle, np.eye(len(kept))) * math.sqrt(cost / freedom)
+    root = scale[:, None] * solve_triangular(triangle, np.eye(len(kept)))
+    spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
+    covariance = np.zeros((len(names), len(names)))
+    covariance[np.ix_(kept, kept)] = spread.covariance
     return Estimate(
         parameters=Parameters(
             Parameter(name, unit_of(name), float(v)) for name, v in zip(names, found, strict=True)
         ),
-        covariance=root @ root.T,
+        covariance=covariance,
         rank=len(kept),
         dropped=_dropped(base.regrouping, names, base.kept, seen.dropped),
         identifiable=tuple(i in set(kept) for i in range(len(names))),
@@ -59,6 +61,7 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
         status="converged",
         message="linear least squares",
         iterations=1,
+        covariance_freedom=spread.freedom,
     )
 
 

@@ -22,8 +22,7 @@ def noise_levels(data: RegressionData) -> list[float]:
     subsystem has no more rows than it determines parameters.
     """
     noise = []
-    for s in data.subsystems:
-        sigma, rank = s.triangle.noise()
+    for s, (sigma, rank) in zip(data.subsystems, data.noise(), strict=True):
         if np.isnan(sigma):
             joint = data.observation.model.joint_names[s.joint]
             raise FlexcalError(
