@@ -67,6 +67,12 @@ class IdentifyDynamics:
             f"{document['rank']} of {document['structural_rank']} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
+        signals = document["signals"]
+        if signals["proposed"]:
+            console.say(
+                f"proposed from the motion's spectrum, as robot.yaml lacks {' and '.join(signals['proposed'])}: "
+                f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
+            )
         error = document["error_percent"]
         console.say(f"torques missed by {error['train']:.2f} % of their norm in the fit")
         if error["held_out"] is not None:

@@ -13,8 +13,9 @@ from flexcal.dynamics.drive_terms import (
 )
 from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
-from flexcal.dynamics.joint_log import JointLog
+from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
@@ -35,6 +36,7 @@ __all__ = [
     "ExperimentSystem",
     "JointLog",
     "Motion",
+    "MotionBandwidth",
     "Observation",
     "RegressionData",
     "RotorInertia",
@@ -46,6 +48,8 @@ __all__ = [
     "batches_each",
     "essential_parameters",
     "experiment_system",
+    "log_blocks",
+    "motion_bandwidth",
     "observe",
     "ordinary_least_squares",
     "weighted_least_squares",
