@@ -30,13 +30,12 @@ def motion_bandwidth(recordings: Iterable[Recording]) -> MotionBandwidth:
     Position spectra of segments of 8 s (of all, where there is less) with a Hann window, averaged, less the level that they have at the
     highest frequencies, times ω².
     """
-    step, power, count = 0.0, np.zeros(0), 0
-    for step, segment in _segments(recordings):
+    power, step = np.zeros((1, 1)), 1.0
+    for number, (own_step, segment) in enumerate(_segments(recordings)):
         line = np.linspace(0.0, 1.0, len(segment))[:, None]
         level = segment - segment[0] - line * (segment[-1] - segment[0])
         spectrum = np.abs(np.fft.rfft(level * np.hanning(len(segment))[:, None], axis=0)) ** 2
-        power = spectrum if count == 0 else power + spectrum
-        count += 1
+        power, step = (spectrum if number == 0 else power + spectrum), own_step
     samples = 2 * (len(power) - 1)
     frequency = np.arange(len(power)) / (samples * step)
     noise = np.mean(power[frequency > _NOISE_ABOVE * 0.5 / step], axis=0)

@@ -30,7 +30,8 @@ class Treatment:
 def treatment_of(model: RobotModel, logs: Sequence[Path]) -> Treatment:
     """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
 
-    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities. Raises `InputError` where a log that is needed for it shows no motion.
+    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities. Raises `InputError` where a log that is
+    needed for it shows no motion.
     """
     declared = model.config.dynamics
     if declared.cutoff_hz is not None and declared.decimation is not None:
