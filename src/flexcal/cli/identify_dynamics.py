@@ -67,6 +67,12 @@ class IdentifyDynamics:
             f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
+        signals = document["signals"]
+        if signals["proposed"]:
+            console.say(
+                f"proposed from the motion's spectrum, as robot.yaml lacks {' and '.join(signals['proposed'])}: "
+                f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
+            )
         if document["friction_tried"]:
             console.show(friction_table(document["friction_tried"]))
         console.say(f"friction: {', '.join(found.friction.labels)}")

@@ -24,8 +24,9 @@ from flexcal.dynamics.friction_library import (
 )
 from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
-from flexcal.dynamics.joint_log import JointLog
+from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
@@ -51,6 +52,7 @@ __all__ = [
     "JointLog",
     "LoadCoulomb",
     "Motion",
+    "MotionBandwidth",
     "Observation",
     "Presliding",
     "RegressionData",
@@ -67,6 +69,8 @@ __all__ = [
     "batches_each",
     "essential_parameters",
     "experiment_system",
+    "log_blocks",
+    "motion_bandwidth",
     "observe",
     "ordinary_least_squares",
     "select_friction",

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from flexcal.data import provenance, read_estimates
-from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
@@ -30,9 +29,10 @@ from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
-from flexcal.workflow.log_systems import LogSystem, Treatment, log_systems
+from flexcal.workflow.log_systems import LogSystem, log_systems
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.treatment import Treatment, treatment_of
 
 EstimatorName = Literal["wls", "ols"]
 
@@ -49,6 +49,7 @@ class RobotDynamics:
     held_out: RegressionData | None
     essential: EssentialParameters
     friction: FrictionSelection
+    treatment: Treatment
     seconds: float
     estimates: Path
 
@@ -68,6 +69,11 @@ class RobotDynamics:
             "equations": sum(s.triangle.rows for s in self.train.subsystems),
             "masked_rows": self.train.masked,
             "error_percent": percent,
+            "signals": {
+                "cutoff_hz": self.treatment.cutoff_hz,
+                "decimation": self.treatment.decimation.factor,
+                "proposed": list(self.treatment.proposed),
+            },
             "friction_terms": list(self.friction.names),
             "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
             "friction_tried": [
@@ -141,14 +147,18 @@ def identify_robot_dynamics(
     Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where the logs do not fit the
-    robot, and where robot.yaml lacks the cut-off or the decimation or declares a payload; nothing is written then.
+    robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
-    treatment = _treatment(model)
+    if model.payload is not None:
+        raise InputError(
+            f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
+        )
+    treatment = treatment_of(model, logs)
 
     def systems(observation: Observation) -> list[LogSystem]:
         return log_systems(
@@ -185,23 +195,8 @@ def identify_robot_dynamics(
     essential = essential_parameters(train, estimate)
     seconds = time.perf_counter() - begun
     rank = BaseParameters.of(Observation(model, CLASSIC)).rank
-    result = RobotDynamics(estimate, rank, train, held_out, essential, friction, seconds, target)
+    result = RobotDynamics(estimate, rank, train, held_out, essential, friction, treatment, seconds, target)
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, result.document())
     return result
-
-
-def _treatment(model: RobotModel) -> Treatment:
-    """Cut-off and decimation as declared."""
-    declared = model.config.dynamics
-    if declared.cutoff_hz is None or declared.decimation is None:
-        raise InputError(
-            f"{model.path}: the cut-off and the decimation of the recordings are missing; declare them, for example "
-            "'dynamics: {cutoff_hz: 50, decimation: 10}'."
-        )
-    if model.payload is not None:
-        raise InputError(
-            f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
-        )
-    return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)

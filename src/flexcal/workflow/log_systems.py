@@ -9,18 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.data.filtering import Decimation
 from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Window, experiment_system
 from flexcal.progress import Progress, silent
-
-
-@dataclass(frozen=True)
-class Treatment:
-    """What is done to a log before its equations are written: low-pass of the positions, decimation, and whether standstill is masked."""
-
-    cutoff_hz: float
-    decimation: Decimation
-    mask_standstill: bool
+from flexcal.workflow.treatment import Treatment
 
 
 @dataclass(frozen=True, eq=False)
