@@ -83,7 +83,7 @@ def test_torques_that_the_fit_never_saw(
     assert error["train"] < essential["error_percent"]["train"] < 1.05 * error["train"]
     assert essential["error_percent"]["held_out"] < error["held_out"] + 0.2
     assert found["friction_terms"] == ["viscous", "coulomb", "torque_offset"]
-    assert (found["friction_tried"], found["friction_shapes"], found["warnings"]) == ([], {}, [])
+    assert (found["friction_tried"], found["friction_shapes"], found["remarks"]) == ([], {}, [])
     assert not (tx40 / "estimates.yaml").exists()
     assert json.loads((tmp_path / "out" / "results.json").read_text())["error_percent"] == error
 
@@ -127,7 +127,7 @@ def test_every_declared_term_is_in_the_estimate(tx40: Path, capsys: pytest.Captu
     }
     for i in range(1, 7):
         own = f"no recording tells joint_{i}.coulomb_asymmetry from "
-        (remark,) = (text for text in found["warnings"] if text.startswith(own))
+        (remark,) = (text for text in found["remarks"] if text.startswith(own))
         assert f"joint_{i}.torque_offset" in remark
     assert set(found["friction_shapes"]) == {"stribeck", "presliding", "warm_up"}
 

@@ -86,7 +86,7 @@ class IdentifyDynamics:
         console.say(
             f"{len(essential['parameters'])} essential parameters alone miss {essential['error_percent']['train']:.2f} %"
         )
-        for remark in document["warnings"]:
+        for remark in document["remarks"]:
             console.say(remark)
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"

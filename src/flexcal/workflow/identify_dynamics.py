@@ -80,7 +80,7 @@ class RobotDynamics:
                 {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
                 for t in self.friction.trials
             ],
-            "warnings": list(dynamics_remarks(self.train, self.estimate)),
+            "remarks": list(dynamics_remarks(self.train, self.estimate)),
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
