@@ -48,7 +48,10 @@ def run() -> list[tuple[str, float, str]]:
             robot = folder / f"decimated_by_{factor}.yaml"
             text = (EXAMPLE / "robot.yaml").read_text().partition("signals:")[0]
             robot.write_text(
-                text.replace("cutoff_hz: 100, decimation: 100", f"cutoff_hz: 50, decimation: {factor}")
+                text.replace(
+                    "cutoff_hz: 100, decimation: 100",
+                    f"cutoff_hz: 50, decimation: {factor}, friction: classic",
+                )
             )
             seconds, megabytes = _identified(robot, folder / "log.parquet", folder / f"out_{factor}")
             ours = seconds / SAMPLES * 1e6
@@ -58,9 +61,9 @@ def run() -> list[tuple[str, float, str]]:
                 (label + f"limit {MICROSECONDS:g} µs a sample", MICROSECONDS / ours, f"{ours:.2f} µs, file to intervals"),
                 (label + f"limit {MEGABYTES:g} MB", MEGABYTES / megabytes, f"{megabytes:.0f} MB"),
             ]  # fmt: skip
-        seconds, megabytes = _identified(
-            EXAMPLE / "robot.yaml", EXAMPLE / "exciting.parquet", folder / "tx40"
-        )
+        robot = Path(shutil.copytree(EXAMPLE, folder / "example")) / "robot.yaml"
+        robot.write_text(robot.read_text().replace("decimation: 100", "decimation: 100, friction: classic"))
+        seconds, megabytes = _identified(robot, EXAMPLE / "exciting.parquet", folder / "tx40")
         results += [
             (
                 f"TX40 file, limit {TX40_SECONDS} s",
@@ -107,7 +110,7 @@ def dense(observation: Observation, swing: Motion) -> np.ndarray:
             model, data, swing.q[k], swing.dq[k], swing.ddq[k]
         )
     for term in observation.terms:
-        for column in term.columns(observation.model, swing):
+        for column in term.columns(observation.model, swing, {}):
             matrix[:, column.joint, observation.names.index(column.name)] = column.values
     return np.linalg.lstsq(matrix.reshape(-1, matrix.shape[2]), swing.torque.ravel(), rcond=None)[0]
 

@@ -144,15 +144,16 @@ def test_the_robot_takes_the_estimate_and_a_second_run_gives_it_again(
 
 def test_what_robot_yaml_lacks_is_proposed(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The TX40's velocities reach 3 Hz; the proposal explains unseen torques about as well as what was chosen by hand."""
-    robot, line = tx40 / "robot.yaml", "dynamics: {cutoff_hz: 100, decimation: 100}"
+    robot = with_friction(tx40, "classic") / "robot.yaml"
+    line = "dynamics: {cutoff_hz: 100, decimation: 100, friction: classic}"
     declared = robot.read_text()
     assert identified(tx40, capsys)["signals"] == {"cutoff_hz": 100, "decimation": 100, "proposed": []}
-    robot.write_text(declared.replace(line, "dynamics: {decimation: 100}"))
+    robot.write_text(declared.replace(line, "dynamics: {decimation: 100, friction: classic}"))
     found = identified(tx40, capsys, "--hold-out", "last:0.3")
     assert found["signals"]["proposed"] == ["cutoff_hz"]
     assert 40 < found["signals"]["cutoff_hz"] < 100
     assert found["signals"]["decimation"] == 100
-    robot.write_text(declared.replace(line, ""))
+    robot.write_text(declared.replace(line, "dynamics: {friction: classic}"))
     log = str(tx40 / "exciting.parquet")
     assert main(["identify", "dynamics", str(robot), log, "--hold-out", "last:0.3", "--json"]) == 0
     out, err = capsys.readouterr()

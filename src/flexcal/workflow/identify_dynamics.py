@@ -194,8 +194,10 @@ def identify_robot_dynamics(
     target = source if out is None else out / ESTIMATES
     essential = essential_parameters(train, estimate)
     seconds = time.perf_counter() - begun
-    rank = BaseParameters.of(Observation(model, CLASSIC)).rank
-    result = RobotDynamics(estimate, rank, train, held_out, essential, friction, treatment, seconds, target)
+    classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
+    result = RobotDynamics(
+        estimate, classic.rank, train, held_out, essential, friction, treatment, seconds, target
+    )
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, result.document())
