@@ -106,7 +106,7 @@ class _Growing:
 
 def reduced(systems: list[np.ndarray]) -> np.ndarray:
     """R of systems [W, Y] (·, k + 1) stacked, or just the stack where that has no more rows than R would."""
-    stack = np.concatenate(systems)
+    stack = np.hstack([system.T for system in systems]).T
     return stack if len(stack) <= stack.shape[1] else triangular(stack)
 
 
