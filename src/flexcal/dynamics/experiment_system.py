@@ -60,13 +60,14 @@ def experiment_system(
         if mask_standstill:
             masked += int(block.still.sum())
             block = block.where(~block.still)
+        if not all(np.isfinite(system).all() for system in block.systems):
+            raise FlexcalError(f"the equations of {experiment.name} are not finite.")
         for part in _split(block, length):
             number = int(part.number[0]) // length
             if current is None or current.number != number:
                 found += [] if current is None else [current.batch()]
                 current = _Growing(number, len(part.systems))
-            if not current.add(part):
-                raise FlexcalError(f"the equations of {experiment.name} are not finite.")
+            current.add(part)
     found += [] if current is None else [current.batch()]
     if not found:
         raise FlexcalError(
@@ -84,16 +85,13 @@ class _Growing:
         self._held: list[list[np.ndarray]] = [[] for _ in range(joints)]
         self._waiting = 0
 
-    def add(self, part: Rows) -> bool:
-        """False where a number is not finite."""
+    def add(self, part: Rows) -> None:
         for held, system in zip(self._held, part.systems, strict=True):
             held.append(system.T)
         self._rows += len(part)
         self._waiting += len(part)
-        finite = all(bool(np.isfinite(held[-1]).all()) for held in self._held)
-        if finite and self._waiting >= _TOGETHER:
+        if self._waiting >= _TOGETHER:
             self._reduce()
-        return finite
 
     def batch(self) -> Batch:
         self._reduce()
