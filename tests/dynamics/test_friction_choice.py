@@ -135,6 +135,14 @@ def test_the_error_is_that_of_predicting_each_block_from_rows_apart_from_it(
     assert found < prediction_errors(blocks, fixed, [[]])[0]
 
 
+def test_one_block_teaches_nothing_about_itself(tx40: RobotModel, swing: Motion) -> None:
+    observation = Observation(tx40, CLASSIC)
+    motion = with_torques(tx40, (), swing, 0.0, 6)
+    system = experiment_system(observation, motion, Decimation(4), Window(), mask_standstill=True, batches=1)
+    with pytest.raises(FlexcalError, match="too short to choose friction by cross-validation"):
+        folds([system], observation.members, len(observation.names), [0], 10)
+
+
 def test_a_column_that_the_data_leave_at_zero_is_named(tx40: RobotModel, swing: Motion) -> None:
     """A joint that never moves has no friction to show, whatever terms are declared."""
     still = np.array([1, 1, 0, 1, 1, 1])

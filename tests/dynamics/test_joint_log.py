@@ -22,7 +22,8 @@ from flexcal.dynamics.rows import rows
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.progress import silent
-from flexcal.workflow.log_systems import Treatment, log_systems
+from flexcal.workflow.log_systems import log_systems
+from flexcal.workflow.treatment import Treatment
 
 STEP = 1 / 200
 

@@ -192,6 +192,37 @@ def test_a_triangle_is_its_system(rng: np.random.Generator) -> None:
     assert sigma == pytest.approx(np.linalg.norm(left) / np.sqrt(47), rel=1e-12)
 
 
+def test_triangles_solve_as_extended_precision_does(rng: np.random.Generator) -> None:
+    """A system of condition 1e6 in twelve parts, against Householder's QR in 80-bit floats."""
+    size, rows = 9, 600
+    left, right = (
+        np.linalg.qr(rng.normal(size=(rows, size)))[0],
+        np.linalg.qr(rng.normal(size=(size, size)))[0],
+    )
+    w = left * np.logspace(0, -6, size) @ right
+    y = w @ rng.normal(size=size) + 1e-9 * rng.normal(size=rows)
+    triangle = Triangle.of(w[:50], y[:50])
+    for start in range(50, rows, 50):
+        triangle = triangle + Triangle.of(w[start : start + 50], y[start : start + 50])
+    found = np.linalg.solve(triangle.matrix[:size], triangle.right[:size])
+    table = np.column_stack([w, y]).astype(np.longdouble)
+    for k in range(size):
+        v = table[k:, k].copy()
+        v[0] += np.copysign(np.sqrt(v @ v), v[0])
+        table[k:, k:] -= np.outer(v, 2 * (v @ table[k:, k:]) / (v @ v))
+    expected = np.zeros(size, dtype=np.longdouble)
+    for k in reversed(range(size)):
+        expected[k] = (table[k, -1] - table[k, k + 1 : size] @ expected[k + 1 :]) / table[k, k]
+    assert np.linalg.norm(found - expected) < 1e-9 * np.linalg.norm(expected)
+
+
+def test_what_is_not_finite_is_refused(observation: Observation, base: BaseParameters, clean: Motion) -> None:
+    torque = clean.torque.copy()
+    torque[70, 2] = np.nan
+    with pytest.raises(FlexcalError, match="the equations of the motion are not finite"):
+        observe(observation, base, [replace(clean, torque=torque)], Decimation(1))
+
+
 def test_too_few_rows_for_a_noise(observation: Observation, base: BaseParameters, motion: Motion) -> None:
     with pytest.raises(FlexcalError, match="do not tell its noise"):
         weighted_least_squares(observe(observation, base, [motion.part(0, 20)], Decimation(1)))

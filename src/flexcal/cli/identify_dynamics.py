@@ -68,6 +68,12 @@ class IdentifyDynamics:
             f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
+        signals = document["signals"]
+        if signals["proposed"]:
+            console.say(
+                f"proposed from the motion's spectrum, as robot.yaml lacks {' and '.join(signals['proposed'])}: "
+                f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
+            )
         if document["friction_tried"]:
             console.show(friction_table(document["friction_tried"]))
         console.say(f"friction: {', '.join(found.friction.labels)}")
@@ -86,7 +92,7 @@ class IdentifyDynamics:
                 f"no body can have the inertials of {', '.join(found.bodiless)}: they give torques, but carry no springs and "
                 "fit in no URDF; --estimator sdp finds bodies"
             )
-        for remark in document["warnings"]:
+        for remark in document["remarks"]:
             console.say(remark)
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"

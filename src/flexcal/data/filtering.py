@@ -31,6 +31,16 @@ class Decimation:
             raise FlexcalError(f"the decimation is {self.factor}; it must be 1 or more.")
         _ = self.stages
 
+    @classmethod
+    def near(cls, factor: float) -> Decimation:
+        """By the largest possible factor that is not above `factor`, or by 1."""
+        whole = max(1, int(factor))
+        while True:
+            try:
+                return cls(whole)
+            except FlexcalError:
+                whole -= 1
+
     @cached_property
     def stages(self) -> tuple[int, ...]:
         """Factors of at most 10 whose product is `factor`, the larger first."""

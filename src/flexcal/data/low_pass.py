@@ -56,15 +56,11 @@ class LowPass:
         impulse[2 * self.support + 1 :] = 0.0
         return length, np.fft.rfft(impulse / impulse.sum())
 
-    def extended(self, values: np.ndarray) -> np.ndarray:
-        """`values` (N, n) with `support` samples more at either end, turned about the end sample by half a turn.
-
-        Raises `FlexcalError` where there are too few samples for it.
-        """
-        return np.concatenate([self.before(values), values, self.before(values[::-1])[::-1]])
-
     def before(self, values: np.ndarray) -> np.ndarray:
-        """The `support` samples that precede `values` (N, n) then; raises `FlexcalError` where N is not above that."""
+        """The `support` samples that precede `values` (N, n) when they go on as they begin, turned about the first by half a turn.
+
+        Raises `FlexcalError` where N is not above the support.
+        """
         if len(values) <= self.support:
             raise FlexcalError(
                 f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {self.support + 1} are needed."

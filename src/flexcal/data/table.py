@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     import polars as pl
 
 BLOCK_BYTES = 64 * 2**20
+_DECODED = 100_000
+"""Rows of Parquet that are decoded together: to slice some, all of their row group is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,13 +98,15 @@ class TableFile:
             )
             start = 0
             while True:
-                frame = (scan if rows is None else scan.slice(start, rows)).collect()
-                if not len(frame):
+                decoded = scan if rows is None else scan.slice(start, max(1, _DECODED // rows) * rows)
+                frames = decoded.collect()
+                if not len(frames):
                     return
-                table = Table(self, 1 + start, _arrays(frame))
-                _check_finite(table, frame)
-                yield table
-                start += len(frame)
+                for frame in frames.iter_slices(rows or len(frames)):
+                    table = Table(self, 1 + start, _arrays(frame))
+                    _check_finite(table, frame)
+                    yield table
+                    start += len(frame)
                 if rows is None:
                     return
         except pl.exceptions.PolarsError as problem:

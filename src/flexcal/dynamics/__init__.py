@@ -25,8 +25,9 @@ from flexcal.dynamics.friction_library import (
 )
 from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
-from flexcal.dynamics.joint_log import JointLog
+from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
@@ -52,6 +53,7 @@ __all__ = [
     "JointLog",
     "LoadCoulomb",
     "Motion",
+    "MotionBandwidth",
     "Observation",
     "Presliding",
     "RegressionData",
@@ -69,6 +71,8 @@ __all__ = [
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
+    "log_blocks",
+    "motion_bandwidth",
     "observe",
     "ordinary_least_squares",
     "select_friction",

@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.dynamics.experiment_system import ExperimentSystem, reduced
 from flexcal.dynamics.triangle import Triangle
+from flexcal.errors import FlexcalError
 
 FOLDS = 10
 _RANK = 1e-9
@@ -36,7 +37,7 @@ def folds(
     """Blocks of about as many rows that follow each other; `purge_rows` to either side of a block train nothing when it is the test.
 
     `members` are the numbers of every joint's columns among all `columns`. The noise of a joint is what its columns among `weigh_by`
-    leave of its torques outside the block.
+    leave of its torques outside the block. Raises `FlexcalError` where no block leaves others to learn from.
     """
     pieces = _pieces(systems, purge_rows)
     result = []
@@ -52,6 +53,10 @@ def folds(
                 own.append(_wide(inside, numbers, columns))
                 other.append(_wide(outside / sigma, numbers, columns))
             result.append(Fold(reduced(other), reduced(own)))
+    if not result:
+        raise FlexcalError(
+            "the recordings are too short to choose friction by cross-validation; record for longer, or declare 'friction: classic'."
+        )
     return result
 
 

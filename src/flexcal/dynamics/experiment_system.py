@@ -70,13 +70,14 @@ def experiment_system(
         if len(block):
             first = min(first, float(block.time[0]))
             last = float(block.time[-1])
+        if not all(np.isfinite(system).all() for system in block.systems):
+            raise FlexcalError(f"the equations of {experiment.name} are not finite.")
         for part in _split(block, length):
             number = int(part.number[0]) // length
             if current is None or current.number != number:
                 found += [] if current is None else [current.batch()]
                 current = _Growing(number, len(part.systems))
-            if not current.add(part):
-                raise FlexcalError(f"the equations of {experiment.name} are not finite.")
+            current.add(part)
     found += [] if current is None else [current.batch()]
     if not found:
         raise FlexcalError(
@@ -94,16 +95,13 @@ class _Growing:
         self._held: list[list[np.ndarray]] = [[] for _ in range(joints)]
         self._waiting = 0
 
-    def add(self, part: Rows) -> bool:
-        """False where a number is not finite."""
+    def add(self, part: Rows) -> None:
         for held, system in zip(self._held, part.systems, strict=True):
             held.append(system.T)
         self._rows += len(part)
         self._waiting += len(part)
-        finite = all(bool(np.isfinite(held[-1]).all()) for held in self._held)
-        if finite and self._waiting >= _TOGETHER:
+        if self._waiting >= _TOGETHER:
             self._reduce()
-        return finite
 
     def batch(self) -> Batch:
         self._reduce()
@@ -116,7 +114,7 @@ class _Growing:
 
 def reduced(systems: list[np.ndarray]) -> np.ndarray:
     """R of systems [W, Y] (·, k + 1) stacked, or just the stack where that has no more rows than R would."""
-    stack = np.concatenate(systems)
+    stack = np.hstack([system.T for system in systems]).T
     return stack if len(stack) <= stack.shape[1] else triangular(stack)
 
 

@@ -22,7 +22,7 @@ _ROWS = 20_000
 class JointLog:
     """The log at `path` of a robot, its positions low-pass filtered at `cutoff_hz`.
 
-    Reading raises `InputError` as `read_recording` does, and for a gap; filtering raises `FlexcalError` as `filtered_motion` does.
+    Reading raises `InputError` as `log_blocks` does; filtering raises `FlexcalError` as `filtered_motion` does.
     """
 
     path: Path
@@ -56,14 +56,14 @@ class JointLog:
 
     def blocks(self) -> Iterator[Motion]:
         """The filtered motion in parts that follow each other."""
-        return filtered_motion(self._recordings(), self.cutoff_hz)
+        return filtered_motion(log_blocks(self.path, self.model), self.cutoff_hz)
 
     @cached_property
     def _summary(self) -> tuple[int, np.ndarray, tuple[float, float], float]:
         read: list[tuple[float, float, float]] = []
 
         def watched() -> Iterator[Recording]:
-            for recording in self._recordings():
+            for recording in log_blocks(self.path, self.model):
                 read.append((recording.start, recording.start + recording.duration, recording.time_step))
                 yield recording
 
@@ -73,12 +73,14 @@ class JointLog:
             top_speed = np.maximum(top_speed, np.abs(motion.dq).max(axis=0, initial=0.0))
         return samples, top_speed, (read[0][0], read[-1][1]), read[0][2]
 
-    def _recordings(self) -> Iterator[Recording]:
-        for recording in read_recording_blocks(self.path, self.model, rows=_ROWS):
-            base = recording.time_base
-            if base is not None and base.gap > 0:
-                raise InputError(
-                    f"{self.path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
-                    f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
-                )
-            yield recording
+
+def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
+    """The recording of a log in parts that follow each other; raises `InputError` as `read_recording` does, and for a gap."""
+    for recording in read_recording_blocks(path, model, rows=_ROWS):
+        base = recording.time_base
+        if base is not None and base.gap > 0:
+            raise InputError(
+                f"{path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
+                f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
+            )
+        yield recording

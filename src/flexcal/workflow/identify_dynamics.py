@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any, Literal
 
 from flexcal.data import provenance, read_estimates
-from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
@@ -32,9 +31,10 @@ from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
-from flexcal.workflow.log_systems import LogSystem, Treatment, log_systems
+from flexcal.workflow.log_systems import LogSystem, log_systems
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.treatment import Treatment, treatment_of
 
 EstimatorName = Literal["wls", "ols", "sdp"]
 
@@ -55,6 +55,7 @@ class RobotDynamics:
     held_out: RegressionData | None
     essential: EssentialParameters
     friction: FrictionSelection
+    treatment: Treatment
     seconds: float
     estimates: Path
 
@@ -81,13 +82,18 @@ class RobotDynamics:
             "masked_rows": self.train.masked,
             "error_percent": percent,
             "bodiless_links": list(self.bodiless),
+            "signals": {
+                "cutoff_hz": self.treatment.cutoff_hz,
+                "decimation": self.treatment.decimation.factor,
+                "proposed": list(self.treatment.proposed),
+            },
             "friction_terms": list(self.friction.names),
             "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
             "friction_tried": [
                 {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
                 for t in self.friction.trials
             ],
-            "warnings": list(dynamics_remarks(self.train, self.estimate)),
+            "remarks": list(dynamics_remarks(self.train, self.estimate)),
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
@@ -154,14 +160,18 @@ def identify_robot_dynamics(
     Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where the logs do not fit the
-    robot, and where robot.yaml lacks the cut-off or the decimation or declares a payload; nothing is written then.
+    robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
-    treatment = _treatment(model)
+    if model.payload is not None:
+        raise InputError(
+            f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
+        )
+    treatment = treatment_of(model, logs)
 
     def systems(observation: Observation) -> list[LogSystem]:
         return log_systems(
@@ -197,24 +207,11 @@ def identify_robot_dynamics(
     target = source if out is None else out / ESTIMATES
     essential = essential_parameters(train, estimate)
     seconds = time.perf_counter() - begun
-    rank = BaseParameters.of(Observation(model, CLASSIC)).rank
-    result = RobotDynamics(estimate, rank, train, held_out, essential, friction, seconds, target)
+    classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
+    result = RobotDynamics(
+        estimate, classic.rank, train, held_out, essential, friction, treatment, seconds, target
+    )
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
         write_results(out, result.document())
     return result
-
-
-def _treatment(model: RobotModel) -> Treatment:
-    """Cut-off and decimation as declared."""
-    declared = model.config.dynamics
-    if declared.cutoff_hz is None or declared.decimation is None:
-        raise InputError(
-            f"{model.path}: the cut-off and the decimation of the recordings are missing; declare them, for example "
-            "'dynamics: {cutoff_hz: 50, decimation: 10}'."
-        )
-    if model.payload is not None:
-        raise InputError(
-            f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
-        )
-    return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)

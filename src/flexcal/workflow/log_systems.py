@@ -9,18 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.data.filtering import Decimation
 from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Window, experiment_system
 from flexcal.progress import Progress, silent
-
-
-@dataclass(frozen=True)
-class Treatment:
-    """What is done to a log before its equations are written: low-pass of the positions, decimation, and whether standstill is masked."""
-
-    cutoff_hz: float
-    decimation: Decimation
-    mask_standstill: bool
+from flexcal.workflow.treatment import Treatment
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,14 +38,10 @@ def log_systems(
     `batches`. Raises `InputError` and `FlexcalError` as `JointLog` and `experiment_system` do.
     """
     if jobs == 1:
-        found = []
-        for number, log in enumerate(logs):
-
-            def within(stage: str, share: float, number: int = number) -> None:
-                progress(stage, (number + share) / len(logs))
-
-            found.append(_log_system(log, observation, treatment, hold_out, batches, within))
-        return found
+        return [
+            _log_system(log, observation, treatment, hold_out, batches, _onward(progress, number, len(logs)))
+            for number, log in enumerate(logs)
+        ]
     from joblib import Parallel, delayed
 
     parts = Parallel(n_jobs=jobs, return_as="generator")(
@@ -66,6 +53,18 @@ def log_systems(
         found.append(part)
         progress("reading", len(found) / len(logs))
     return found
+
+
+def _onward(progress: Progress, number: int, logs: int) -> Progress:
+    """Tells how much of all logs is done from how much of this one is; a second pass over it takes nothing back."""
+    reached = number / logs
+
+    def within(stage: str, share: float) -> None:
+        nonlocal reached
+        reached = max(reached, (number + share) / logs)
+        progress(stage, reached)
+
+    return within
 
 
 def _log_system(

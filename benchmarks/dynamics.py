@@ -1,0 +1,134 @@
+"""Logs to base parameters with intervals, against a Pinocchio loop with NumPy's lstsq; processor time and peak memory.
+
+The peer builds one dense matrix of all joints' rows, which a long log does not allow: it is timed on a short one, by the sample.
+"""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+
+from flexcal.data import Recording, write_recording
+from flexcal.dynamics import CLASSIC, Motion, Observation
+from flexcal.model import RobotModel
+
+EXAMPLE = Path(__file__).parents[1] / "examples" / "tx40"
+SAMPLES, SHORT, RATE_HZ = 1_000_000, 10_000, 1000.0
+NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
+_WATCH = """
+import os, subprocess, sys
+process = subprocess.Popen(sys.argv[1:], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+_, status, usage = os.wait4(process.pid, 0)
+print(usage.ru_utime + usage.ru_stime, usage.ru_maxrss)
+sys.exit(status != 0)
+"""
+"""Run by a process of its own, as a child's peak memory begins with that of its parent."""
+MICROSECONDS, MEGABYTES = 4.0, 300.0
+TX40_SECONDS, TX40_MEGABYTES = 0.8, 250.0
+
+
+def run() -> list[tuple[str, float, str]]:
+    """Limit over measured, and the peer's time over ours."""
+    observation = Observation(RobotModel.from_yaml(EXAMPLE / "robot.yaml", estimates=False), CLASSIC)
+    results = []
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        shutil.copy(EXAMPLE / "tx40.urdf", folder)
+        swing = motion(observation, np.arange(SHORT))
+        peer = min(_seconds(lambda: dense(observation, swing)) for _ in range(3)) / SHORT * 1e6
+        write_recording(folder / "log.parquet", long_log(observation))
+        for factor in (1, 10):
+            robot = folder / f"decimated_by_{factor}.yaml"
+            text = (EXAMPLE / "robot.yaml").read_text().partition("signals:")[0]
+            robot.write_text(
+                text.replace(
+                    "cutoff_hz: 100, decimation: 100",
+                    f"cutoff_hz: 50, decimation: {factor}, friction: classic",
+                )
+            )
+            seconds, megabytes = _identified(robot, folder / "log.parquet", folder / f"out_{factor}")
+            ours = seconds / SAMPLES * 1e6
+            label = f"1e6 samples, decimated by {factor}: "
+            results += [
+                (label + "Pinocchio loop, dense lstsq", peer / ours, f"{peer:.1f} µs a sample, ours {ours:.2f}"),
+                (label + f"limit {MICROSECONDS:g} µs a sample", MICROSECONDS / ours, f"{ours:.2f} µs, file to intervals"),
+                (label + f"limit {MEGABYTES:g} MB", MEGABYTES / megabytes, f"{megabytes:.0f} MB"),
+            ]  # fmt: skip
+        robot = Path(shutil.copytree(EXAMPLE, folder / "example")) / "robot.yaml"
+        robot.write_text(robot.read_text().replace("decimation: 100", "decimation: 100, friction: classic"))
+        seconds, megabytes = _identified(robot, EXAMPLE / "exciting.parquet", folder / "tx40")
+        results += [
+            (
+                f"TX40 file, limit {TX40_SECONDS} s",
+                TX40_SECONDS / seconds,
+                f"{seconds:.2f} s of one processor, whole process",
+            ),
+            (f"TX40 file, limit {TX40_MEGABYTES:g} MB", TX40_MEGABYTES / megabytes, f"{megabytes:.0f} MB"),
+        ]
+    return results
+
+
+def motion(observation: Observation, number: np.ndarray) -> Motion:
+    """Samples of that number of a motion on sums of sines, with the torques of unit friction and noise."""
+    rng = np.random.default_rng(7)
+    rate = 2 * np.pi * 0.1 * np.array([1, 2, 3, 5, 7])
+    size, phase = rng.normal(size=(5, 6)), rng.uniform(0, 2 * np.pi, (5, 6))
+    angle = (number / RATE_HZ)[:, None, None] * rate[:, None] + phase
+    q = np.sum(size * np.sin(angle), axis=1)
+    dq = np.sum(size * rate[:, None] * np.cos(angle), axis=1)
+    ddq = -np.sum(size * rate[:, None] ** 2 * np.sin(angle), axis=1)
+    still = Motion(number / RATE_HZ, q, dq, ddq, np.zeros_like(q))
+    x = np.where(observation.values() == 0, 1.0, observation.values())
+    columns = observation.columns(still)
+    torque = np.stack([x[m] @ c for m, c in zip(observation.members, columns, strict=True)], axis=1)
+    torque += NOISE * np.random.default_rng(int(number[0])).normal(size=torque.shape)
+    return Motion(still.time, q, dq, ddq, torque)
+
+
+def long_log(observation: Observation) -> Recording:
+    """A thousand seconds of it."""
+    parts = [motion(observation, np.arange(a, a + SHORT)) for a in range(0, SAMPLES, SHORT)]
+    whole = Motion.joined(parts)
+    return Recording(time_step=1 / RATE_HZ, q=whole.q, torque=whole.torque)
+
+
+def dense(observation: Observation, swing: Motion) -> np.ndarray:
+    """As one writes it first: Pinocchio's regressor sample by sample, drive columns beside it, one least-squares solution."""
+    model = pin.buildModelFromUrdf(str(EXAMPLE / "tx40.urdf"))
+    data = model.createData()
+    n, inertial = observation.model.n, 10 * observation.model.n
+    matrix = np.zeros((len(swing), n, len(observation.names)))
+    for k in range(len(swing)):
+        matrix[k, :, :inertial] = pin.computeJointTorqueRegressor(
+            model, data, swing.q[k], swing.dq[k], swing.ddq[k]
+        )
+    for term in observation.terms:
+        for column in term.columns(observation.model, swing, {}):
+            matrix[:, column.joint, observation.names.index(column.name)] = column.values
+    return np.linalg.lstsq(matrix.reshape(-1, matrix.shape[2]), swing.torque.ravel(), rcond=None)[0]
+
+
+def _identified(robot: Path, log: Path, out: Path) -> tuple[float, float]:
+    """Seconds of one processor and peak megabytes of `flexcal identify dynamics` as a process, start-up included."""
+    command = [sys.executable, "-m", "flexcal.cli.main", "identify", "dynamics", str(robot), str(log)]
+    watched = subprocess.run(
+        [sys.executable, "-c", _WATCH, *command, "--out", str(out)],
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    seconds, kilobytes = watched.stdout.split()
+    return float(seconds), float(kilobytes) / 1024
+
+
+def _seconds(work) -> float:
+    started = time.process_time()
+    work()
+    return time.process_time() - started

@@ -1,0 +1,53 @@
+"""What is done to a log before its equations are written: as robot.yaml declares it, else as the motion asks for."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import log_blocks, motion_bandwidth
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+
+_PASSED = 20.0
+"""Cut-off, and rows a second, over the bandwidth of the motion: ten times twice of it, as products of two velocities reach twice as far."""
+_HIGHEST = 0.4
+"""Cut-off over the sampling rate, at most."""
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """Low-pass of the positions, decimation, and whether standstill is masked; `proposed` names what robot.yaml lacks."""
+
+    cutoff_hz: float
+    decimation: Decimation
+    mask_standstill: bool
+    proposed: tuple[str, ...] = ()
+
+
+def treatment_of(model: RobotModel, logs: Sequence[Path]) -> Treatment:
+    """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
+
+    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities. Raises `InputError` where a log that is
+    needed for it shows no motion.
+    """
+    declared = model.config.dynamics
+    if declared.cutoff_hz is not None and declared.decimation is not None:
+        return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
+    found = [motion_bandwidth(log_blocks(log, model)) for log in logs]
+    for log, motion in zip(logs, found, strict=True):
+        if motion.frequency_hz == 0:
+            raise InputError(
+                f"{log}: the positions show no motion above their noise; record a motion that excites all joints."
+            )
+    rate = min(motion.rate_hz for motion in found)
+    wanted = min(_PASSED * max(motion.frequency_hz for motion in found), _HIGHEST * rate)
+    proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
+    return Treatment(
+        float(f"{wanted:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
+        Decimation.near(rate / wanted) if declared.decimation is None else Decimation(declared.decimation),
+        declared.mask_standstill,
+        proposed,
+    )
