@@ -79,12 +79,13 @@ def cramer_rao(study: TwoStageStudy) -> np.ndarray:
     """Standard deviations (p,) of stage 1 that noise, distortion and the priors of inertias and geometry allow."""
     estimate, responses = study.stiffness.estimate, study.responses
     x = estimate.parameters.coordinates()
-    model = ResponseModel.of(study.nominal, responses, estimate.parameters).with_open_gaps(x, study.plan)
+    model = ResponseModel.of(study.informed, responses, estimate.parameters).with_open_gaps(x, study.plan)
     residual = StageOneResidual.of(model, responses, CovarianceWeighting())
     geometry = replace(Tolerances.none(), length=Tolerances.length, angle=Tolerances.angle)
     still = [ExperimentEffect.none(response) for response in responses]
     jacobian = ModelError.of(residual, responses, x, still, geometry).whiten(residual.linearise(x)[1])
-    information = jacobian.T @ jacobian + estimate.parameters.prior_information()
+    prior = study.informed.posterior.prior(estimate.parameters)[1]
+    information = jacobian.T @ jacobian + np.linalg.inv(prior)
     return np.sqrt(np.diag(np.linalg.inv(information)))
 
 

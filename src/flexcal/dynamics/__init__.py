@@ -14,6 +14,7 @@ from flexcal.dynamics.drive_terms import (
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.regression import RegressionData, Subsystem, Window, observe
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
@@ -34,6 +35,7 @@ __all__ = [
     "Triangle",
     "Viscous",
     "Window",
+    "identify_with_prior",
     "observe",
     "ordinary_least_squares",
     "weighted_least_squares",

@@ -11,8 +11,8 @@ from flexcal.atomic import write_text
 from flexcal.calibration import ErrorStatistics
 from flexcal.export.urdf import UrdfExport
 from flexcal.model.names import SPRINGS
-from flexcal.report.study import TwoStageStudy
-from flexcal.workflow.results import identifiability_block
+from flexcal.report.study import CadAlone, TwoStageStudy
+from flexcal.workflow.results import identifiability_block, quantities
 
 
 def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, Any]:
@@ -33,6 +33,8 @@ def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, 
     measured = study.measured_verification
     rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(study.rigid, study.rigid_verification, strict=True)}
     return {
+        "dynamics": None if study.dynamics is None else {"parameters": quantities(study.dynamics, truth)},
+        "cad_alone": None if study.cad_alone is None else _cad_alone(study, study.cad_alone),
         "stage1": stage_one
         | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
         "identifiability": identifiability_block(study.calibration.identifiability),
@@ -62,6 +64,22 @@ def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, 
         "seed": study.seed,
         "plan": study.plan.name,
         "command": study.command,
+    }
+
+
+def _cad_alone(study: TwoStageStudy, cad: CadAlone) -> dict[str, Any]:
+    return {
+        "stage1": {
+            "stiffness": {
+                name: cad.stiffness.quantity(name, (study.truth or {}).get(name))
+                for name in study.springs("stiffness")
+            }
+        },
+        "calibration": cad.calibration.errors.in_millimetres(),
+        "verification": {
+            "elastic": cad.verification.all.in_millimetres(),
+            "elastic_unambiguous": cad.verification.unambiguous.in_millimetres(),
+        },
     }
 
 

@@ -1,0 +1,72 @@
+"""Link inertials, rotors and friction from periodic exciting trajectories, with CAD as the prior: Bayesian weighted least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.data import Recording, TrajectoryPlan
+from flexcal.dynamics.noise_bands import NoiseBands
+from flexcal.dynamics.periodic_motion import PeriodicMotion
+from flexcal.dynamics.trajectory_rows import TrajectoryRows, unknowns
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate, Problem, solve
+from flexcal.model import RobotModel
+
+CUTOFF_HZ = 5.0
+"""Highest line that is used: half the first resonance of a large arm, ten times the highest harmonic of a trajectory."""
+ROUNDS = 2
+"""How often the torques are linearised about the last estimate: masses multiply centres of mass, and springs yield to both."""
+NOISE_PASSES = 4
+"""How often the noise is read from the residual of a fit that was weighed with it."""
+
+
+def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> Estimate:
+    """Posterior of mass, centre of mass, rotor inertia and friction of a robot from a plan's recordings.
+
+    The rows are Fourier coefficients of the motor torques of one mean period (Swevers 1997). The prior is that of robot.yaml; beside the
+    parameters, springs and geometry are unknown to their tolerances and marginalised. The weights are from the residual's own
+    spectrum, joint by joint, so that its autocorrelation is accounted for. Raises `FlexcalError` where a rotor inertia is missing or a
+    recording does not fit the plan.
+    """
+    motions = [PeriodicMotion.of(recording, plan, CUTOFF_HZ) for recording in recordings]
+    if not motions:
+        raise FlexcalError("there is no recording of a trajectory to identify from; give at least one.")
+    parameters, own = unknowns(model)
+    rows = TrajectoryRows.about(model, parameters, motions, plan.payload)
+    estimate, sigma = _weighed(rows, rows.first_sigma())
+    for _ in range(ROUNDS - 1):
+        rows = TrajectoryRows.about(model, estimate.parameters, motions, plan.payload)
+        estimate, sigma = _weighed(rows, sigma)
+    return _marginal(estimate, own)
+
+
+def _weighed(rows: TrajectoryRows, sigma: np.ndarray) -> tuple[Estimate, np.ndarray]:
+    """Fit and noise (2 K + 1, n) that agree with each other."""
+    estimate = _fit(rows, sigma)
+    for _ in range(NOISE_PASSES):
+        sigma = NoiseBands.of(rows, estimate, sigma).sigma
+        estimate = _fit(rows, sigma)
+    return estimate, sigma
+
+
+def _fit(rows: TrajectoryRows, sigma: np.ndarray) -> Estimate:
+    about = rows.parameters.coordinates()
+    right = (rows.residual / sigma).ravel()
+    slope = -(rows.jacobian / sigma[:, :, None]).reshape(right.size, -1)
+    return solve(Problem(rows.parameters, lambda x: (right + slope @ (x - about), slope)))
+
+
+def _marginal(estimate: Estimate, names: tuple[str, ...]) -> Estimate:
+    """The estimate of some parameters, the others integrated out."""
+    numbers = [estimate.parameters.index(name) for name in names]
+    return replace(
+        estimate,
+        parameters=estimate.parameters.subset(names),
+        covariance=estimate.marginal(names)[1],
+        rank=len(names) - sum(entry.name in names for entry in estimate.dropped),
+        dropped=tuple(entry for entry in estimate.dropped if entry.name in names),
+        identifiable=tuple(estimate.identifiable[number] for number in numbers),
+    )
