@@ -12,6 +12,7 @@ from flexcal.model import RobotModel
 from flexcal.model.declared import declared, uncertain_inertials
 from flexcal.model.names import SPRINGS
 
+
 @dataclass(frozen=True, eq=False)
 class ElasticPrior:
     """Stiffness, inertia and payload parameters that deflection depends on, and their joint covariance (estimation coordinates)."""

@@ -37,7 +37,10 @@ def rigid_inverse_dynamics(
     ddq: np.ndarray,
     payload: float | None = None,
 ) -> np.ndarray:
-    """Motor torque (N, n) N m that moves the rigid robot with its payload (kg, None: the declared) by any motion `q`, `dq`, `ddq` (N, n)."""
+    """Motor torque (N, n) N m that moves the rigid robot by any motion `q`, `dq`, `ddq` (N, n), with friction.
+
+    `payload` in kg, None for the declared.
+    """
     bodies = carried_inertias(model, payload)
     loaded = replace(
         model,

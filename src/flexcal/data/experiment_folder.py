@@ -52,7 +52,8 @@ def existing_file(folder: Path, name: str) -> Path:
 
 
 def write_recordings(
-    folder: str | Path, plan: MultisinePlan | TrajectoryPlan,
+    folder: str | Path,
+    plan: MultisinePlan | TrajectoryPlan,
     recordings: Iterable[Recording],
     *,
     ending: str = ".parquet",

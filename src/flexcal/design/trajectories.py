@@ -13,7 +13,7 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
 from flexcal.model.declared import declared, uncertain_inertials
 
-BASE_FREQUENCY_HZ = 0.1
+BASE_FREQUENCY_HZ = 0.2
 HARMONICS = 5
 PERIODS, SETTLE_PERIODS = 3, 1
 SPEED, EFFORT = 0.8, 0.8
@@ -88,7 +88,9 @@ class Candidate:
         fastest = np.array([joint.velocity for joint in model.joints])
         sine, cosine = rng.standard_normal((2, model.n, HARMONICS))
         q, dq, _ = _series(sine, cosine)
-        allowed = np.minimum(RANGE * (upper - lower) / np.ptp(q, axis=0), SPEED * fastest / np.abs(dq).max(axis=0))
+        allowed = np.minimum(
+            RANGE * (upper - lower) / np.ptp(q, axis=0), SPEED * fastest / np.abs(dq).max(axis=0)
+        )
         scale = (allowed * rng.uniform(0.3, 1.0, model.n))[:, None]
         sine, cosine = scale * sine, scale * cosine
         q, dq, ddq = _series(sine, cosine)
@@ -105,14 +107,16 @@ class Candidate:
         return bool((np.abs(torque) <= EFFORT * efforts).all() and not checker.collides(q).any())
 
     def information(self, model: RobotModel, directions: np.ndarray) -> np.ndarray:
-        """Information (p, p) on the unknowns in units of their prior, free friction eliminated; `directions` (10 n, p - n) are the links'."""
+        """Information (p, p) on the unknowns in units of their prior, free friction eliminated; see `_directions` for (10 n, p - n)."""
         q, dq, ddq = self.motion
         efforts = _TORQUE_ERROR * np.array([joint.effort for joint in model.joints])
         links = torque_regressor(model, q, dq, ddq) @ directions
         rows = []
         for joint in range(model.n):
             rotor = np.zeros((len(q), model.n))
-            rotor[:, joint] = model.prior.rotor_inertia * np.nan_to_num(model.rotor_inertia[joint]) * ddq[:, joint]
+            rotor[:, joint] = (
+                model.prior.rotor_inertia * np.nan_to_num(model.rotor_inertia[joint]) * ddq[:, joint]
+            )
             friction = np.column_stack([dq[:, joint], np.sign(dq[:, joint]), np.ones(len(q))])
             basis = np.linalg.qr(friction)[0]
             wanted = np.hstack([links[:, joint], rotor]) / efforts[joint]

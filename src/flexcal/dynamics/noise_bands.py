@@ -25,7 +25,9 @@ class NoiseBands:
         x, about = estimate.parameters.coordinates(), rows.parameters.coordinates()
         squares = np.sum((rows.residual - rows.jacobian @ (x - about)) ** 2, axis=0)
         white = rows.jacobian / weighed[:, :, None]
-        free = np.sum(1.0 - np.einsum("tkjp,pr,tkjr->tkj", white, estimate.covariance, white, optimize=True), axis=0)
+        free = np.sum(
+            1.0 - np.einsum("tkjp,pr,tkjr->tkj", white, estimate.covariance, white, optimize=True), axis=0
+        )
         band = (rows.lines - (rows.lines > 0)) // _LINES
         sigma = np.empty_like(squares)
         for number in np.unique(band):

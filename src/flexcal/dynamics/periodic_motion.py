@@ -66,4 +66,4 @@ class PeriodicMotion:
 def real_rows(coefficients: np.ndarray) -> np.ndarray:
     """(K + 1, …) complex coefficients to (2 K + 1, …) real ones: the mean, then √2 times real and imaginary parts."""
     above = np.sqrt(2.0) * coefficients[1:]
-    return np.concatenate([coefficients[:1].real, above.real, above.imag])
+    return np.concatenate([np.real(coefficients[:1]), np.real(above), np.imag(above)])

@@ -32,7 +32,9 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     These are mass and centre of mass of every link, and the terms of the drives; the others are spring stiffnesses, geometric errors and
     what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
     """
-    lacking = [name for name, value in zip(model.joint_names, model.rotor_inertia, strict=True) if not value > 0]
+    lacking = [
+        name for name, value in zip(model.joint_names, model.rotor_inertia, strict=True) if not value > 0
+    ]
     if lacking:
         raise FlexcalError(
             f"{model.path} gives {lacking[0]} no rotor inertia, which the prior is about; add `drives: {{rotor_inertia: […]}}`."

@@ -144,13 +144,11 @@ def _fit(
     return _widened(fitted, robust, inflation, problem.prior_rows())
 
 
-def _widened(
-    fitted: Estimate, robust: Estimate | None, inflation: float, prior_rows: np.ndarray
-) -> Estimate:
+def _widened(fitted: Estimate, robust: Estimate | None, inflation: float, prior_rows: np.ndarray) -> Estimate:
     """The covariance for measurements whose variance is `inflation` times what weighs them.
 
-    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L. Every standard deviation is then raised by
-    the sandwich's or the reduced χ², where these are larger than the weights say.
+    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L. Every standard deviation
+    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say.
     """
     posterior = fitted.covariance
     from_prior = prior_rows @ posterior

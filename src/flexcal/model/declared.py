@@ -28,8 +28,8 @@ def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
 def declared(model: RobotModel, name: str) -> Parameter:
     """A parameter at the model's value, with what robot.yaml and workshop tolerances say of it as its prior.
 
-    Mass, rotor inertia and stiffness are estimated as logarithms. A link's inertia about its centre of mass goes with its mass, so it has no
-    prior of its own. Friction and torque offset have none.
+    Mass, rotor inertia and stiffness are estimated as logarithms. A link's inertia about its centre of mass goes with its mass and has no
+    prior of its own; friction and torque offset have none at all.
     """
     value, key = model.value(name), name.rpartition(".")[2]
     std = _std(model, name, key)

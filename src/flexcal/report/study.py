@@ -34,10 +34,11 @@ class TwoStageStudy:
     """One robot, both stages, and how they were checked.
 
     `nominal` is the robot of the data sheet; `informed` what both stages start from, with the inertials `dynamics` that trajectories
-    identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds fits of the same robot without
-    elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on `verification_poses` are against the
-    noise-free truth where `truth` is known, otherwise against the instrument; `measured_verification` is against the instrument, on
-    `measured_poses`. `floor` is the error that would remain with every parameter known. `truth` maps parameter names to SI values.
+    identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds
+    fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
+    `verification_poses` are against the noise-free truth where `truth` is known, otherwise against the instrument;
+    `measured_verification` is against the instrument, on `measured_poses`. `floor` is the error that would remain with every parameter
+    known. `truth` maps parameter names to SI values.
     `results` is the document of results.json, `seconds` durations by stage.
     """
 

@@ -33,7 +33,7 @@ VIRTUAL = "virtual"
 
 @dataclass(frozen=True)
 class Measurement:
-    """What lies in `folder`: joint logs of a frequency experiment or of trajectories, or measured poses, by a plan of this kind and name."""
+    """What lies in `folder`: joint logs of an experiment, or measured poses, by a plan of this kind and name."""
 
     folder: Path
     kind: str

@@ -140,12 +140,6 @@ def run_two_stage(
     stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, calibration.estimate)
     calibration = replace(calibration, estimate=stored)
     exported = write_urdf(calibration.model, out / "calibrated.urdf")
-    cad_alone = None
-    if dynamics is not None:
-        with watch.stage("cad_alone"):
-            refound = stage_one(nominal, "cad_alone")
-            refitted = calibrate(nominal.with_estimate(refound.estimate), measured)
-            progress("cad_alone", 1.0)
     with watch.stage("verification"):
         progress("verification", 0.0)
         seen = cell.measure(anywhere)
@@ -153,14 +147,11 @@ def run_two_stage(
         known = read_truth(hidden)
         exact = replace(seen, position=cell.noise_free(anywhere))
         floor = exact.position - predict(nominal.with_values(known), exact).position
-        if dynamics is not None:
-            cad_alone = CadAlone(refound, refitted, verify(refitted.model, exact))
         registered = register(nominal, measured, predict(nominal, measured, elastic=False).position)
         study = TwoStageStudy(
             nominal=nominal,
             informed=believed,
             dynamics=dynamics,
-            cad_alone=cad_alone,
             plan=frequency,
             responses=responses,
             stiffness=stiffness,
@@ -182,6 +173,12 @@ def run_two_stage(
             + ("" if truth is None else f" --truth {truth.name}"),
         )
         progress("verification", 1.0)
+    if dynamics is not None:
+        with watch.stage("cad_alone"):
+            springs = stage_one(nominal, "cad_alone")
+            fitted = calibrate(nominal.with_estimate(springs.estimate), measured)
+            study = replace(study, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact)))
+            progress("cad_alone", 1.0)
     study = replace(study, results=two_stage_document(study, exported))
     with watch.stage("report"):
         progress("report", 0.0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.atomic import write_text
 from flexcal.calibration import ErrorStatistics
+from flexcal.estimation import Estimate
 from flexcal.export.urdf import UrdfExport
 from flexcal.model.names import SPRINGS
 from flexcal.report.study import CadAlone, TwoStageStudy
@@ -19,17 +20,7 @@ def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, 
     """The content of results.json."""
     truth = study.truth or {}
     estimate = study.stiffness.estimate
-    stage_one: dict[str, dict[str, Any]] = {}
-    for kind in ("stiffness", "damping"):
-        stage_one[kind] = {
-            joint.name: {
-                SPRINGS[c]: estimate.quantity(
-                    f"{joint.name}.{SPRINGS[c]}.{kind}", truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
-                )
-                for c in joint.components
-            }
-            for joint in study.nominal.elastic
-        }
+    stage_one = {kind: _springs(study, estimate, kind) for kind in ("stiffness", "damping")}
     measured = study.measured_verification
     rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(study.rigid, study.rigid_verification, strict=True)}
     return {
@@ -68,18 +59,29 @@ def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, 
 
 
 def _cad_alone(study: TwoStageStudy, cad: CadAlone) -> dict[str, Any]:
+    """The numbers of both stages without stage 0, under the names of the run's own."""
+    kinds = ("stiffness", "damping")
     return {
-        "stage1": {
-            "stiffness": {
-                name: cad.stiffness.quantity(name, (study.truth or {}).get(name))
-                for name in study.springs("stiffness")
-            }
-        },
+        "stage1": {kind: _springs(study, cad.stiffness.estimate, kind) for kind in kinds},
         "calibration": cad.calibration.errors.in_millimetres(),
         "verification": {
             "elastic": cad.verification.all.in_millimetres(),
             "elastic_unambiguous": cad.verification.unambiguous.in_millimetres(),
         },
+    }
+
+
+def _springs(study: TwoStageStudy, estimate: Estimate, kind: str) -> dict[str, Any]:
+    """Every stiffness or damping as a quantity, by joint and spring."""
+    truth = study.truth or {}
+    return {
+        joint.name: {
+            SPRINGS[c]: estimate.quantity(
+                f"{joint.name}.{SPRINGS[c]}.{kind}", truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
+            )
+            for c in joint.components
+        }
+        for joint in study.nominal.elastic
     }
 
 
