@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.data import Recording, TrajectoryPlan
-from flexcal.dynamics.noise_bands import NoiseBands
+from flexcal.dynamics.curvature import Curvature
+from flexcal.dynamics.residual_noise import noise
 from flexcal.dynamics.periodic_motion import PeriodicMotion
 from flexcal.dynamics.trajectory_rows import TrajectoryRows, unknowns
 from flexcal.errors import FlexcalError
@@ -17,10 +18,12 @@ from flexcal.model import RobotModel
 
 CUTOFF_HZ = 5.0
 """Highest line that is used: half the first resonance of a large arm, ten times the highest harmonic of a trajectory."""
-ROUNDS = 2
-"""How often the torques are linearised about the last estimate: masses multiply centres of mass, and springs yield to both."""
-NOISE_PASSES = 4
-"""How often the noise is read from the residual of a fit that was weighed with it."""
+ROUNDS = 10
+"""Largest number of linearisations, each with the noise read from the last residual: masses multiply centres of mass."""
+CONVERGED = 0.01
+"""Square of the last step, in standard deviations, below which the linearisation is that of the optimum."""
+CURVATURE_PASSES = 2
+"""How often the second-order terms are evaluated with the last covariance."""
 
 
 def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> Estimate:
@@ -36,27 +39,27 @@ def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Ite
         raise FlexcalError("there is no recording of a trajectory to identify from; give at least one.")
     parameters, own = unknowns(model)
     rows = TrajectoryRows.about(model, parameters, motions, plan.payload)
-    estimate, sigma = _weighed(rows, rows.first_sigma())
-    for _ in range(ROUNDS - 1):
+    estimate = _fit(rows, rows.first_sigma())
+    sigma = noise(rows, estimate, rows.first_sigma())
+    for _ in range(ROUNDS):
         rows = TrajectoryRows.about(model, estimate.parameters, motions, plan.payload)
-        estimate, sigma = _weighed(rows, sigma)
-    return _marginal(estimate, own)
-
-
-def _weighed(rows: TrajectoryRows, sigma: np.ndarray) -> tuple[Estimate, np.ndarray]:
-    """Fit and noise (2 K + 1, n) that agree with each other."""
-    estimate = _fit(rows, sigma)
-    for _ in range(NOISE_PASSES):
-        sigma = NoiseBands.of(rows, estimate, sigma).sigma
         estimate = _fit(rows, sigma)
-    return estimate, sigma
+        sigma = noise(rows, estimate, sigma)
+        step = estimate.parameters.coordinates() - rows.parameters.coordinates()
+        if step @ np.linalg.solve(estimate.covariance, step) < CONVERGED:
+            break
+    for _ in range(CURVATURE_PASSES):
+        bent = Curvature.of(model, estimate, motions).added_to(rows)
+        estimate = _fit(bent, sigma)
+        sigma = noise(bent, estimate, sigma)
+    return _marginal(estimate, own)
 
 
 def _fit(rows: TrajectoryRows, sigma: np.ndarray) -> Estimate:
     about = rows.parameters.coordinates()
     right = (rows.residual / sigma).ravel()
     slope = -(rows.jacobian / sigma[:, :, None]).reshape(right.size, -1)
-    return solve(Problem(rows.parameters, lambda x: (right + slope @ (x - about), slope)))
+    return solve(Problem(rows.parameters, lambda x: (right + slope @ (x - about), slope)), tolerance=1e-6)
 
 
 def _marginal(estimate: Estimate, names: tuple[str, ...]) -> Estimate:

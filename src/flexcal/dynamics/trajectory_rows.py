@@ -17,7 +17,7 @@ from flexcal.model.declared import declared, uncertain_inertials
 from flexcal.model.names import GEOMETRY, SPRINGS
 from flexcal.model.periodic_torque import periodic_torque
 
-_SAMPLES_PER_LINE = 8
+SAMPLES_PER_LINE = 4
 _STEP = 1e-3
 """Of the central differences, in estimation coordinates: torques are polynomials of these, nearly linear over the step."""
 _REVERSAL_VELOCITY = 0.02
@@ -88,17 +88,21 @@ class TrajectoryRows:
         above = np.arange(1, self.measured.shape[1] // 2 + 1)
         return np.concatenate([[0], above, above])
 
+    @property
+    def size(self) -> np.ndarray:
+        """Root mean square (n,) of the coefficients of each joint, N m."""
+        return np.sqrt(np.mean(self.measured**2, axis=(0, 1)))
+
     def first_sigma(self) -> np.ndarray:
         """Noise (2 K + 1, n) to begin with, N m."""
-        size = np.sqrt(np.mean(self.measured**2, axis=(0, 1)))
-        return np.broadcast_to(_FIRST_SIGMA * size, self.measured.shape[1:])
+        return np.broadcast_to(_FIRST_SIGMA * self.size, self.measured.shape[1:])
 
 
 def _links(
     model: RobotModel, parameters: Parameters, x: np.ndarray, motion: PeriodicMotion, payload: float | None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Rows of the arm's torques (2 K + 1, n), and their derivatives (2 K + 1, n, p)."""
-    states = motion.states(_SAMPLES_PER_LINE * motion.lines)
+    states = motion.states(SAMPLES_PER_LINE * motion.lines)
     moved = [k for k, name in enumerate(parameters.names) if name in model.values and not _of_drive(name)]
     names = [parameters.names[k] for k in moved]
 
