@@ -20,8 +20,8 @@ from flexcal.model.periodic_torque import periodic_torque
 
 @pytest.fixture(scope="module")
 def plan(tx90l: RobotModel) -> TrajectoryPlan:
-    """One trajectory, sampled slowly: synthetic torques need no controller."""
-    designed = design_trajectories(tx90l, 1, candidates=20, seed=1, payload=0.0)
+    """Two trajectories, sampled slowly: synthetic torques need no controller."""
+    designed = design_trajectories(tx90l, 2, candidates=20, seed=1, payload=0.0)
     return replace(designed, rate_hz=400.0, torque="instantaneous")
 
 
@@ -74,7 +74,9 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, pla
     q, dq, ddq = rng.uniform(-1, 1, (3, 50, 6)) * np.array([2.0, 2.0, 5.0])[:, None, None]
 
     def torque(robot: RobotModel) -> np.ndarray:
-        rows = torque_regressor(replace(robot, geometry=tx90l.geometry), q, dq, ddq) @ inertial_parameters(robot)
+        rows = torque_regressor(replace(robot, geometry=tx90l.geometry), q, dq, ddq) @ inertial_parameters(
+            robot
+        )
         return rows + robot.rotor_inertia * ddq
 
     scale = np.linalg.norm(torque(truth), axis=0)
@@ -87,16 +89,16 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, pla
 
 
 def test_covariance_is_true_under_coloured_noise(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
-    inside, together = coverage(tx90l, plan, range(6))
+    inside, together = coverage(tx90l, plan, range(3))
     assert 0.90 < inside < 0.99
-    assert 0.75 < together < 1.3
+    assert 0.75 < together < 1.4
 
 
 @pytest.mark.slow
 def test_covariance_is_true_on_many_robots(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
     inside, together = coverage(tx90l, plan, range(100, 160))
     assert 0.93 < inside < 0.97
-    assert 0.9 < together < 1.12
+    assert 0.9 < together < 1.2
 
 
 def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[float, float]:
@@ -114,14 +116,14 @@ def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[flo
 
 def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
     """MuJoCo's robot with gaps, encoders and a friction that is no sign: the covariance still holds, and gravity is known."""
-    plan = design_trajectories(tx90l, 2, candidates=20, seed=4, payload=0.0)
+    plan = design_trajectories(tx90l, 1, candidates=20, seed=4, payload=0.0)
     values = draw_truth(tx90l, CellConfig().spread, np.random.default_rng(4))
     truth = tx90l.with_values(values)
     cell = VirtualCell(truth, seed=4, controller_model=tx90l)
     estimate = identify_with_prior(tx90l, plan, cell.record(plan))
     one, together = errors(estimate, truth)
     assert np.mean(np.abs(one) < 1.96) > 0.88
-    assert 0.4 < together < 1.8
+    assert 0.5 < together < 1.6
     for name, below in (("link_2.com_x", 5e-4), ("link_3.com_x", 5e-4), ("joint_2.rotor_inertia", 5e-3)):
         number = estimate.parameters.index(name)
         assert np.sqrt(estimate.covariance[number, number]) < below
@@ -129,7 +131,7 @@ def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
 
 def test_what_does_not_fit_is_said(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
     short = Recording(time_step=1 / 400, q=np.zeros((50, 6)), torque=np.zeros((50, 6)))
-    with pytest.raises(FlexcalError, match="50 samples every 0.0025 s; its plan asks for 6000"):
+    with pytest.raises(FlexcalError, match=r"50 samples every 0\.0025 s; its plan asks for 6000"):
         identify_with_prior(tx90l, plan, [short])
     with pytest.raises(FlexcalError, match="no recording"):
         identify_with_prior(tx90l, plan, [])

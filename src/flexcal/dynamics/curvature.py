@@ -41,7 +41,12 @@ class Curvature:
         moments = c[np.ix_(a, a)] * c[np.ix_(b, b)] + c[np.ix_(a, b)] * c[np.ix_(b, a)]
         sizes, turns = np.linalg.eigh(moments)
         kept = sizes > _NOTHING * sizes[-1]
-        rows = np.array([motion.rows(torque_regressor(model, *motion.states(SAMPLES_PER_LINE * motion.lines))) @ bends for motion in motions])
+        rows = np.array(
+            [
+                motion.rows(torque_regressor(model, *motion.states(SAMPLES_PER_LINE * motion.lines))) @ bends
+                for motion in motions
+            ]
+        )
         return cls(rows @ c[a, b], rows @ (turns[:, kept] * np.sqrt(sizes[kept])))
 
     def added_to(self, rows: TrajectoryRows) -> TrajectoryRows:

@@ -9,8 +9,8 @@ import numpy as np
 
 from flexcal.data import Recording, TrajectoryPlan
 from flexcal.dynamics.curvature import Curvature
-from flexcal.dynamics.residual_noise import noise
 from flexcal.dynamics.periodic_motion import PeriodicMotion
+from flexcal.dynamics.residual_noise import noise
 from flexcal.dynamics.trajectory_rows import TrajectoryRows, unknowns
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Problem, solve
