@@ -63,6 +63,7 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
                                  const Masses& masses, Vector3 gravity, const double* q, std::ptrdiff_t samples,
                                  const EquilibriumOutput& out) {
     const int n = tree.size(), d = static_cast<int>(axes.size());
+    if (d == 0) return 0;
     constexpr int most_iterations = 30;
     constexpr double tolerance = 1e-13;
     const std::vector<Prepared> prepared = tree.prepare(geometry);
@@ -118,6 +119,7 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
                 deflection[3 * axes[k].joint + axes[k].component] += step[k];
                 largest = std::max(largest, std::abs(step[k]));
             }
+            if (largest < tolerance && !out.compliance) break;  // derivatives need everything once more where the arm rests
         }
         worst = std::max(worst, largest);
         if (out.compliance) {

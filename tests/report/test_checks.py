@@ -11,6 +11,7 @@ from flexcal.report import TwoStageStudy
 from flexcal.report.checks import (
     CHANCE,
     check_claimed_uncertainty,
+    check_drift,
     check_flanks,
     check_fresh_poses,
     check_rank,
@@ -64,6 +65,14 @@ def test_chi2_is_judged(study: TwoStageStudy) -> None:
     assert by_size == {0.2: "care", 1.0: "good", 2.0: "care", 9.0: "bad"}
     assert check_residual("q", replace(estimate, status="stalled", message="no descent")).status == "bad"
     assert check_residual("q", estimate, sigma_given=False).status == "unknown"
+
+
+def test_a_drift_is_flagged(study: TwoStageStudy) -> None:
+    fit = study.calibration
+    assert check_drift(fit).status == "good"
+    share = np.linspace(-0.5, 0.5, len(fit.poses))
+    wandered = fit.residuals + share[:, None] * np.array([1e-4, 0.0, 0.0])
+    assert check_drift(replace(fit, residuals=wandered)).status == "care"
 
 
 def test_a_blurred_gap_is_flagged(study: TwoStageStudy) -> None:

@@ -1,6 +1,7 @@
 """Stage 2: geometry from measured points, with the elastic deflection taken into account, and its verification."""
 
 from flexcal.calibration.calibrate import Calibration, calibrate
+from flexcal.calibration.drift import Drift
 from flexcal.calibration.elastic_prior import ElasticPrior
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.measured_points import require_points
@@ -13,6 +14,7 @@ from flexcal.calibration.verification import Verification, verify
 
 __all__ = [
     "Calibration",
+    "Drift",
     "ElasticPrior",
     "ErrorStatistics",
     "Moved",

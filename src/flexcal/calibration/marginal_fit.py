@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.calibration.geometry_fit import GeometryFit, columns_of
 from flexcal.estimation import Estimate, Parameters, Problem, solve
-from flexcal.estimation.uncertainty import known_to_a_factor
+from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 
 _RELINEARISATIONS = 10
 _SETTLED = 1e-4
@@ -109,7 +109,7 @@ def _joint(at: _Marginal, geometry: Estimate) -> Estimate:
         parameters=parameters,
         covariance=covariance,
         rank=geometry.rank + len(at.elastic),
-        identifiable=geometry.identifiable + known_to_a_factor(at.elastic, own),
+        identifiable=geometry.identifiable + known_to_a_factor_of_two(at.elastic, own),
         chi2=float(np.sum((fit.residual(predicted) / fit.sigma) ** 2)),
         degrees_of_freedom=max(0, round(len(rows) - effective)),
     )

@@ -151,10 +151,10 @@ def predict(
     payload = payload_masses(model, poses)
     rest = static_equilibrium(model, poses.q, payload, flank=flank, elastic=elastic, sensitivities=jacobians)
     kinematics = _points(model, poses, rest.deflection, jacobians)
-    places = {name: model.station[model.station_index(name)] for name in poses.stations}
-    turns = {name: vector_rotation(place[3:]) for name, place in places.items()}
-    at = np.array([places[name][:3] for name in poses.station]).reshape(-1, 3)
-    base = np.array([turns[name] for name in poses.station]).reshape(-1, 3, 3)
+    at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
+    for name in poses.stations:
+        own, place = poses.station == name, model.station[model.station_index(name)]
+        at[own], base[own] = place[:3], vector_rotation(place[3:])
     position = np.matmul(base, kinematics.position[:, :, None])[:, :, 0] + at
     return Prediction(model, poses, position, base, rest, kinematics)
 

@@ -18,7 +18,7 @@ from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
 from flexcal.estimation import Estimate, Parameters, Problem, solve
-from flexcal.estimation.uncertainty import known_to_a_factor
+from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -162,7 +162,7 @@ def _widened(fitted: Estimate, robust: Estimate | None, inflation: float, prior_
         wider = np.sqrt(np.diag(robust.covariance))
         factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
     covariance = covariance * np.outer(factor, factor)
-    sized = known_to_a_factor(fitted.parameters, covariance)
+    sized = known_to_a_factor_of_two(fitted.parameters, covariance)
     small = {
         name: flag and size
         for name, flag, size in zip(fitted.parameters.names, fitted.identifiable, sized, strict=True)

@@ -12,6 +12,9 @@ from flexcal.estimation.parameter import Parameters
 
 NORMAL_QUANTILE = 1.959963984540054
 
+_NOISE_UNKNOWN = 0.1
+"""What chi2 may exceed its expectation by, relative, because the noise level is hardly better known."""
+
 
 @dataclass(frozen=True)
 class Dropped:
@@ -31,8 +34,8 @@ class Estimate:
 
     `parameters` carry the estimates as values; `covariance` (p, p) is in estimation coordinates, with zero rows and columns
     for `dropped` parameters: given their fixed values, predictions inside the model's reach have exactly this uncertainty.
-    `identifiable` is False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.5
-    (95 % interval wider than a factor e either way). `cost` is the minimised objective, prior included. `chi2` is the data's
+    `identifiable` is False for dropped parameters, and for parameters on a log scale with a standard deviation above 0.255
+    (not known to a factor of two). `cost` is the minimised objective, prior included. `chi2` is the data's
     whitened residual sum of squares, prior rows excluded and with robust weights where a robust loss is used;
     `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
     `outliers` are labels of groups, or row numbers where the problem has no groups.
@@ -61,6 +64,14 @@ class Estimate:
     def reduced_chi2(self) -> float:
         """chi2 / degrees of freedom: near one when model and noise are right; NaN without degrees of freedom."""
         return self.chi2 / self.degrees_of_freedom if self.degrees_of_freedom > 0 else math.nan
+
+    @property
+    def unexplained(self) -> bool:
+        """Whether chi2 is more than noise explains: chance, three standard deviations of its distribution, and 10 % for noise that is
+        itself known to 5 %."""
+        if self.degrees_of_freedom <= 0:
+            return False
+        return self.reduced_chi2 > 1.0 + max(_NOISE_UNKNOWN, 3.0 * math.sqrt(2.0 / self.degrees_of_freedom))
 
     @property
     def converged(self) -> bool:

@@ -13,9 +13,10 @@ from flexcal.estimation.levenberg_marquardt import Optimum
 from flexcal.estimation.objective import Objective
 from flexcal.estimation.parameter import Parameters
 
-LOG_STD_LIMIT = 0.5
-"""A parameter on a log scale with a larger posterior standard deviation is not identifiable: its 95 % interval is wider
-than a factor e either way."""
+LOG_STD_LIMIT = 0.5 / 1.96
+"""A parameter on a log scale with a larger posterior standard deviation s is not identifiable: its 95 % interval may reach twice its
+value. Responses are nearly linear in a compliance, whose interval (1 ± 1.96 s) / c then includes half of it: at twice the stiffness s
+is twice as large, and the data cannot tell that end of the interval from rigid. Intervals of the logarithm do not cover there."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +54,8 @@ def uncertainty(
     )
 
 
-def known_to_a_factor(parameters: Parameters, covariance: np.ndarray) -> tuple[bool, ...]:
-    """For every parameter whether `covariance` (p, p) leaves it within `LOG_STD_LIMIT`; always so on a linear scale."""
+def known_to_a_factor_of_two(parameters: Parameters, covariance: np.ndarray) -> tuple[bool, ...]:
+    """For every parameter whether `covariance` (p, p) leaves it known to a factor of two, `LOG_STD_LIMIT`; always so on a linear scale."""
     stds = np.sqrt(np.diag(covariance))
     return tuple(
         item.scale == "linear" or bool(std <= LOG_STD_LIMIT)

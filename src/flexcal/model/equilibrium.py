@@ -11,7 +11,7 @@ from flexcal.model.kinematics import joint_batch
 from flexcal.model.robot_model import RobotModel
 
 _FLANK_PASSES = 5
-_RIGID = 1e15
+_RIGID = 1e17
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +162,8 @@ def static_equilibrium(
         rest = np.sign(torque)
     sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank
     deflection[:, :, 2] += slack
-    has_backlash = np.isin(np.arange(model.n), model.backlash_joints)
+    has_backlash = np.zeros(model.n)
+    has_backlash[list(model.backlash_joints)] = 1.0
     return Equilibrium(
         deflection, torque, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
     )

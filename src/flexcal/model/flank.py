@@ -49,4 +49,4 @@ def gravity_torque_std(
     slopes = parameters.natural_slope(parameters.coordinates())
     covariance[np.ix_(known, known)] = model.posterior.marginal(parameters.names) * np.outer(slopes, slopes)
     slope = np.stack(rows, axis=2)
-    return np.sqrt(np.einsum("snp,pq,snq->sn", slope, covariance, slope))
+    return np.sqrt(np.sum(np.matmul(slope, covariance) * slope, axis=2))

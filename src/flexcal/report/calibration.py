@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.calibration import Calibration, ErrorStatistics, TermSelection
 from flexcal.model import RobotModel
-from flexcal.report.checks import check_left_out, check_outliers, check_rank, check_residual
+from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.notation import NOTHING, millimetres, ratio, statistics_cells
 from flexcal.report.page import Check, Page, Section, Table, Verdict, worst
@@ -116,6 +116,7 @@ def calibration_checks(study: CalibrationStudy) -> tuple[Check, ...]:
             "Does noise explain what the fit leaves?", fit.estimate, sigma_given=fit.poses.sigma_given
         ),
         check_rank(len(found.names), found.rank, found.gap),
+        check_drift(fit),
         check_outliers(fit),
     )
 

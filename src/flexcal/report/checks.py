@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration import Calibration, ErrorStatistics, Verification
+from flexcal.calibration import Calibration, Drift, ErrorStatistics, Verification
 from flexcal.estimation import Estimate
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Check
@@ -92,11 +92,24 @@ def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = Tru
         return Check(
             question, f"{answer} The model misses something that is much larger than the noise.", "bad"
         )
-    if value > 1.6:
+    if estimate.unexplained:
         return Check(question, f"{answer} Something small is missing from the model.", "care")
     if value < 0.4:
         return Check(question, f"{answer} The stated noise is too large.", "care")
     return Check(question, answer, "good")
+
+
+def check_drift(calibration: Calibration) -> Check:
+    """Whether what the fit leaves goes with the order of measuring."""
+    question = "Did robot and instrument stay as they were while the poses were measured?"
+    drift = Drift.of(calibration)
+    if not drift.certain:
+        return Check(question, "Nothing speaks against it.", "good")
+    answer = (
+        f"What the fit leaves goes with the order of measuring, {millimetres(drift.distance)} mm from the first pose to the last. Let the "
+        "robot warm up and the instrument settle, or measure in random order if place and order went together."
+    )
+    return Check(question, answer, "care")
 
 
 def check_rank(parameters: int, rank: int, gap: float) -> Check:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 from flexcal.report.checks import (
     check_claimed_uncertainty,
+    check_drift,
     check_flanks,
     check_fresh_poses,
     check_rank,
@@ -101,6 +102,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
             sigma_given=fit.poses.sigma_given,
         ),
         check_residual("Does noise explain what the elastic fit leaves?", found),
+        check_drift(fit),
         check_springs(found, stiffness, damping),
         check_rank(len(geometry.names), geometry.rank, geometry.gap),
         check_flanks(study.elastic_verification),

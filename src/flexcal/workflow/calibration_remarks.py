@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration import Calibration, moved_far
+from flexcal.calibration import Calibration, Drift, moved_far
 from flexcal.model.declared import UNIDENTIFIED_STIFFNESS
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.pose_remarks import unused_columns
@@ -17,8 +17,8 @@ _LOOK = (
     "target or robot; --loss cauchy finds single wrong points"
 )
 
-_LACKING, _ABSURD = 2.0, 100.0
-"""Reduced chi-squares from which the model lacks something, and from which the data cannot be what they say."""
+_ABSURD = 100.0
+"""Reduced chi-square from which the data cannot be what they say."""
 
 _LARGEST_SCATTER = 1e-3
 """Scatter (m) that no calibrated arm and no instrument has."""
@@ -52,6 +52,12 @@ def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
         listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers)
         remarks.append(f"{len(outliers)} outliers: {listed}")
     remarks += _noise(fit)
+    drift = Drift.of(fit)
+    if drift.certain:
+        remarks.append(
+            f"what the fit leaves goes with the order of measuring, {drift.distance / MILLIMETRE:.3f} mm from the first pose to the last: "
+            "something warmed up or settled, or place and order went together"
+        )
     far = moved_far(fit)
     if far:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
@@ -81,11 +87,11 @@ def _noise(fit: Calibration) -> Sequence[str]:
     if not fit.poses.sigma_given:
         text = f"no sigma in the files: the scatter of {_scatter(fit) / MILLIMETRE:.3f} mm a coordinate stands for it"
         return (f"{text}, though it is too much to be noise" if _noise_is_absurd(fit) else text,)
-    ratio = fit.estimate.reduced_chi2
-    if not ratio > _LACKING:
+    if not fit.estimate.unexplained:
         return ()
+    ratio = fit.estimate.reduced_chi2
     return (
-        f"chi-square is {ratio:.1f} times what sigma explains: the model lacks something or sigma is too small, and the intervals are "
+        f"chi-square is {ratio:.2g} times what sigma explains: the model lacks something or sigma is too small, and the intervals are "
         "too narrow",
     )
 

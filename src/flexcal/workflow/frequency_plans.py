@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
@@ -10,15 +11,20 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.data.joint_limits import check_joint_limits
 from flexcal.data.table import open_table
+from flexcal.elasticity.gap import multisine_torque
 from flexcal.errors import InputError
 from flexcal.frequency.multisine import half_integer_frequency, odd_lines
-from flexcal.model import RobotModel
+from flexcal.model import RobotModel, static_equilibrium
 from flexcal.units import DEGREE
 
 BASE_FREQUENCY_HZ = 0.25
 BAND_HZ = (3.0, 80.0)
 EXCITATION = 0.04
-"""Root mean square of the excitation of an axis in one experiment, relative to its drive's effort."""
+"""Largest root mean square of the excitation of an axis in one experiment, relative to its drive's effort."""
+_CREST = 3.0
+"""Peak of a multisine's torque over its root mean square."""
+_LEAST = 0.5
+"""What is left of the excitation at least: a drive that gravity does not load crosses its gap however small that is."""
 DROOP = 2 * DEGREE
 """How far an excited axis may stray from its reference: under gravity, which the soft loop holds imperfectly, and by the excitation."""
 
@@ -28,7 +34,8 @@ def frequency_plan(
 ) -> MultisinePlan:
     """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°); P1 §4.1.3, Fig. 4.
 
-    Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two of them dropped, both signs.
+    Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two of them dropped, both signs. The
+    excitation is lowered, on all axes alike, until its peaks no longer pull a drive with backlash across its gap against gravity.
     Raises `InputError` where the file lacks the plan's poses, robot.yaml a controller, or a pose the room that the motion about it needs.
     """
     if model.controller is None:
@@ -42,7 +49,7 @@ def frequency_plan(
     reference = (1.5 if kind == "default" else 3.0) * DEGREE
     room = np.zeros(model.n)
     room[list(joints)] = reference + DROOP
-    return MultisinePlan(
+    plan = MultisinePlan(
         name=kind,
         poses=read_frequency_poses(poses_file, kind, model, room),
         joints=joints,
@@ -62,6 +69,15 @@ def frequency_plan(
         torque="held",
         seed=seed,
     )
+    return replace(plan, amplitude=_preloaded_share(model, plan) * plan.amplitude)
+
+
+def _preloaded_share(model: RobotModel, plan: MultisinePlan) -> float:
+    """The share of the excitation at which its peaks in every pose stay below what gravity puts on the drives with backlash."""
+    drives = [k for k, i in enumerate(plan.joints) if i in model.backlash_joints]
+    held = np.abs(static_equilibrium(model, plan.poses, plan.payload).torque[:, list(plan.joints)])
+    swing = _CREST * np.array([multisine_torque(model, q, plan.payload, plan) for q in plan.poses])
+    return float(np.clip((held / swing)[:, drives].min(initial=1.0), _LEAST, 1.0))
 
 
 def read_frequency_poses(

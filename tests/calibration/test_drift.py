@@ -1,0 +1,53 @@
+"""Whether points wandered while they were measured: recovered, and not invented."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.calibration import Drift, calibrate
+
+TRAVEL = np.array([6e-5, -6e-5, 5e-5])
+
+
+def _drifted(poses, travel):
+    share = np.linspace(0, 1, len(poses))
+    return replace(poses, position=poses.position + share[:, None] * travel)
+
+
+def test_a_drift_is_found(simulate, tx90l):
+    measured = simulate(3, 60, sigma=3e-5)
+    drift = Drift.of(calibrate(tx90l, _drifted(measured.poses, TRAVEL)))
+    z = np.linalg.solve(np.linalg.cholesky(drift.covariance), drift.travel - TRAVEL)
+    assert np.linalg.norm(z) < 4
+    assert drift.certain
+    assert 0 < np.sqrt(np.trace(drift.covariance)) < 0.4 * drift.distance
+
+
+def test_taking_the_drift_out_leaves_none(simulate, tx90l):
+    """The estimate is one step of Gauss-Newton: points less the drift that was found have none, the parameters fitted anew."""
+    poses = _drifted(simulate(4, 60, sigma=3e-5).poses, TRAVEL)
+    first = Drift.of(calibrate(tx90l, poses))
+    again = Drift.of(calibrate(tx90l, _drifted(poses, -first.travel)))
+    assert again.distance < 0.02 * first.distance
+    assert not again.certain
+
+
+def test_no_drift_is_invented(simulate, tx90l):
+    """For an arm that stays, travel over its standard deviation is three standard normal numbers."""
+    statistics, flagged = [], 0
+    for seed in range(24):
+        drift = Drift.of(calibrate(tx90l, simulate(seed, 40, sigma=3e-5).poses))
+        statistics.append(drift.travel @ np.linalg.solve(drift.covariance, drift.travel))
+        flagged += drift.certain
+    assert 1.5 < np.mean(statistics) < 4.5
+    assert flagged <= 1
+
+
+def test_outliers_do_not_count(simulate, tx90l):
+    poses = simulate(5, 80, sigma=3e-5).poses
+    position = poses.position.copy()
+    position[-6:] += 5e-3
+    drift = Drift.of(calibrate(tx90l, replace(poses, position=position), loss="cauchy"))
+    assert not drift.certain
