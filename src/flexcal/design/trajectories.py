@@ -153,9 +153,9 @@ def _directions(model: RobotModel) -> np.ndarray:
     """Change (10 n, p) of the links' inertial parameters by one prior standard deviation of each unknown."""
     names = uncertain_inertials(model, range(model.n))
     start = inertial_parameters(model)
-    columns = []
-    for name in names:
+    directions = np.empty((len(start), len(names)))
+    for k, name in enumerate(names):
         item = declared(model, name)
         x = item.coordinate(item.value) + _STEP * item.prior_std
-        columns.append((inertial_parameters(model.with_values({name: item.natural(x)})) - start) / _STEP)
-    return np.column_stack(columns)
+        directions[:, k] = (inertial_parameters(model.with_values({name: item.natural(x)})) - start) / _STEP
+    return directions

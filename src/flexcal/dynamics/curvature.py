@@ -40,7 +40,7 @@ class Curvature:
         c = estimate.marginal(names)[1]
         moments = c[np.ix_(a, a)] * c[np.ix_(b, b)] + c[np.ix_(a, b)] * c[np.ix_(b, a)]
         sizes, turns = np.linalg.eigh(moments)
-        kept = sizes > _NOTHING * sizes[-1]
+        kept = sizes > _NOTHING * sizes.max(initial=0.0)
         rows = np.array(
             [
                 motion.rows(torque_regressor(model, *motion.states(SAMPLES_PER_LINE * motion.lines))) @ bends
@@ -74,8 +74,8 @@ def _second_derivatives(model: RobotModel, parameters: Parameters) -> tuple[np.n
         natural = parameters.natural(moved)
         return inertial_parameters(model.with_values(dict(zip(parameters.names, natural, strict=True))))
 
-    columns = []
-    for i, j in pairs:
+    bends = np.empty((len(at()), len(pairs)))
+    for k, (i, j) in enumerate(pairs):
         mixed = sum(s * t * at((i, s * _STEP), (j, t * _STEP)) for s in (-1, 1) for t in (-1, 1))
-        columns.append(mixed / (4 * _STEP**2) * (0.5 if i == j else 1.0))
-    return np.column_stack(columns), np.array(pairs)
+        bends[:, k] = mixed / (4 * _STEP**2) * (0.5 if i == j else 1.0)
+    return bends, np.array(pairs, dtype=int).reshape(-1, 2)

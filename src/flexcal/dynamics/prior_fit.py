@@ -17,7 +17,7 @@ from flexcal.estimation import Estimate, Problem, solve
 from flexcal.model import RobotModel
 
 CUTOFF_HZ = 5.0
-"""Highest line that is used: half the first resonance of a large arm, ten times the highest harmonic of a trajectory."""
+"""Highest line that is used: half the first resonance of a large arm, five times the highest harmonic of a designed trajectory."""
 ROUNDS = 10
 """Largest number of linearisations, each with the noise read from the last residual: masses multiply centres of mass."""
 CONVERGED = 0.01
