@@ -7,7 +7,7 @@ import numpy as np
 from flexcal.calibration import Verification
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
-from flexcal.report.notation import NOTHING, millimetres, percent, significant, spring_label
+from flexcal.report.notation import NOTHING, millimetres, significant, spring_label
 from flexcal.report.page import Block, Section, Table, Text
 from flexcal.report.study import CadAlone, TwoStageStudy
 
@@ -43,12 +43,12 @@ def _gain_table(study: TwoStageStudy, cad: CadAlone) -> Table:
     if study.truth is not None:
         errors = [_errors(study, result) for result in (cad.stiffness, study.stiffness)]
         rows += [
-            ("stage 1: largest of all stiffness errors", *(percent(float(e.max())) for e in errors)),
-            ("stage 1: median of all stiffness errors", *(percent(float(np.median(e))) for e in errors)),
+            ("stage 1: largest of all stiffness errors", *(_percent(float(e.max())) for e in errors)),
+            ("stage 1: median of all stiffness errors", *(_percent(float(np.median(e))) for e in errors)),
         ]
     for name in names:
         stds = (_relative_std(result.estimate, name) for result in (cad.stiffness, study.stiffness))
-        rows.append((f"stage 1: std of {spring_label(name)}", *(percent(std) for std in stds)))
+        rows.append((f"stage 1: std of {spring_label(name)}", *(_percent(std) for std in stds)))
     both = (cad.verification, study.elastic_verification)
     rows += [
         ("stage 2: mean of the fresh poses / mm", *(millimetres(v.all.mean) for v in both)),
@@ -63,6 +63,10 @@ def _gain_table(study: TwoStageStudy, cad: CadAlone) -> Table:
         ("number", "inertials of CAD alone", "with stage 0"),
         tuple(rows),
     )
+
+
+def _percent(share: float | None) -> str:
+    return NOTHING if share is None else f"{100 * share:.2f} %"
 
 
 def _errors(study: TwoStageStudy, result: StiffnessResult) -> np.ndarray:
