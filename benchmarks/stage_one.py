@@ -42,7 +42,7 @@ def run() -> list[tuple[str, float, str]]:
 
     start = time.perf_counter()
     parameters = stage_one_parameters(robot, responses, inertias_known=True).subset(names)
-    found = MultiStart().find(robot, responses, parameters, rng)
+    found = MultiStart().find(robot, responses, parameters, np.diag(parameters.prior_std() ** 2), rng)
     residual = StageOneResidual.of(
         ResponseModel.of(robot, responses, parameters), responses, CovarianceWeighting()
     )

@@ -100,7 +100,7 @@ def test_one_payload_counts_for_all_poses() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ("kind: multisine", "kind: sine", ["line 1", "multisine, poses"]),
+        ("kind: multisine", "kind: sine", ["line 1", "multisine, trajectory, poses"]),
         ("kind: multisine\n", "", ["line 1", "add for example 'kind: multisine'"]),
         ("periods: 4", "perids: 4", ["line ", "unknown key 'perids'", "did you mean 'periods'?"]),
         ("tau: mean", "torque: mean", ["unknown key 'torque'"]),

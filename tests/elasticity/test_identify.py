@@ -23,6 +23,9 @@ from flexcal.elasticity import (
 from flexcal.elasticity.gap import open_share
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
+from flexcal.estimation import Parameters
+from flexcal.model.declared import declared, uncertain_inertials
+from flexcal.model.posterior import Posterior
 
 VISCOUS = np.array([1.6, 1.3, 1.8])
 """As in the synthetic responses."""
@@ -74,6 +77,33 @@ def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthe
     assert paper.quantity("joint_1.drive.stiffness")["identifiable"]
     default = identify_stiffness(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng), rng=rng)
     assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith("stiffness"))
+
+
+def test_inertials_known_from_before_count_as_known(tx90l, poses, synthesise, drawn, rng):
+    """With a joint posterior of vanishing width the fit is that with known inertias, interval by interval."""
+    truth = drawn(tx90l, rng, inertias=True)
+    responses = synthesise(truth, poses["default"][:2], noise=0.05, rng=rng, payload=0.0, step=16)
+    names = uncertain_inertials(tx90l, range(6))
+    known = tx90l.with_values({name: truth.value(name) for name in names})
+    items = Parameters(declared(known, name) for name in names)
+    width = np.diag((1e-4 * items.prior_std()) ** 2)
+    informed = replace(known, posterior=Posterior(items, width))
+    springs = [f"joint_{i}.{spring}.stiffness" for i in (1, 2, 3) for spring in ("drive", "bearing_x")]
+
+    def fitted(robot, inertias_known):
+        estimate = identify_stiffness(
+            robot,
+            responses,
+            rng=np.random.default_rng(1),
+            inertias_known=inertias_known,
+            tolerances=Tolerances.none(),
+        ).estimate
+        x, covariance = estimate.marginal(springs)
+        return x, np.sqrt(np.diag(covariance))
+
+    (one, one_std), (other, other_std) = fitted(informed, False), fitted(known, True)
+    assert np.abs(one - other).max() < 0.02 * other_std.min()
+    np.testing.assert_allclose(one_std, other_std, rtol=0.1)
 
 
 def test_population_search_reaches_the_same_fit(stiff, poses, synthesise, drawn, rng):

@@ -13,9 +13,11 @@ import pytest
 from outline import Outline
 
 from flexcal.errors import InputError
+from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.report import TX90L_PAPER, TwoStageStudy, write_two_stage_report
 from flexcal.report.notation import millimetres, significant
+from flexcal.report.study import CadAlone
 
 MEBIBYTE = 1e6
 
@@ -191,3 +193,30 @@ def test_a_place_that_cannot_be_written_leaves_nothing(study: TwoStageStudy, tmp
 def test_the_papers_springs_are_those_of_the_example(tx90l: RobotModel) -> None:
     for name, value in TX90L_PAPER.springs.items():
         assert tx90l.value(name) == pytest.approx(value, rel=1e-12)
+
+
+def test_stage_zero_stands_beside_cad_alone(study: TwoStageStudy, tmp_path: Path) -> None:
+    """Both columns from their own fits; without stage 0 there is no such section."""
+    mass, com = (
+        Parameter("link_2.mass", "kg", 21.5, prior_std=0.07, prior_mean=20.0, scale="log"),
+        "link_2.com_x",
+    )
+    found = replace(
+        study.stiffness.estimate,
+        parameters=Parameters([mass, Parameter(com, "m", 0.2345, prior_std=0.01, prior_mean=0.23)]),
+        covariance=np.diag([1e-4, 1e-8]),
+        dropped=(),
+        identifiable=(True, True),
+    )
+    rigid = study.rigid_verification[0]
+    alone = CadAlone(study.stiffness, study.calibration, rigid)
+    path = tmp_path / "report.html"
+    write_two_stage_report(path, replace(study, dynamics=found, cad_alone=alone))
+    section = path.read_text("utf-8")
+    section = section[section.index('id="table-stage0-gain"') : section.index('id="stage1"')]
+    text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", section))
+    both = f"{millimetres(rigid.all.p90)} {millimetres(study.elastic_verification.all.p90)}"
+    assert f"stage 2: 90 % of them within / mm {both}" in text
+    assert "link_2.com_x mm 230 10.0 234 0.100" in text or "link_2.com_x mm 230 10.0 235 0.100" in text
+    write_two_stage_report(path, study)
+    assert "table-stage0" not in path.read_text("utf-8")

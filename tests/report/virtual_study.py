@@ -168,6 +168,7 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
     floor = 2.0e-5 * rng.normal(size=exact.position.shape)
     return TwoStageStudy(
         nominal=nominal,
+        informed=nominal,
         plan=plan,
         responses=responses,
         stiffness=stiffness,

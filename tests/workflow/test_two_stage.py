@@ -42,11 +42,11 @@ def demo(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
 
 
 def test_every_stage_tells_how_far_it_is(demo: Path) -> None:
-    assert list(dict.fromkeys(stage for stage, _ in TOLD)) == list(two_stage.STAGES[1:])
-    for stage in two_stage.STAGES[1:]:
+    assert list(dict.fromkeys(stage for stage, _ in TOLD)) == list(two_stage.STAGES)
+    for stage in two_stage.STAGES:
         shares = [share for told, share in TOLD if told == stage]
         assert shares[0] < 0.02 and shares[-1] == 1.0 and shares == sorted(shares), stage
-    for stage in ("frequency", "stage1", "poses"):
+    for stage in ("dynamics", "frequency", "stage1", "poses"):
         assert sum(told == stage and 0 < share < 1 for told, share in TOLD) >= 2, stage
 
 
@@ -65,7 +65,20 @@ def test_results_have_the_fixed_names(demo: Path) -> None:
     assert document["calibration"]["poses"] == 40
     assert {document["verification"][b]["poses"] for b in ("elastic", "rigid", "measured")} == {150}
     stages = {"dynamics", "frequency", "stage1", "poses", "stage2", "verification", "report", "total"}
-    assert set(document["seconds"]) == stages
+    assert set(document["seconds"]) == stages | {"cad_alone"}
+
+
+def test_stage_zero_is_told_beside_cad_alone(demo: Path, tx90l: RobotModel) -> None:
+    document = json.loads((demo / "results.json").read_text())
+    parameters = document["dynamics"]["parameters"]
+    z = [(q["estimate"] - q["truth"]) / q["std"] for q in parameters.values() if q["truth"] is not None]
+    assert len(z) == 30 and np.mean(np.abs(z) < 1.96) > 0.85
+    assert parameters["link_2.com_x"]["std"] < 1e-3 < tx90l.prior.com
+    alone = document["cad_alone"]
+    assert alone["stage1"]["stiffness"].keys() == document["stage1"]["stiffness"].keys()
+    assert alone["verification"]["elastic"]["poses"] == 150
+    assert alone["verification"]["elastic"] != document["verification"]["elastic"]
+    assert "What stage 0 buys" in (demo / "report.html").read_text()
 
 
 def test_it_is_accurate(demo: Path) -> None:
@@ -123,6 +136,9 @@ def test_every_block_says_where_it_came_from(demo: Path) -> None:
     assert origin["input.response_pose_2.npz"] == sha256_of(demo / "response_pose_2.npz")
     assert (origin["option.seed"], origin["option.plan"]) == ("77", "default")
     assert origin["program"].startswith("flexcal ")
+    assert origin["block.dynamics"] == block_sha256(demo / "estimates.yaml", "dynamics")
+    trajectory = demo / "trajectory_plan.yaml"
+    assert blocks["dynamics"].provenance["input.trajectory_plan.yaml"] == sha256_of(trajectory)
     origin = blocks["calibration"].provenance
     assert origin["input.calibration_poses.csv"] == sha256_of(demo / "calibration_poses.csv")
     assert origin["block.stiffness"] == block_sha256(demo / "estimates.yaml", "stiffness")

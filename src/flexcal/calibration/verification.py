@@ -12,6 +12,7 @@ from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.prediction import predict
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
+from flexcal.model.names import GEOMETRY, STATION
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +46,9 @@ class Verification:
         return ErrorStatistics.of(self.errors[~self.ambiguous])
 
 
+_GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance")
+
+
 def verify(model: RobotModel, poses: PoseSet, *, elastic: bool = True) -> Verification:
     """Compare a calibrated robot with points; `poses` should be none of those it was fitted to.
 
@@ -68,4 +72,5 @@ def _is_elastic(name: str) -> bool:
 
 
 def _moves_points(name: str) -> bool:
-    return not name.endswith((".damping", ".rotor_inertia", ".delay", ".viscous", ".coulomb"))
+    key = name.rpartition(".")[2]
+    return _is_elastic(name) or key in _GEOMETRIC or key.startswith("transmission_")

@@ -12,7 +12,8 @@ import numpy as np
 
 from flexcal.cell.config import CellConfig
 from flexcal.cell.feed_forward import inverse_dynamics
-from flexcal.cell.plant import Plant, build_plant, unresolved
+from flexcal.cell.plant import Plant, build_plant
+from flexcal.cell.resolution import resolved_plant
 from flexcal.cell.rest import rest
 from flexcal.cell.sensors import encoder_resolution, read_encoder, read_torque
 from flexcal.cell.stepping import LoopCommand, LoopGains, run_loop
@@ -20,8 +21,6 @@ from flexcal.data import MultisinePlan, Recording, RecordingLabel
 from flexcal.errors import FlexcalError
 from flexcal.frequency import multisine
 from flexcal.model import RobotModel
-
-REFINEMENTS = (1, 2, 4, 8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,7 +68,9 @@ def prepare(
     import mujoco
 
     free = sorted(plan.joints)
-    plant, substeps = _resolved_plant(truth, config, plan, pose)
+    plant, substeps = resolved_plant(
+        truth, config, q=pose, free=free, payload=plan.payload, rate_hz=plan.rate_hz
+    )
     assumed = build_plant(believed, config, q=pose, free=free, payload=plan.payload)
     samples = plan.periods * multisine.samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
     reference = multisine.reference(plan, np.arange(samples) / plan.rate_hz)
@@ -83,22 +84,6 @@ def prepare(
     kp, kd = plan.kp[free], plan.kd[free]
     gains = LoopGains(kp, kd, plan.rate_hz, substeps, config.controller.rate_filter_hz)
     return Excitation(pose, plant, gains, start, start_rate, LoopCommand(torque, pose[free] + motion, rate))
-
-
-def _resolved_plant(
-    truth: RobotModel, config: CellConfig, plan: MultisinePlan, pose: np.ndarray
-) -> tuple[Plant, int]:
-    """The plant and its steps per tick: as many as configured, doubled until the true robot's fastest modes are resolved."""
-    free, phrase = sorted(plan.joints), ""
-    for refinement in REFINEMENTS:
-        substeps = config.controller.substeps * refinement
-        step = 1 / (plan.rate_hz * substeps)
-        plant = build_plant(truth, config, q=pose, free=free, payload=plan.payload, time_step=step)
-        missed = unresolved(plant)
-        if missed is None:
-            return plant, substeps
-        phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"
-    raise FlexcalError(f"{phrase}; raise the controller's substeps or rate, or friction's coulomb_velocity.")
 
 
 def run(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
+from flexcal.cell.config import CellConfig
 from flexcal.cell.plant import Plant, gravity_stiffness, linearise
+from flexcal.export.mjcf import carried_inertias
+from flexcal.model import RobotModel, inertial_parameters, torque_regressor
 
 
 def inverse_dynamics(
@@ -22,3 +27,28 @@ def inverse_dynamics(
     viscous, coulomb, smoothing = plant.frictions[:, :3].T
     inertial = acceleration @ linear.mass[np.ix_(motors, motors)] + motion @ tangent.T
     return linear.gravity[motors] + inertial + viscous * rate + coulomb * np.tanh(rate / smoothing)
+
+
+def rigid_inverse_dynamics(
+    model: RobotModel,
+    config: CellConfig,
+    q: np.ndarray,
+    dq: np.ndarray,
+    ddq: np.ndarray,
+    payload: float | None = None,
+) -> np.ndarray:
+    """Motor torque (N, n) N m that moves the rigid robot by any motion `q`, `dq`, `ddq` (N, n), with friction.
+
+    `payload` in kg, None for the declared.
+    """
+    bodies = carried_inertias(model, payload)
+    loaded = replace(
+        model,
+        mass=np.array([body.mass for body in bodies]),
+        com=np.array([body.com for body in bodies]),
+        inertia=np.array([body.inertia for body in bodies]),
+    )
+    links = torque_regressor(loaded, q, dq, ddq) @ inertial_parameters(loaded)
+    rotor, viscous, coulomb = np.nan_to_num([model.rotor_inertia, model.viscous, model.coulomb])
+    scale, smoothing = config.friction.scale, config.friction.coulomb_velocity
+    return links + rotor * ddq + scale * (viscous * dq + coulomb * np.tanh(dq / smoothing))

@@ -10,7 +10,8 @@ import numpy as np
 from flexcal.cell.config import CellConfig
 from flexcal.cell.excitation import recordings
 from flexcal.cell.pose_measurement import in_instrument, measured_poses, true_poses
-from flexcal.data import MultisinePlan, PosePlan, PoseSet, Recording
+from flexcal.cell.trajectory import trajectory_recordings
+from flexcal.data import MultisinePlan, PosePlan, PoseSet, Recording, TrajectoryPlan
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 
@@ -39,15 +40,17 @@ class VirtualCell:
         self.controller_model = truth if controller_model is None else controller_model
         self.threads = threads or os.cpu_count() or 1
 
-    def record(self, plan: MultisinePlan) -> Iterator[Recording]:
-        """Run a frequency experiment: recordings by pose, realisation, orthogonal experiment, sign (+1, then −1).
+    def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
+        """Run a frequency experiment: recordings by pose, realisation, orthogonal experiment, sign (+1, then −1); or trajectories.
 
         `q` (N, n) are encoder readings and `torque` (N, n) the torque held until the next sample, with sensor noise; joints that are
         not excited are braked at the pose and read a torque of zero. Raises `FlexcalError` for a joint count that does not fit,
         an excited drive without rotor inertia, a step that does not resolve the robot, or a loop that diverges.
         """
-        self._check_width(plan.poses)
+        self._check_width(plan.joint_count)
         self._check_rotors(plan)
+        if isinstance(plan, TrajectoryPlan):
+            return trajectory_recordings(self.truth, self.controller_model, self.config, plan, self.seed)
         return recordings(self.truth, self.controller_model, self.config, plan, self.seed, self.threads)
 
     def measure(self, plan: PosePlan) -> PoseSet:
@@ -56,25 +59,26 @@ class VirtualCell:
         `q` are encoder readings, `torque` is gravity's plus Coulomb friction of random sign and size within its band plus noise,
         `sigma` the tracker's standard deviation an axis.
         """
-        self._check_width(plan.q)
+        self._check_width(plan.joint_count)
         rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(plan.seed, _TRACKER)))
         return measured_poses(self.truth, self.config, plan, rng)
 
     def noise_free(self, plan: PosePlan) -> np.ndarray:
         """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
-        self._check_width(plan.q)
+        self._check_width(plan.joint_count)
         return in_instrument(self.truth, true_poses(self.truth, self.config, plan).point)
 
-    def _check_rotors(self, plan: MultisinePlan) -> None:
+    def _check_rotors(self, plan: MultisinePlan | TrajectoryPlan) -> None:
+        moving = range(self.truth.n) if isinstance(plan, TrajectoryPlan) else plan.joints
         for spring in self.truth.elastic:
-            if spring.index in plan.joints and not self.truth.rotor_inertia[spring.index] > 0:
+            if spring.index in moving and not self.truth.rotor_inertia[spring.index] > 0:
                 raise FlexcalError(
                     f"{self.truth.path} gives {spring.name} no positive rotor inertia, and a motor before a drive spring cannot move "
                     "without one; add `drives: {rotor_inertia: […]}` in kg m² at the joint."
                 )
 
-    def _check_width(self, q: np.ndarray) -> None:
-        if q.shape[1] != self.truth.n:
+    def _check_width(self, joints: int) -> None:
+        if joints != self.truth.n:
             raise FlexcalError(
-                f"the plan's poses have {q.shape[-1]} joints but {self.truth.name} has {self.truth.n}."
+                f"the plan's poses have {joints} joints but {self.truth.name} has {self.truth.n}."
             )

@@ -34,7 +34,7 @@ class Demo:
 
     def run(self) -> None:
         """Run everything, and print the numbers."""
-        from flexcal.cli.tables import comparison_table, error_table
+        from flexcal.cli.tables import comparison_table, error_table, gain_table
         from flexcal.workflow.experiment_files import example_robot
         from flexcal.workflow.results import read_results
         from flexcal.workflow.two_stage import run_two_stage
@@ -58,6 +58,8 @@ class Demo:
             if document["verification"].get(key)
         }
         console.show(error_table("distance between prediction and point", rows))
+        if document["cad_alone"] is not None:
+            console.show(gain_table(document))
         console.say(f"took {document['seconds']['total']:.0f} s; everything is in {self.out}")
         console.finish(document, f"open {self.out / 'report.html'}")
 

@@ -138,3 +138,22 @@ def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     for row in best.values():
         table.add_row(", ".join(row["terms"]) or "none", f"{row['cross_validation_percent']:.2f}")
     return table
+
+
+def gain_table(document: Mapping[str, Any]) -> Table:
+    """What stage 0 buys both stages: results.json's numbers with the inertials of CAD alone beside those of the run."""
+    table = Table(title="what stage 0 buys", title_justify="left")
+    table.add_column("")
+    for heading in ("CAD alone", "with stage 0"):
+        table.add_column(heading, justify="right")
+    both = (document["cad_alone"], document)
+    errors = [_largest_error(run["stage1"]["stiffness"]) for run in both]
+    table.add_row("largest stiffness error", *(f"{100 * e:.2f} %" for e in errors))
+    for key, label in (("mean_mm", "mean mm"), ("p90_mm", "p90 mm"), ("max_mm", "max mm")):
+        values = (run["verification"]["elastic"][key] for run in both)
+        table.add_row(f"fresh poses, {label}", *(_millimetres(v) for v in values))
+    return table
+
+
+def _largest_error(joints: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> float:
+    return max(abs(q["estimate"] / q["truth"] - 1) for springs in joints.values() for q in springs.values())

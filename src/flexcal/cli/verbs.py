@@ -46,6 +46,7 @@ STEPS = (
                 "flexcal demo --seed 1 --out demo",
                 (
                     "truth.yaml",
+                    "trajectory_plan.yaml",
                     "frequency_plan.yaml",
                     "response_pose_*.npz",
                     "calibration_poses.csv",

@@ -9,14 +9,15 @@ from flexcal.data.multisine_plan import MultisinePlan
 from flexcal.data.pose_plan import PosePlan
 from flexcal.data.pose_set import PoseSet
 from flexcal.data.recording import Recording
+from flexcal.data.trajectory_plan import TrajectoryPlan
 
 
 @runtime_checkable
 class Cell(Protocol):
     """A robot with its instruments: simulated, or a folder of recorded files."""
 
-    def record(self, plan: MultisinePlan) -> Iterator[Recording]:
-        """The plan's recordings one by one, pose by pose, labelled; none has to stay in memory."""
+    def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
+        """The plan's recordings one by one, in its order, labelled; none has to stay in memory."""
         ...
 
     def measure(self, plan: PosePlan) -> PoseSet:

@@ -16,6 +16,7 @@ from flexcal.data.pose_plan import PosePlan
 from flexcal.data.pose_set import PoseSet
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import write_recording
+from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.errors import FlexcalError, InputError
 
 PLAN = "plan.yaml"
@@ -23,8 +24,14 @@ POSES = "poses"
 ENDINGS = (".parquet", ".csv")
 
 
-def labels(plan: MultisinePlan) -> Iterator[RecordingLabel]:
-    """The recordings of a plan in the order in which they are made: pose, realisation, experiment, sign."""
+def labels(plan: MultisinePlan | TrajectoryPlan) -> Iterator[RecordingLabel]:
+    """The recordings of a plan in the order in which they are made: pose, realisation, experiment, sign.
+
+    A trajectory counts as a realisation of the one pose.
+    """
+    if isinstance(plan, TrajectoryPlan):
+        yield from (RecordingLabel(0, number, 0, 1) for number in range(len(plan)))
+        return
     for pose in range(len(plan.poses)):
         for realisation in range(plan.realisations):
             for experiment in range(plan.experiments):
@@ -45,7 +52,11 @@ def existing_file(folder: Path, name: str) -> Path:
 
 
 def write_recordings(
-    folder: str | Path, plan: MultisinePlan, recordings: Iterable[Recording], *, ending: str = ".parquet"
+    folder: str | Path,
+    plan: MultisinePlan | TrajectoryPlan,
+    recordings: Iterable[Recording],
+    *,
+    ending: str = ".parquet",
 ) -> None:
     """Write recordings as they come, then the plan: a folder without `plan.yaml` is not complete.
 

@@ -16,6 +16,7 @@ from flexcal.data.pose_plan import PosePlan
 from flexcal.data.pose_set import PoseSet
 from flexcal.data.recording import Recording
 from flexcal.data.recording_files import read_recording
+from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.errors import InputError
 from flexcal.yaml_writer import to_plain
 
@@ -38,20 +39,20 @@ class FolderCell:
                 f"{self.path} is no folder; give the folder that holds {PLAN} and the measurements."
             )
         self.plan: Plan = read_plan(self.path / PLAN)
-        joints = self._commanded.shape[1]
+        joints = self.plan.joint_count
         if joints != model.n:
             raise InputError(
                 f"{self.path / PLAN}: the plan is for {joints} joints, but the robot has {model.n}; check robot.yaml."
             )
 
-    def record(self, plan: MultisinePlan | None = None) -> Iterator[Recording]:
+    def record(self, plan: MultisinePlan | TrajectoryPlan | None = None) -> Iterator[Recording]:
         """The recordings one by one, in the order of the plan (None: that of the folder).
 
         Raises `InputError`, before the first recording, where the folder holds another plan or a log is missing; and
         as `read_recording` does.
         """
         own = self.plan
-        if not isinstance(own, MultisinePlan):
+        if isinstance(own, PosePlan):
             raise InputError(f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no joint logs.")
         self._check_same(plan)
         files = [(existing_file(self.path, label.name), label) for label in labels(own)]
@@ -85,10 +86,6 @@ class FolderCell:
                 "measure in the order of the plan, or give the plan that was measured."
             )
         return poses
-
-    @property
-    def _commanded(self) -> np.ndarray:
-        return self.plan.poses if isinstance(self.plan, MultisinePlan) else self.plan.q
 
     def _check_same(self, plan: Plan | None) -> None:
         if plan is None:

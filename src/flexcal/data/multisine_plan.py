@@ -64,6 +64,11 @@ class MultisinePlan:
         self._check_values()
 
     @property
+    def joint_count(self) -> int:
+        """Joints of the robot that the plan is for."""
+        return self.poses.shape[1]
+
+    @property
     def experiments(self) -> int:
         """Orthogonal experiments of one realisation: as many as excited axes."""
         return len(self.joints)

@@ -7,14 +7,19 @@ from typing import TypeVar
 
 from flexcal.data.multisine_plan import MultisinePlan
 from flexcal.data.pose_plan import PosePlan
+from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.errors import InputError
 from flexcal.yaml_reader import read_yaml_file
 from flexcal.yaml_writer import write_yaml
 
-Plan = MultisinePlan | PosePlan
-P = TypeVar("P", MultisinePlan, PosePlan)
+Plan = MultisinePlan | TrajectoryPlan | PosePlan
+P = TypeVar("P", MultisinePlan, TrajectoryPlan, PosePlan)
 
-_KINDS: dict[str, type[MultisinePlan] | type[PosePlan]] = {"multisine": MultisinePlan, "poses": PosePlan}
+_KINDS: dict[str, type[MultisinePlan] | type[TrajectoryPlan] | type[PosePlan]] = {
+    "multisine": MultisinePlan,
+    "trajectory": TrajectoryPlan,
+    "poses": PosePlan,
+}
 
 
 def read_plan(path: str | Path) -> Plan:

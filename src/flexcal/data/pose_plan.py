@@ -48,3 +48,8 @@ class PosePlan:
 
     def __len__(self) -> int:
         return self.q.shape[0]
+
+    @property
+    def joint_count(self) -> int:
+        """Joints of the robot that the plan is for."""
+        return self.q.shape[1]

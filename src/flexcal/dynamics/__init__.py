@@ -30,6 +30,7 @@ from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
@@ -71,6 +72,7 @@ __all__ = [
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
+    "identify_with_prior",
     "log_blocks",
     "motion_bandwidth",
     "observe",

@@ -72,12 +72,14 @@ def identify_stiffness(
     neighbouring lines, the first inflated by the reduced χ² where it exceeds 1. The damping of a spring whose stiffness is not
     identifiable is not either. Raises `FlexcalError` where responses do not fit the robot.
     """
-    parameters = stage_one_parameters(model, responses, inertias_known=inertias_known, gaps=plan is not None)
+    parameters, prior = model.posterior.prior(
+        stage_one_parameters(model, responses, inertias_known=inertias_known, gaps=plan is not None)
+    )
     reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
     weighting = CovarianceWeighting() if weighting is None else weighting
     tolerances = Tolerances() if tolerances is None else tolerances
     search = MultiStart() if search is None else search
-    x = search.find(model, responses, parameters, rng, progress)
+    x = search.find(model, responses, parameters, prior, rng, progress)
     predicting = ResponseModel.of(model, responses, parameters)
     measured = StageOneResidual.of(predicting, responses, weighting)
     effects = [ExperimentEffect.none(response) for response in responses]
@@ -93,7 +95,7 @@ def identify_stiffness(
         residual = measured.shifted(predicting, [effect.shift for effect in effects])
         error = ModelError.of(residual, responses, x, effects, tolerances) if tolerances.any else None
         last = number == rounds - 1
-        estimate = _fit(residual, error, parameters, x, inflation, 1e-7 if last else 1e-3)
+        estimate = _fit(residual, error, parameters, prior, x, inflation, 1e-7 if last else 1e-3)
         x = estimate.parameters.coordinates()
         progress("fitting", (number + 1) / rounds)
     assert estimate is not None
@@ -113,6 +115,7 @@ def _fit(
     residual: StageOneResidual,
     error: ModelError | None,
     parameters: Parameters,
+    prior: np.ndarray,
     x: np.ndarray,
     inflation: float,
     tolerance: float,
@@ -128,6 +131,7 @@ def _fit(
         parameters,
         linearise,
         lambda at: whiten(residual.residual(at)),
+        prior_covariance=prior,
         groups=residual.clusters(CLUSTER_LINES),
     )
     fitted = solve(problem, starts=x[None], tolerance=tolerance)
@@ -137,17 +141,18 @@ def _fit(
         robust = solve(
             problem, starts=fitted.parameters.coordinates()[None], covariance="sandwich", tolerance=tolerance
         )
-    return _widened(fitted, robust, inflation)
+    return _widened(fitted, robust, inflation, problem.prior_rows())
 
 
-def _widened(fitted: Estimate, robust: Estimate | None, inflation: float) -> Estimate:
+def _widened(fitted: Estimate, robust: Estimate | None, inflation: float, prior_rows: np.ndarray) -> Estimate:
     """The covariance for measurements whose variance is `inflation` times what weighs them.
 
-    That is H + (f - 1) (H - H P H), with H the posterior and P the prior's information. Every standard deviation is then raised by
-    the sandwich's or the reduced χ², where these are larger than the weights say.
+    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L. Every standard deviation
+    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say.
     """
     posterior = fitted.covariance
-    from_data = posterior - posterior @ fitted.parameters.prior_information() @ posterior
+    from_prior = prior_rows @ posterior
+    from_data = posterior - from_prior.T @ from_prior
     covariance = posterior + (inflation - 1.0) * from_data
     std = np.sqrt(np.diag(posterior))
     factor = np.full(

@@ -12,6 +12,7 @@ from flexcal.elasticity.naming import pose_labels, viscous_name
 from flexcal.elasticity.prediction import Prediction, ResponseModel
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.frequency import FrequencyResponse
+from flexcal.model.declared import ANGLE_TOLERANCE, LENGTH_TOLERANCE
 from flexcal.model.names import GEOMETRY
 
 
@@ -27,8 +28,8 @@ class Tolerances:
     realisations does not lower it.
     """
 
-    length: float = 3e-4
-    angle: float = 5e-4
+    length: float = LENGTH_TOLERANCE
+    angle: float = ANGLE_TOLERANCE
     strength: float = 0.2
     width: float = 0.3
     friction: float = 0.05

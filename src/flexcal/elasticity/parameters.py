@@ -11,6 +11,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.declared import declared, uncertain_inertials
 from flexcal.model.names import unit_of
 
 SPRING_LOG_STD = 1.5
@@ -46,8 +47,8 @@ def stage_one_parameters(
     ]
     for joint in model.elastic:
         name = f"{joint.name}.rotor_inertia"
-        std = model.prior.rotor_inertia
-        items.append(Parameter(name, unit_of(name), _positive(model, name), prior_std=std, scale="log"))
+        _positive(model, name)
+        items.append(declared(model, name))
     if not inertias_known:
         items += _inertial(model, responses)
     for joint in model.elastic:
@@ -113,25 +114,16 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
 
 def _inertial(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list[Parameter]:
     elastic = {joint.index for joint in model.elastic}
-    items = []
-    for i, joint in enumerate(model.joints):
+    moved = []
+    for i in range(model.n):
         at = i
         while at >= 0 and at not in elastic:
             at = model.joints[at].parent
-        if at < 0 or not model.mass[i] > 0:
-            continue
-        name = f"{joint.link}.mass"
-        if model.prior.mass > 0:
-            items.append(Parameter(name, "kg", model.value(name), prior_std=model.prior.mass, scale="log"))
-        if model.prior.com > 0:
-            items += [
-                Parameter(f"{joint.link}.com_{key}", "m", model.com[i, k], prior_std=model.prior.com)
-                for k, key in enumerate("xyz")
-            ]
+        moved += [i] if at >= 0 else []
+    items = [declared(model, name) for name in uncertain_inertials(model, moved)]
     held = model.payload
     if held is not None and held.mass > 0 and held.mass_std > 0 and any(r.payload != 0 for r in responses):
-        std = held.mass_std / held.mass
-        items.append(Parameter("payload.mass", "kg", held.mass, prior_std=std, scale="log"))
+        items.append(declared(model, "payload.mass"))
     return items
 
 

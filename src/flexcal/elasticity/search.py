@@ -26,10 +26,11 @@ class Search(Protocol):
         robot: RobotModel,
         responses: Sequence[FrequencyResponse],
         parameters: Parameters,
+        prior: np.ndarray,
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> np.ndarray:
-        """Estimation coordinates (p,) to start the fit from."""
+        """Estimation coordinates (p,) to start the fit from; `prior` (p, p) is the covariance of what is known of them."""
         ...
 
 
@@ -64,6 +65,7 @@ class MultiStart:
         robot: RobotModel,
         responses: Sequence[FrequencyResponse],
         parameters: Parameters,
+        prior: np.ndarray,
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> np.ndarray:
@@ -72,7 +74,7 @@ class MultiStart:
         residual = StageOneResidual.of(
             ResponseModel.of(robot, thinned, parameters), thinned, TemperedWeighting(self.sigma)
         )
-        problem = Problem(parameters, residual.linearise, residual.residual)
+        problem = Problem(parameters, residual.linearise, residual.residual, prior)
         springs = [parameters.index(name) for name in spring_names(robot)]
         ends: list[tuple[float, np.ndarray]] = []
         progress("searching", 0.0)
@@ -115,6 +117,7 @@ class PopulationSearch:
         robot: RobotModel,
         responses: Sequence[FrequencyResponse],
         parameters: Parameters,
+        prior: np.ndarray,
         rng: np.random.Generator,
         progress: Progress = silent,
     ) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.data import MultisinePlan, Recording
+from flexcal.data import MultisinePlan, Recording, TrajectoryPlan
 from flexcal.errors import FlexcalError
 from flexcal.frequency.multisine import samples_per_period
 
@@ -107,7 +107,7 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
     return candidates[~_is_whole(candidates / _reference_ratio(plan))]
 
 
-def torque_hold(plan: MultisinePlan, omega: np.ndarray, time_step: float) -> np.ndarray:
+def torque_hold(plan: MultisinePlan | TrajectoryPlan, omega: np.ndarray, time_step: float) -> np.ndarray:
     """Factor (L,) from the spectrum of the logged torque samples to that of the torque that acted; T = time_step.
 
     "held": the sample acts until the next one, sinc(ωT/2) exp(-jωT/2), exact for a staircase. "instantaneous": 1, the

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,6 +28,23 @@ class Posterior:
         """Joint covariance (k, k) of the named parameters, in estimation coordinates."""
         numbers = [self.parameters.index(name) for name in names]
         return self.covariance[np.ix_(numbers, numbers)]
+
+    def prior(self, declared: Parameters) -> tuple[Parameters, np.ndarray]:
+        """What to start an identification of `declared` from: these with the marginal priors, and the joint prior covariance (p, p).
+
+        Where they were estimated before, on the same scale, the joint covariance of that replaces what was declared of them. Values stay:
+        a robot with this posterior has its values.
+        """
+        known = [
+            k
+            for k, item in enumerate(declared)
+            if self.determines(item.name) and self.parameters[item.name].scale == item.scale
+        ]
+        covariance = np.diag(declared.prior_std() ** 2)
+        covariance[np.ix_(known, known)] = self.marginal([declared.names[k] for k in known])
+        std = np.sqrt(np.diag(covariance))
+        items = (replace(item, prior_std=float(s)) for item, s in zip(declared, std, strict=True))
+        return Parameters(items), covariance
 
     def updated(self, estimate: Estimate, names: tuple[str, ...]) -> Posterior:
         """With the named parameters taken from `estimate`; what only the older holds stays, taken as independent of it."""

@@ -11,6 +11,7 @@ import numpy as np
 from flexcal.calibration import Calibration, ErrorStatistics, Verification
 from flexcal.data import MultisinePlan, PoseSet
 from flexcal.elasticity import StiffnessResult
+from flexcal.estimation import Estimate
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.report.publication import Publication
@@ -20,17 +21,29 @@ MAXWELL_MEAN = 1.5958
 
 
 @dataclass(frozen=True, eq=False)
+class CadAlone:
+    """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
+
+    stiffness: StiffnessResult
+    calibration: Calibration
+    verification: Verification
+
+
+@dataclass(frozen=True, eq=False)
 class TwoStageStudy:
     """One robot, both stages, and how they were checked.
 
-    `nominal` is the robot of the data sheet; `calibration.model` the calibrated one. `rigid` holds fits of the same robot without
-    elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on `verification_poses` are against the
-    noise-free truth where `truth` is known, otherwise against the instrument; `measured_verification` is against the instrument, on
-    `measured_poses`. `floor` is the error that would remain with every parameter known. `truth` maps parameter names to SI values.
+    `nominal` is the robot of the data sheet; `informed` what both stages start from, with the inertials `dynamics` that trajectories
+    identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds
+    fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
+    `verification_poses` are against the noise-free truth where `truth` is known, otherwise against the instrument;
+    `measured_verification` is against the instrument, on `measured_poses`. `floor` is the error that would remain with every parameter
+    known. `truth` maps parameter names to SI values.
     `results` is the document of results.json, `seconds` durations by stage.
     """
 
     nominal: RobotModel
+    informed: RobotModel
     plan: MultisinePlan
     responses: tuple[FrequencyResponse, ...]
     stiffness: StiffnessResult
@@ -41,6 +54,8 @@ class TwoStageStudy:
     nominal_verification: Verification
     elastic_verification: Verification
     rigid_verification: tuple[Verification, ...]
+    dynamics: Estimate | None = None
+    cad_alone: CadAlone | None = None
     measured_poses: PoseSet | None = None
     measured_verification: Verification | None = None
     floor: ErrorStatistics | None = None

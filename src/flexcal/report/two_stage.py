@@ -22,6 +22,7 @@ from flexcal.report.sections.comparison import comparison_section
 from flexcal.report.sections.geometry import geometry_section
 from flexcal.report.sections.parameters import coverage
 from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.stage_zero import stage_zero_section
 from flexcal.report.sections.stiffness import stiffness_section
 from flexcal.report.sections.verification import verification_section
 from flexcal.report.study import TwoStageStudy
@@ -42,6 +43,7 @@ def write_two_stage_report(path: str | Path, study: TwoStageStudy) -> None:
 
 def two_stage_page(study: TwoStageStudy) -> Page:
     """The page before it becomes HTML."""
+    before = stage_zero_section(study)
     kind = "simulated robot, its truth known" if study.truth is not None else "measured robot"
     return Page(
         title=f"{study.nominal.name}: calibration report",
@@ -49,6 +51,7 @@ def two_stage_page(study: TwoStageStudy) -> Page:
         + (f" · seed {study.seed}" if study.seed is not None else ""),
         verdict=two_stage_verdict(study),
         sections=(
+            *([before] if before is not None else []),
             stiffness_section(study),
             geometry_section(study),
             verification_section(study),

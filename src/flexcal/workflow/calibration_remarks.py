@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration import Calibration, Drift, moved_far
-from flexcal.calibration.elastic_prior import UNIDENTIFIED_STIFFNESS
+from flexcal.model.declared import UNIDENTIFIED_STIFFNESS
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.pose_remarks import unused_columns
 

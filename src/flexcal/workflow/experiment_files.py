@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of
+from flexcal.data import MultisinePlan, read_plan, read_plan_of
 from flexcal.data.experiment_folder import PLAN
+from flexcal.data.plan_files import Plan
 from flexcal.errors import InputError
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -37,13 +38,12 @@ def example_robot(name: str) -> Path:
     )
 
 
-def read_fitting_plan(path: Path, model: RobotModel) -> MultisinePlan | PosePlan:
+def read_fitting_plan(path: Path, model: RobotModel) -> Plan:
     """A plan for this robot; raises `InputError` where it has another number of joints."""
     plan = read_plan(path)
-    joints = (plan.poses if isinstance(plan, MultisinePlan) else plan.q).shape[1]
-    if joints != model.n:
+    if plan.joint_count != model.n:
         raise InputError(
-            f"{path}: the plan is for {joints} joints, but {model.path} has {model.n}; give the plan of this robot."
+            f"{path}: the plan is for {plan.joint_count} joints, but {model.path} has {model.n}; give the plan of this robot."
         )
     return plan
 

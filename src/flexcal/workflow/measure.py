@@ -16,6 +16,7 @@ from flexcal.data import (
     MultisinePlan,
     PosePlan,
     Recording,
+    labels,
     write_measured_poses,
     write_recordings,
 )
@@ -32,7 +33,7 @@ VIRTUAL = "virtual"
 
 @dataclass(frozen=True)
 class Measurement:
-    """What lies in `folder`: joint logs of a frequency experiment, or measured poses, by a plan of this kind and name."""
+    """What lies in `folder`: joint logs of an experiment, or measured poses, by a plan of this kind and name."""
 
     folder: Path
     kind: str
@@ -83,12 +84,13 @@ def measure(
         source, drawn = _virtual(model, config, seed, truth)
     else:
         source = FolderCell(cell, model)
-    if isinstance(plan, MultisinePlan):
-        total = len(plan.poses) * plan.recordings_per_pose
-        write_recordings(out, plan, _counted(source.record(plan), total, progress))
-        result = Measurement(out, plan.kind, plan.name, len(plan.poses), total)
-    else:
+    if isinstance(plan, PosePlan):
         result = Measurement(out, plan.kind, plan.name, _measure_poses(source, plan, out, progress), 0)
+    else:
+        total = len(list(labels(plan)))
+        write_recordings(out, plan, _counted(source.record(plan), total, progress))
+        poses = len(plan.poses) if isinstance(plan, MultisinePlan) else 0
+        result = Measurement(out, plan.kind, plan.name, poses, total)
     if drawn:
         write_truth(out / "truth.yaml", drawn)
     write_results(out, result.document())

@@ -1,4 +1,4 @@
-"""The main job, whole: excite, identify stiffness, choose poses, measure, calibrate, verify, report (P1)."""
+"""The main job, whole: identify inertials, then stiffness, choose poses, measure, calibrate, verify, report (P0, P1)."""
 
 from __future__ import annotations
 
@@ -15,17 +15,19 @@ from flexcal.calibration import ErrorStatistics, calibrate, predict, register, v
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
 from flexcal.data import MultisinePlan, Recording, provenance, write_estimates, write_plan, write_poses
 from flexcal.design import MeasuringSetup, design_poses, random_poses
-from flexcal.elasticity import identify_stiffness
+from flexcal.elasticity import StiffnessResult, identify_stiffness
+from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.publication import TX90L_PAPER
-from flexcal.report.study import TwoStageStudy
+from flexcal.report.study import CadAlone, TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.results import write_results
+from flexcal.workflow.stage_zero import run_stage_zero
 from flexcal.workflow.two_stage_results import two_stage_document, write_verification
 from flexcal.yaml_reader import read_yaml
 
@@ -33,7 +35,7 @@ CALIBRATION_POSES = 40
 RIGID_POSES = (40, 100)
 VERIFICATION_POSES = 150
 
-STAGES = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "report")
+STAGES = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "cad_alone", "report")
 
 
 @dataclass
@@ -79,7 +81,13 @@ def run_two_stage(
         else read_truth_of(truth, nominal),
     )
     cell = VirtualCell(nominal.with_values(read_truth(hidden)), config, seed, controller_model=nominal)
-    believed = nominal.with_values(_inertias(read_truth(hidden))) if inertias_known else nominal
+    dynamics = None
+    if inertias_known:
+        believed = nominal.with_values(_inertias(read_truth(hidden)))
+    else:
+        with watch.stage("dynamics"):
+            dynamics = run_stage_zero(cell, nominal, out, seed=seed, progress=progress)[1]
+        believed = nominal.with_estimate(dynamics)
 
     frequency = frequency_plan(nominal, robot.parent / "frequency_poses.csv", plan, seed)
     write_plan(out / "frequency_plan.yaml", frequency)
@@ -92,14 +100,18 @@ def run_two_stage(
         response.save(file)
     with watch.stage("stage1"):
         progress("stage1", 0.0)
-        stiffness = identify_stiffness(
-            believed,
-            responses,
-            inertias_known=inertias_known,
-            plan=frequency,
-            rng=np.random.default_rng([seed, 1]),
-            progress=lambda part, share: progress("stage1", (share + (part == "fitting")) / 2),
-        )
+
+        def stage_one(robot: RobotModel, stage: str) -> StiffnessResult:
+            return identify_stiffness(
+                robot,
+                responses,
+                inertias_known=inertias_known,
+                plan=frequency,
+                rng=np.random.default_rng([seed, 1]),
+                progress=lambda part, share: progress(stage, (share + (part == "fitting")) / 2),
+            )
+
+        stiffness = stage_one(believed, "stage1")
         elastic = believed.with_estimate(stiffness.estimate)
         progress("stage1", 1.0)
     with watch.stage("poses"):
@@ -138,6 +150,8 @@ def run_two_stage(
         registered = register(nominal, measured, predict(nominal, measured, elastic=False).position)
         study = TwoStageStudy(
             nominal=nominal,
+            informed=believed,
+            dynamics=dynamics,
             plan=frequency,
             responses=responses,
             stiffness=stiffness,
@@ -159,6 +173,12 @@ def run_two_stage(
             + ("" if truth is None else f" --truth {truth.name}"),
         )
         progress("verification", 1.0)
+    if dynamics is not None:
+        with watch.stage("cad_alone"):
+            springs = stage_one(nominal, "cad_alone")
+            fitted = calibrate(nominal.with_estimate(springs.estimate), measured)
+            study = replace(study, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact)))
+            progress("cad_alone", 1.0)
     study = replace(study, results=two_stage_document(study, exported))
     with watch.stage("report"):
         progress("report", 0.0)
@@ -196,9 +216,10 @@ def _store(
 ) -> Estimate:
     """Store both blocks of `out`/estimates.yaml with what they came from; the geometry with its provenance."""
     path = out / "estimates.yaml"
-    origin = provenance([*robot, out / "frequency_plan.yaml", *responses], options)
+    used: tuple[Block, ...] = () if options["inertias_known"] else ("dynamics",)
+    origin = provenance([*robot, out / "frequency_plan.yaml", *responses], options, path, used)
     write_estimates(path, "stiffness", replace(stiffness, provenance=origin))
-    origin = provenance([*robot, out / "calibration_poses.csv"], options, path, ("stiffness",))
+    origin = provenance([*robot, out / "calibration_poses.csv"], options, path, (*used, "stiffness"))
     stored = replace(geometry, provenance=origin)
     write_estimates(path, "calibration", stored)
     return stored

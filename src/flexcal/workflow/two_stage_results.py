@@ -9,30 +9,23 @@ import numpy as np
 
 from flexcal.atomic import write_text
 from flexcal.calibration import ErrorStatistics
+from flexcal.estimation import Estimate
 from flexcal.export.urdf import UrdfExport
 from flexcal.model.names import SPRINGS
-from flexcal.report.study import TwoStageStudy
-from flexcal.workflow.results import identifiability_block
+from flexcal.report.study import CadAlone, TwoStageStudy
+from flexcal.workflow.results import identifiability_block, quantities
 
 
 def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, Any]:
     """The content of results.json."""
     truth = study.truth or {}
     estimate = study.stiffness.estimate
-    stage_one: dict[str, dict[str, Any]] = {}
-    for kind in ("stiffness", "damping"):
-        stage_one[kind] = {
-            joint.name: {
-                SPRINGS[c]: estimate.quantity(
-                    f"{joint.name}.{SPRINGS[c]}.{kind}", truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
-                )
-                for c in joint.components
-            }
-            for joint in study.nominal.elastic
-        }
+    stage_one = {kind: _springs(study, estimate, kind) for kind in ("stiffness", "damping")}
     measured = study.measured_verification
     rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(study.rigid, study.rigid_verification, strict=True)}
     return {
+        "dynamics": None if study.dynamics is None else {"parameters": quantities(study.dynamics, truth)},
+        "cad_alone": None if study.cad_alone is None else _cad_alone(study, study.cad_alone),
         "stage1": stage_one
         | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
         "identifiability": identifiability_block(study.calibration.identifiability),
@@ -62,6 +55,33 @@ def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, 
         "seed": study.seed,
         "plan": study.plan.name,
         "command": study.command,
+    }
+
+
+def _cad_alone(study: TwoStageStudy, cad: CadAlone) -> dict[str, Any]:
+    """The numbers of both stages without stage 0, under the names of the run's own."""
+    kinds = ("stiffness", "damping")
+    return {
+        "stage1": {kind: _springs(study, cad.stiffness.estimate, kind) for kind in kinds},
+        "calibration": cad.calibration.errors.in_millimetres(),
+        "verification": {
+            "elastic": cad.verification.all.in_millimetres(),
+            "elastic_unambiguous": cad.verification.unambiguous.in_millimetres(),
+        },
+    }
+
+
+def _springs(study: TwoStageStudy, estimate: Estimate, kind: str) -> dict[str, Any]:
+    """Every stiffness or damping as a quantity, by joint and spring."""
+    truth = study.truth or {}
+    return {
+        joint.name: {
+            SPRINGS[c]: estimate.quantity(
+                f"{joint.name}.{SPRINGS[c]}.{kind}", truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
+            )
+            for c in joint.components
+        }
+        for joint in study.nominal.elastic
     }
 
 

@@ -1,0 +1,69 @@
+"""One period of a periodic experiment as its Fourier series (Swevers 1997): averaging, filtering and differentiation are exact there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import Recording, TrajectoryPlan
+from flexcal.errors import FlexcalError
+from flexcal.frequency.spectrum import torque_hold
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodicMotion:
+    """Complex coefficients (K + 1, n) of `position` (rad) and `torque` (N m) at the multiples 0…K of `base_frequency_hz`."""
+
+    position: np.ndarray
+    torque: np.ndarray
+    base_frequency_hz: float
+    samples: int
+
+    @classmethod
+    def of(cls, recording: Recording, plan: TrajectoryPlan, cutoff_hz: float) -> PeriodicMotion:
+        """The mean of the periods after the settling ones, up to `cutoff_hz`; the torque as it acts, with its hold.
+
+        Raises `FlexcalError` where the recording is not as long or as fast as planned.
+        """
+        size, periods = plan.samples_per_period, plan.periods
+        if len(recording) != size * periods or not np.isclose(
+            recording.time_step * plan.rate_hz, 1.0, rtol=1e-6
+        ):
+            raise FlexcalError(
+                f"{recording.name} has {len(recording)} samples every {recording.time_step:g} s; its plan asks for {size * periods} every "
+                f"{1 / plan.rate_hz:g} s."
+            )
+        lines = int(cutoff_hz / plan.base_frequency_hz) + 1
+        omega = 2 * np.pi * plan.base_frequency_hz * np.arange(lines)
+
+        def coefficients(values: np.ndarray) -> np.ndarray:
+            kept = values.reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
+            return np.fft.rfft(kept, axis=0)[:lines] / size
+
+        torque = coefficients(recording.torque) * torque_hold(plan, omega, recording.time_step)[:, None]
+        return cls(coefficients(recording.q), torque, plan.base_frequency_hz, size)
+
+    @property
+    def lines(self) -> int:
+        """Number of lines, that at zero among them."""
+        return len(self.position)
+
+    def states(self, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Position, velocity and acceleration, each (samples, n), at even instants of the period."""
+        omega = 2j * np.pi * self.base_frequency_hz * np.arange(self.lines)[:, None]
+        wide = np.zeros((3, samples // 2 + 1, self.position.shape[1]), dtype=complex)
+        for order in range(3):
+            wide[order, : self.lines] = self.position * omega**order * samples
+        q, dq, ddq = np.fft.irfft(wide, n=samples, axis=1)
+        return q, dq, ddq
+
+    def rows(self, values: np.ndarray) -> np.ndarray:
+        """Real coefficients (2 K + 1, …) of `values` (samples, …) up to the cut-off: white noise stays white, and of one size."""
+        return real_rows(np.fft.rfft(values, axis=0)[: self.lines] / len(values))
+
+
+def real_rows(coefficients: np.ndarray) -> np.ndarray:
+    """(K + 1, …) complex coefficients to (2 K + 1, …) real ones: the mean, then √2 times real and imaginary parts."""
+    above = np.sqrt(2.0) * coefficients[1:]
+    return np.concatenate([np.real(coefficients[:1]), np.real(above), np.imag(above)])

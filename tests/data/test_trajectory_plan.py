@@ -1,0 +1,93 @@
+"""Exciting trajectories as plans: round trip, their motion, what does not fit together."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from flexcal.data import MultisinePlan, TrajectoryPlan, labels, read_plan_of, write_plan
+from flexcal.errors import FlexcalError, InputError
+from flexcal.yaml_writer import to_plain
+
+
+def make_trajectory(**changes: Any) -> TrajectoryPlan:
+    """Two trajectories of three joints with four harmonics."""
+    rng = np.random.default_rng(3)
+    values: dict[str, Any] = {
+        "name": "small",
+        "centre": rng.normal(size=(2, 3)),
+        "sine": rng.normal(size=(2, 3, 4)),
+        "cosine": rng.normal(size=(2, 3, 4)),
+        "payload": 0.0,
+        "base_frequency_hz": 0.2,
+        "periods": 3,
+        "settle_periods": 1,
+        "kp": np.array([3e3, 800.0, 60.0]),
+        "kd": np.array([400.0, 20.0, 4.0]),
+        "rate_hz": 4000.0,
+        "torque": "held",
+        "seed": 2**40,
+    }
+    return TrajectoryPlan(**(values | changes))
+
+
+def test_round_trip(tmp_path: Path) -> None:
+    plan = make_trajectory()
+    write_plan(tmp_path / "plan.yaml", plan)
+    again = read_plan_of(tmp_path / "plan.yaml", TrajectoryPlan)
+    assert to_plain(again) == to_plain(plan)
+    np.testing.assert_array_equal(again.sine, plan.sine)
+    with pytest.raises(InputError, match="kind 'trajectory', but one of kind 'multisine'"):
+        read_plan_of(tmp_path / "plan.yaml", MultisinePlan)
+
+
+def test_velocity_and_acceleration_are_derivatives() -> None:
+    """Complex steps on a series written out independently of the plan."""
+    plan = make_trajectory()
+    time = np.linspace(0.3, 4.1, 17)
+    q, dq, ddq = plan.motion(1, time)
+    k = 2 * np.pi * 0.2 * np.arange(1, 5)
+
+    def velocity(t: np.ndarray) -> np.ndarray:
+        angle = t[:, None, None] * k
+        return np.sum(plan.sine[1] * np.sin(angle) + plan.cosine[1] * np.cos(angle), axis=2)
+
+    np.testing.assert_allclose(dq, velocity(time), rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(ddq, velocity(time + 1e-20j).imag / 1e-20, rtol=1e-10, atol=1e-10)
+    fine = np.linspace(time[0], time[1], 4001)
+    moved = np.trapezoid(velocity(fine), fine, axis=0)
+    np.testing.assert_allclose(q[1] - q[0], moved, atol=1e-6)
+
+
+def test_motion_is_periodic_about_its_centre() -> None:
+    plan = make_trajectory()
+    time = np.arange(plan.samples_per_period) / plan.rate_hz
+    now, later = plan.motion(0, time), plan.motion(0, time + 5.0)
+    for one, other in zip(now, later, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-9)
+    np.testing.assert_allclose(now[0].mean(axis=0), plan.centre[0], atol=1e-9)
+
+
+def test_every_trajectory_has_a_label() -> None:
+    names = [label.name for label in labels(make_trajectory())]
+    assert names == [f"pose_1_realisation_{k}_experiment_1_plus" for k in (1, 2)]
+
+
+@pytest.mark.parametrize(
+    ("changes", "message"),
+    [
+        ({"sine": np.zeros((2, 2, 4))}, "sine has shape"),
+        ({"cosine": np.zeros((2, 3, 5))}, "same number of harmonics"),
+        ({"kp": np.ones(2)}, "kp has 2 gains"),
+        ({"base_frequency_hz": 0.3}, "no whole number of samples"),
+        ({"settle_periods": 3}, "keep at least one"),
+        ({"payload": -1.0}, "must not be negative"),
+        ({"seed": -1}, "seed is -1"),
+    ],
+)
+def test_what_does_not_fit_is_said(changes: dict[str, Any], message: str) -> None:
+    with pytest.raises(FlexcalError, match=message):
+        make_trajectory(**changes)

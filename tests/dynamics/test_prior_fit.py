@@ -1,0 +1,164 @@
+"""Inertials from trajectories with CAD as the prior: recovery, truthful covariance under coloured noise and on the virtual cell."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexcal.cell import CellConfig, VirtualCell, draw_truth
+from flexcal.data import Recording, TrajectoryPlan
+from flexcal.design import design_trajectories
+from flexcal.dynamics import identify_with_prior
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel, inertial_parameters, torque_regressor
+from flexcal.model.config import PriorConfig
+from flexcal.model.periodic_torque import periodic_torque
+
+
+@pytest.fixture(scope="module")
+def plan(tx90l: RobotModel) -> TrajectoryPlan:
+    """Two trajectories, sampled slowly: synthetic torques need no controller."""
+    designed = design_trajectories(tx90l, 2, candidates=20, seed=1, payload=0.0)
+    return replace(designed, rate_hz=400.0, torque="instantaneous")
+
+
+@pytest.fixture(scope="module")
+def single(plan: TrajectoryPlan) -> TrajectoryPlan:
+    """The first of them."""
+    return replace(plan, centre=plan.centre[:1], sine=plan.sine[:1], cosine=plan.cosine[:1])
+
+
+def drawn(model: RobotModel, rng: np.random.Generator) -> RobotModel:
+    """A true robot as far from CAD, nominal springs and nominal geometry as declared; friction changes by a tenth."""
+    values = draw_truth(model, CellConfig().spread, rng)
+    values = {n: v for n, v in values.items() if not n.endswith((".backlash", ".damping"))}
+    robot = model.with_values(values)
+    return replace(robot, viscous=model.viscous * rng.uniform(0.9, 1.1, model.n), coulomb=model.coulomb * 1.1)
+
+
+def synthetic(truth: RobotModel, plan: TrajectoryPlan, noise: np.ndarray) -> Iterator[Recording]:
+    """Recordings of a true robot that follows the plan exactly; `noise` (samples, n) N m is on its torques."""
+    size = plan.samples_per_period
+    for number in range(len(plan)):
+        q, dq, ddq = plan.motion(number, np.arange(size) / plan.rate_hz)
+        torque = periodic_torque(truth, q, dq, ddq, 1 / plan.base_frequency_hz, 0.0)
+        torque += truth.rotor_inertia * ddq + truth.viscous * dq + truth.coulomb * np.sign(dq)
+        yield Recording(
+            time_step=1 / plan.rate_hz,
+            q=np.tile(q, (plan.periods, 1)),
+            torque=np.tile(torque, (plan.periods, 1)) + noise,
+        )
+
+
+def coloured(plan: TrajectoryPlan, rng: np.random.Generator) -> np.ndarray:
+    """Noise (samples, n) of 0.3 N m that holds for a fifth of a second."""
+    from scipy.signal import lfilter
+
+    decay = np.exp(-5.0 / plan.rate_hz)
+    white = rng.standard_normal((plan.periods * plan.samples_per_period + 1000, plan.joint_count))
+    return 0.3 * np.sqrt(1 - decay**2) * lfilter([1.0], [1.0, -decay], white, axis=0)[1000:]
+
+
+def errors(estimate: Estimate, truth: RobotModel) -> tuple[np.ndarray, float]:
+    """Every error over its standard deviation, and the mean square of all errors together, decorrelated."""
+    names = estimate.parameters.names
+    should = estimate.parameters.coordinates({name: truth.value(name) for name in names})
+    error = estimate.parameters.coordinates() - should
+    together = float(error @ np.linalg.solve(estimate.covariance, error)) / len(error)
+    return error / np.sqrt(np.diag(estimate.covariance)), together
+
+
+def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, single: TrajectoryPlan) -> None:
+    """Single masses stay as uncertain as CAD; what turns the motors, on motions never recorded, does not."""
+    rng = np.random.default_rng(5)
+    truth = drawn(tx90l, rng)
+    truth = replace(truth, geometry=tx90l.geometry, stiffness=tx90l.stiffness)
+    found = tx90l.with_estimate(
+        identify_with_prior(tx90l, single, synthetic(truth, single, np.zeros((1, 6))))
+    )
+    q, dq, ddq = rng.uniform(-1, 1, (3, 50, 6)) * np.array([2.0, 2.0, 5.0])[:, None, None]
+
+    def torque(robot: RobotModel) -> np.ndarray:
+        rows = torque_regressor(replace(robot, geometry=tx90l.geometry), q, dq, ddq) @ inertial_parameters(
+            robot
+        )
+        return rows + robot.rotor_inertia * ddq
+
+    scale = np.linalg.norm(torque(truth), axis=0)
+    before = np.linalg.norm(torque(tx90l) - torque(truth), axis=0) / scale
+    after = np.linalg.norm(torque(found) - torque(truth), axis=0) / scale
+    assert (before > 0.02).all()
+    assert (after < 0.05 * before).all()
+    np.testing.assert_allclose(found.viscous, truth.viscous, rtol=1e-3)
+    np.testing.assert_allclose(found.coulomb, truth.coulomb, rtol=1e-3)
+
+
+def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: TrajectoryPlan) -> None:
+    """A robot.yaml that lets no link be off has no unknown link."""
+    exact = PriorConfig(mass=0.0, com=0.0, rotor_inertia=0.05)
+    robot = replace(tx90l, config=replace(tx90l.config, prior=exact))
+    truth = replace(robot, rotor_inertia=1.04 * robot.rotor_inertia)
+    rng = np.random.default_rng(6)
+    estimate = identify_with_prior(robot, single, synthetic(truth, single, coloured(single, rng)))
+    assert not any(name.startswith("link") for name in estimate.parameters.names)
+    for name in tx90l.joint_names:
+        key = f"{name}.rotor_inertia"
+        std = estimate.std(key)
+        assert std is not None and abs(estimate.values[key] - truth.value(key)) < 4 * std
+
+
+def test_covariance_is_true_under_coloured_noise(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
+    inside, together = coverage(tx90l, plan, range(2))
+    assert 0.90 < inside < 0.99
+    assert 0.75 < together < 1.4
+
+
+@pytest.mark.slow
+def test_covariance_is_true_on_many_robots(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
+    inside, together = coverage(tx90l, plan, range(100, 160))
+    assert 0.93 < inside < 0.97
+    assert 0.9 < together < 1.2
+
+
+def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[float, float]:
+    """Share of the 95 % intervals that hold the truth, and the mean square of decorrelated errors."""
+    normalised, together = [], []
+    for seed in seeds:
+        rng = np.random.default_rng([2024, seed])
+        truth = drawn(model, rng)
+        estimate = identify_with_prior(model, plan, synthetic(truth, plan, coloured(plan, rng)))
+        one, both = errors(estimate, truth)
+        normalised.append(one)
+        together.append(both)
+    return float(np.mean(np.abs(normalised) < 1.96)), float(np.mean(together))
+
+
+def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
+    """MuJoCo's robot with gaps, encoders and a friction that is no sign: the covariance still holds, and gravity is known."""
+    plan = design_trajectories(tx90l, 1, candidates=20, seed=4, payload=0.0)
+    values = draw_truth(tx90l, CellConfig().spread, np.random.default_rng(4))
+    truth = tx90l.with_values(values)
+    cell = VirtualCell(truth, seed=4, controller_model=tx90l)
+    estimate = identify_with_prior(tx90l, plan, cell.record(plan))
+    one, together = errors(estimate, truth)
+    assert np.mean(np.abs(one) < 1.96) > 0.88
+    assert 0.5 < together < 1.6
+    for name, below in (("link_2.com_x", 1e-3), ("link_3.com_x", 1e-3), ("joint_2.rotor_inertia", 5e-3)):
+        number = estimate.parameters.index(name)
+        assert np.sqrt(estimate.covariance[number, number]) < below
+
+
+def test_what_does_not_fit_is_said(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
+    short = Recording(time_step=1 / 400, q=np.zeros((50, 6)), torque=np.zeros((50, 6)))
+    with pytest.raises(FlexcalError, match=r"50 samples every 0\.0025 s; its plan asks for 6000"):
+        identify_with_prior(tx90l, plan, [short])
+    with pytest.raises(FlexcalError, match="no recording"):
+        identify_with_prior(tx90l, plan, [])
+    lacking = replace(tx90l, rotor_inertia=np.full(6, np.nan))
+    full = Recording(time_step=1 / 400, q=np.zeros((6000, 6)), torque=np.zeros((6000, 6)))
+    with pytest.raises(FlexcalError, match="joint_1 no rotor inertia"):
+        identify_with_prior(lacking, plan, [full])
