@@ -66,6 +66,7 @@ class StoredFit:
     message: str
     iterations: int
     outliers: tuple[int, ...] = ()
+    covariance_freedom: float | None = None
 
 
 @dataclass(frozen=True)
@@ -256,6 +257,7 @@ def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.nd
         message=fit.message,
         iterations=fit.iterations,
         outliers=fit.outliers,
+        covariance_freedom=fit.covariance_freedom,
         provenance=dict(block.provenance),
     )
 
@@ -286,6 +288,7 @@ def _stored(estimate: Estimate, covariance: np.ndarray) -> StoredBlock:
             message=estimate.message,
             iterations=int(estimate.iterations),
             outliers=tuple(int(number) for number in estimate.outliers),
+            covariance_freedom=estimate.covariance_freedom,
         ),
         covariance_sha256=_sha256(covariance),
         provenance={str(key): str(value) for key, value in estimate.provenance.items()},

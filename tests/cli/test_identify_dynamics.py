@@ -4,6 +4,8 @@ import json
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
+import polars as pl
 import pytest
 from cli_files import copied
 
@@ -22,13 +24,21 @@ def identified(folder: Path, capsys: pytest.CaptureFixture[str], *options: str) 
     return json.loads(capsys.readouterr().out)
 
 
-def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """All sixty within 1.6 published standard deviations, but for two of link 6, the weakest link.
+def with_friction(folder: Path, friction: str) -> Path:
+    robot = folder / "robot.yaml"
+    robot.write_text(
+        robot.read_text().replace("decimation: 100}", f"decimation: 100, friction: {friction}}}")
+    )
+    return folder
 
-    Filter and decimation were others there, and the rotor inertia of joint 6 was left out; the standard
-    deviations have the same meaning.
+
+def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """All sixty near what is published, in its standard deviations, but for Coulomb and viscous friction.
+
+    Filter and rows near standstill were others there, and the rotor inertia of joint 6 was left out (tests/dynamics has both as they
+    were). The published standard deviations take the errors for independent from row to row, which makes them too small.
     """
-    found = identified(tx40, capsys)
+    found = identified(with_friction(tx40, "classic"), capsys)
     assert (found["structural_rank"], found["rank"]) == (61, 61)
     assert found["error_percent"]["held_out"] is None
     base = {row["name"].split()[0]: row for row in found["base_parameters"]}
@@ -36,24 +46,91 @@ def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) ->
     published = {name: (float(value), float(std)) for name, value, std in (line.split(",") for line in lines)}
     assert set(base) - set(published) == {"joint_6.rotor_inertia"}
     off = {name: abs(base[name]["estimate"] - value) / std for name, (value, std) in published.items()}
-    assert {name for name, size in off.items() if size > 1.6} == {"link_6.mc_x", "link_6.mc_y"}
-    assert max(off.values()) < 3.0
-    assert np.median(list(off.values())) < 0.6
-    assert all(0.6 < base[name]["std"] / std < 1.1 for name, (_, std) in published.items())
+    friction = {name for name in off if name.rpartition(".")[2].startswith(("coulomb", "viscous"))}
+    assert max(off[name] for name in off.keys() - friction) < 3.0
+    assert max(off[name] for name in friction) < 5.0
+    assert np.median(list(off.values())) < 0.8
+    ratio = [base[name]["std"] / std for name, (_, std) in published.items()]
+    assert min(ratio) > 0.85 and 1.4 < np.median(ratio) < 2.2
+
+
+def test_rotor_inertia_of_the_motor_that_two_joints_feel(
+    tx40: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Within 5 % of what its maker's file says, 0.00964 seen across and 0.0105 at joint 6 itself (figaroh-examples, TX40_config.yaml)."""
+    for friction in ("classic", "auto"):
+        found = identified(with_friction(tx40, friction), capsys)["parameters"]
+        assert found["joint_6.rotor_inertia_at_joint_5"]["estimate"] == pytest.approx(0.00964, rel=0.05)
+        assert found["joint_6.rotor_inertia"]["estimate"] == pytest.approx(0.0105, rel=0.05)
+        (tx40 / "robot.yaml").write_text(
+            (tx40 / "robot.yaml").read_text().replace(f", friction: {friction}", "")
+        )
 
 
 def test_torques_that_the_fit_never_saw(
     tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
-    found = identified(tx40, capsys, "--hold-out", "last:0.3", "--out", str(tmp_path / "out"))
+    found = identified(
+        with_friction(tx40, "classic"), capsys, "--hold-out", "last:0.3", "--out", str(tmp_path / "out")
+    )
     error = found["error_percent"]
-    assert error["train"] < 5.2
-    assert error["train"] < error["held_out"] < 7.8
+    assert error["train"] < 4.5
+    assert error["train"] < error["held_out"] < 6.95
     assert set(error["per_joint"]) == {f"joint_{i}" for i in range(1, 7)}
     assert found["masked_rows"] > 0
+    essential = found["essential_parameters"]
+    assert 20 <= len(essential["parameters"]) <= 35
+    assert len(essential["parameters"]) + len(essential["eliminated"]) == 61
+    assert error["train"] < essential["error_percent"]["train"] < 1.05 * error["train"]
+    assert essential["error_percent"]["held_out"] < error["held_out"] + 0.2
     assert found["friction_terms"] == ["viscous", "coulomb", "torque_offset"]
+    assert (found["friction_tried"], found["friction_shapes"], found["warnings"]) == ([], {}, [])
     assert not (tx40 / "estimates.yaml").exists()
     assert json.loads((tmp_path / "out" / "results.json").read_text())["error_percent"] == error
+
+
+def test_friction_chosen_inside_the_training_part_predicts_the_rest(
+    tx40: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """No row of the last 30 % is looked at by the choice: with other torques there it chooses the same, after the same trials."""
+    found = identified(tx40, capsys, "--hold-out", "last:0.3")
+    assert found["error_percent"]["held_out"] < 5.2
+    assert found["structural_rank"] == 61 < found["rank"]
+    tried = {tuple(row["terms"]): row["cross_validation_percent"] for row in found["friction_tried"]}
+    chosen = found["friction_terms"][3:]
+    shapes = found["friction_shapes"]
+    best = tuple(f"{name} ({shapes[name]})" if name in shapes else name for name in chosen)
+    assert tried[best] < 0.8 * tried[()]
+    log = pl.read_parquet(tx40 / "exciting.parquet")
+    late = pl.col("t") >= 0.7 * 45000 / 5000
+    log.with_columns(
+        [pl.when(late).then(-pl.col(f"torque_{i}")).otherwise(pl.col(f"torque_{i}")) for i in range(1, 7)]
+    ).write_parquet(tx40 / "exciting.parquet")
+    again = identified(tx40, capsys, "--hold-out", "last:0.3")
+    assert again["friction_tried"] == found["friction_tried"]
+    assert again["parameters"] == found["parameters"]
+    assert again["error_percent"]["held_out"] > 100
+
+
+def test_every_declared_term_is_in_the_estimate(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also when it cannot be told from another: then by name."""
+    friction = (
+        "[coulomb, viscous, torque_offset, asymmetric_coulomb, stribeck, presliding, warm_up, load_coulomb]"
+    )
+    found = identified(with_friction(tx40, friction), capsys)
+    keys = "coulomb viscous torque_offset coulomb_asymmetry stribeck presliding warm_up load_coulomb rotor_inertia"
+    names = {f"joint_{i}.{key}" for i in range(1, 7) for key in keys.split()}
+    coupled = {f"joint_6.{key}_at_joint_5" for key in ("rotor_inertia", "viscous", "coulomb")}
+    assert names | coupled <= set(found["parameters"])
+    hidden = {name for name in names | coupled if not found["parameters"][name]["identifiable"]}
+    assert hidden == {"joint_1.rotor_inertia", "joint_2.rotor_inertia"} | {
+        f"joint_{i}.coulomb_asymmetry" for i in range(1, 7)
+    }
+    for i in range(1, 7):
+        own = f"no recording tells joint_{i}.coulomb_asymmetry from "
+        (remark,) = (text for text in found["warnings"] if text.startswith(own))
+        assert f"joint_{i}.torque_offset" in remark
+    assert set(found["friction_shapes"]) == {"stribeck", "presliding", "warm_up"}
 
 
 def test_the_robot_takes_the_estimate_and_a_second_run_gives_it_again(
@@ -79,7 +156,7 @@ def refusal(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> str:
         ("dynamics: {cutoff_hz: 2600, decimation: 100}", "half the sampling rate"),
         (
             "dynamics: {cutoff_hz: 100, decimation: 100, friction: [sticky]}",
-            "no friction term 'sticky'; there are viscous",
+            "no friction term 'sticky'; there are viscous, coulomb",
         ),
         (
             "dynamics: {cutoff_hz: 100, decimation: 100}\npayload: {frame: tool0, mass: 1.0, com: [0, 0, 0]}",
@@ -106,3 +183,26 @@ def test_two_ways_to_validate_exclude_each_other(tx40: Path, capsys: pytest.Capt
     log = str(tx40 / "exciting.parquet")
     arguments = [str(tx40 / "robot.yaml"), log, "--hold-out", "last:0.3", "--validate", log]
     assert "exclude each other" in refusal(arguments, capsys)
+
+
+def test_bodies_that_could_be_built(tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """sdp finds them, wls says that it has not; the URDF gets them."""
+    robot = tx40 / "robot.yaml"
+    classic = "dynamics: {friction: [viscous, coulomb, torque_offset], "
+    robot.write_text(robot.read_text().replace("dynamics: {", classic))
+    held = ("--hold-out", "last:0.3", "--out", str(tmp_path / "out"))
+    linear, found = (identified(tx40, capsys, *held, "--estimator", name) for name in ("wls", "sdp"))
+    assert linear["bodiless_links"] and found["bodiless_links"] == []
+    assert found["error_percent"]["held_out"] < linear["error_percent"]["held_out"] + 0.05
+    arguments = [str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")]
+    assert main(["identify", "dynamics", *arguments, "--estimator", "wls"]) == 0
+    assert "no body can have the inertials of link_1" in capsys.readouterr().out
+    assert main(["identify", "dynamics", *arguments, "--estimator", "sdp"]) == 0
+    assert "no body can have" not in capsys.readouterr().out
+    urdf = tmp_path / "identified.urdf"
+    assert main(["export", "urdf", str(tx40 / "robot.yaml"), "--out", str(urdf), "--json"]) == 0
+    remarks = json.loads(capsys.readouterr().out)["remarks"]
+    assert len(remarks) == 1 and "stay in estimates.yaml" in remarks[0]
+    robot = RobotModel.from_yaml(tx40 / "robot.yaml")
+    inertias = pin.buildModelFromUrdf(str(urdf)).inertias
+    assert [i.mass for i in list(inertias)[1:]] == pytest.approx(list(robot.mass), rel=1e-12)

@@ -68,7 +68,7 @@ MISTAKES = [
     (RATIO, "coupling: [{motor: motor_6, joint: joint_5, ratio: 1}]", ["no movable joint 'motor_6'"]),
     (RATIO, "coupling: [{motor: joint_5, joint: joint_5, ratio: 1}]", ["two different joints"]),
     (RATIO, "coupling: [{motor: joint_6, joint: joint_5, ratio: 0}]", ["other than 0"]),
-    (TERMS, "dynamics: {friction: coulomb}", ["'auto' or a list", "'coulomb'"]),
+    (TERMS, "dynamics: {friction: coulomb}", ["'auto', 'classic' or a list", "'coulomb'"]),
     (TERMS, "dynamics: {cutoff_hz: -1}", ["cutoff_hz must be positive"]),
     (TERMS, "dynamics: {decimation: 0}", ["decimation must be 1 or more"]),
     (TERMS, "dynamics: {decimation: 1.5}", ["decimation", "a whole number", "1.5"]),

@@ -92,3 +92,25 @@ def test_later_block_wins_and_both_are_kept(robot: Path) -> None:
     model = RobotModel.from_yaml(robot)
     assert model.value("forearm_link.mass") == 2.5 and model.value("wrist_1_link.mass") == 1.5
     assert set(model.posterior.parameters.names) == {"forearm_link.mass", "wrist_1_link.mass"}
+
+
+def test_springs_do_not_stand_on_links_that_no_body_can_be(examples: Path, tmp_path: Path) -> None:
+    """Linear least squares may give an inertia that is none; a rigid robot takes it, as its torques are right."""
+    elastic = (examples / "tx90l" / "robot.yaml").read_text()
+    (tmp_path / "tx90l.urdf").write_bytes((examples / "tx90l" / "tx90l.urdf").read_bytes())
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(elastic)
+    nominal = RobotModel.from_yaml(robot)
+    inertial = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+    values = {f"link_3.{key}": nominal.value(f"link_3.{key}") for key in inertial}
+    path = tmp_path / "estimates.yaml"
+    write_estimates(path, "dynamics", estimate(*(Parameter(n, "1", v) for n, v in values.items())))
+    assert RobotModel.from_yaml(robot).value("link_3.Ixx") == pytest.approx(values["link_3.Ixx"])
+    values["link_3.Ixx"] *= 9
+    write_estimates(path, "dynamics", estimate(*(Parameter(n, "1", v) for n, v in values.items())))
+    with pytest.raises(
+        InputError, match=r"estimates\.yaml: no body can have .* gives link_3, .* --estimator sdp"
+    ):
+        RobotModel.from_yaml(robot)
+    rigid = replace(nominal, bearing_frames={})
+    assert apply_estimates(rigid, path).value("link_3.Ixx") == pytest.approx(values["link_3.Ixx"])

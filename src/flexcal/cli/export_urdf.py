@@ -14,9 +14,10 @@ from flexcal.cli.options import Json, Robot, require_robot
 
 @dataclass(frozen=True)
 class ExportUrdf:
-    """Write the calibrated robot as URDF: joint origins and tool moved to where they were found to be.
+    """Write the calibrated robot as URDF: joint origins and tool moved to where they were found to be, links with identified inertials.
 
-    A URDF cannot hold deflection, backlash and transmission error; what leaving them out costs is said in millimetres.
+    A URDF cannot hold deflection, backlash and transmission error; what leaving them out costs is said in millimetres. Rotor inertia
+    and friction stay in estimates.yaml.
     """
 
     robot: Robot

@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_files, require_robot
+from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
 
@@ -18,7 +18,8 @@ class IdentifyDynamics:
     """Fit link inertias, rotor inertias and friction to recordings of exciting motion.
 
     Writes estimates.yaml beside robot.yaml. Parameters that no motion can tell apart stay as CAD has them, and the others absorb them:
-    the robot as a whole needs the measured torques, while a single mass or inertia need not be what a scale would show.
+    the robot as a whole needs the measured torques, while a single mass or inertia need not be what a scale would show. With
+    --estimator sdp every link is a body that could be built, as near to CAD as the torques allow: springs and a URDF need that.
     """
 
     robot: Robot
@@ -30,19 +31,22 @@ class IdentifyDynamics:
     """Keep the last share of every log's time out of the fit, and predict its torques."""
     validate: Annotated[tuple[Path, ...], arg(metavar="LOG", help_behavior_hint="")] = ()
     """Logs that the fit does not see, whose torques it predicts."""
-    estimator: Literal["wls", "ols"] = "wls"
-    """wls: every joint and log by its own noise; ols: every equation alike."""
+    estimator: Literal["wls", "ols", "sdp"] = "wls"
+    """wls: every joint and log by its own noise; ols: every equation alike; sdp: as wls, among robots that can be built."""
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Logs that are read at once, each in a process of its own."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
     json: Json = False
 
     def run(self) -> None:
         """Fit, and print the base parameters and the error of the torques."""
-        from flexcal.cli.tables import base_parameter_table
+        from flexcal.cli.tables import base_parameter_table, friction_table
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
         share = _share(self.hold_out)
         if share and self.validate:
             raise InputError("--hold-out and --validate exclude each other; give one of them.")
@@ -55,23 +59,35 @@ class IdentifyDynamics:
                 validate=self.validate,
                 estimator=self.estimator,
                 out=self.out,
+                jobs=self.jobs,
                 progress=progress,
             )
         document = found.document()
         console.show(base_parameter_table(document["base_parameters"]))
         console.say(
-            f"{document['rank']} of {document['structural_rank']} base parameters from {document['equations']} equations; "
+            f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
+        if document["friction_tried"]:
+            console.show(friction_table(document["friction_tried"]))
+        console.say(f"friction: {', '.join(found.friction.labels)}")
         error = document["error_percent"]
         console.say(f"torques missed by {error['train']:.2f} % of their norm in the fit")
         if error["held_out"] is not None:
             console.say(
                 f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
             )
+        essential = document["essential_parameters"]
         console.say(
-            "intervals take the errors for independent from row to row, which is too hopeful for real recordings"
+            f"{len(essential['parameters'])} essential parameters alone miss {essential['error_percent']['train']:.2f} %"
         )
+        if found.bodiless:
+            console.say(
+                f"no body can have the inertials of {', '.join(found.bodiless)}: they give torques, but carry no springs and "
+                "fit in no URDF; --estimator sdp finds bodies"
+            )
+        for remark in document["warnings"]:
+            console.say(remark)
         console.say(f"wrote {found.estimates}")
         again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
         elastic = found.train.observation.model.elastic

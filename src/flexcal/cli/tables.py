@@ -111,15 +111,32 @@ def _millimetres(value: float | None) -> str:
 
 
 def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """One row a base parameter, written out: estimate, standard deviation, and that in per cent of the estimate."""
+    """One row a base parameter, written out: estimate, standard deviation, that in per cent of the estimate, and what is essential."""
     table = Table(title="base parameters", title_justify="left")
     table.add_column("parameter")
-    for heading in ("estimate", "std", "%", "unit"):
-        table.add_column(heading, justify="right" if heading != "unit" else "left")
+    for heading in ("estimate", "std", "%", "essential"):
+        table.add_column(heading, justify="right")
+    table.add_column("unit")
     for row in rows:
         std = "not seen" if row["std"] is None else f"{row['std']:.3g}"
         percent = "" if row["std_percent"] is None else f"{row['std_percent']:.1f}"
-        table.add_row(row["name"], f"{row['estimate']:.5g}", std, percent, row["unit"])
+        essential = "" if row["essential"] is None else f"{row['essential']:.5g}"
+        table.add_row(row["name"], f"{row['estimate']:.5g}", std, percent, essential, row["unit"])
+    return table
+
+
+def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """The best of what was tried with none, one, two … friction terms beyond the plain ones, with its cross-validated error."""
+    best: dict[int, Mapping[str, Any]] = {}
+    for row in rows:
+        held = best.setdefault(len(row["terms"]), row)
+        if row["cross_validation_percent"] < held["cross_validation_percent"]:
+            best[len(row["terms"])] = row
+    table = Table(title="friction terms tried", title_justify="left")
+    table.add_column("beyond the plain ones")
+    table.add_column("cross-validation, %", justify="right")
+    for row in best.values():
+        table.add_row(", ".join(row["terms"]) or "none", f"{row['cross_validation_percent']:.2f}")
     return table
 
 

@@ -1,43 +1,19 @@
-"""Filters without phase shift: low-pass, central differences, decimation of many columns at once."""
+"""Decimation of many columns at once, without phase shift: whole, or block by block."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache, cached_property
 
 import numpy as np
 
 from flexcal.errors import FlexcalError
 
-_ORDER = 4
 _REACH = 10
 """Half the length of a decimation filter, in samples that it leaves."""
 _LARGEST_STAGE = 10
-
-
-def low_pass(values: np.ndarray, time_step: float, cutoff_hz: float) -> np.ndarray:
-    """`values` (N, …) through a fourth-order Butterworth filter forwards and backwards: no phase, -6 dB at `cutoff_hz`.
-
-    Raises `FlexcalError` where the cut-off is not below half the sampling rate, or there are too few samples.
-    """
-    from scipy.signal import butter, sosfiltfilt
-
-    rate = 1.0 / time_step
-    if not 0 < cutoff_hz < rate / 2:
-        raise FlexcalError(
-            f"a cut-off of {cutoff_hz:g} Hz is not between 0 and {rate / 2:g} Hz, half the sampling rate."
-        )
-    padding = int(np.ceil(3 * rate / cutoff_hz))
-    if len(values) <= padding:
-        raise FlexcalError(
-            f"{len(values)} samples are too few for a cut-off of {cutoff_hz:g} Hz; {padding + 1} are needed."
-        )
-    sections = butter(_ORDER, cutoff_hz, fs=rate, output="sos")
-    return sosfiltfilt(sections, values, axis=0, padlen=padding)
-
-
-def central_difference(values: np.ndarray, time_step: float) -> np.ndarray:
-    """Derivative (N, …) of `values` by central differences; one-sided at the first and last sample."""
-    return np.gradient(values, time_step, axis=0)
+_TOGETHER = 10
+"""Samples that one matrix product leaves: more of them multiply more zeros, fewer make thinner matrices."""
 
 
 @dataclass(frozen=True)
@@ -55,7 +31,7 @@ class Decimation:
             raise FlexcalError(f"the decimation is {self.factor}; it must be 1 or more.")
         _ = self.stages
 
-    @property
+    @cached_property
     def stages(self) -> tuple[int, ...]:
         """Factors of at most 10 whose product is `factor`, the larger first."""
         stages, left = [], self.factor
@@ -79,14 +55,45 @@ class Decimation:
         return reach
 
     def apply(self, columns: np.ndarray) -> np.ndarray:
-        """`columns` (…, N) at samples support, support + factor, …: (…, M), empty where N is not above 2 · support."""
-        from scipy.signal import firwin, upfirdn
+        """`columns` (k, N) at samples support, support + factor, …: (k, M), empty where N is not above 2 · support."""
+        return DecimationStream(self).push(columns)
 
-        for stage in self.stages:
-            length = 2 * _REACH * stage
-            if columns.shape[-1] <= length:
-                return columns[..., :0]
-            taps = firwin(length + 1, 1.0 / stage, window="hamming")
-            last = (columns.shape[-1] - 1) // stage
-            columns = upfirdn(taps, columns, down=stage, axis=-1)[..., 2 * _REACH : last + 1]
+
+class DecimationStream:
+    """Columns that come block by block, decimated as the whole would be: it holds back what the filters still need."""
+
+    def __init__(self, decimation: Decimation) -> None:
+        self._stages = decimation.stages
+        self._held: list[np.ndarray | None] = [None] * len(self._stages)
+
+    def push(self, columns: np.ndarray) -> np.ndarray:
+        """The kept samples (k, M) that the next `columns` (k, N) complete; M may be zero."""
+        for i, stage in enumerate(self._stages):
+            held = self._held[i]
+            whole = columns if held is None else np.concatenate([held, columns], axis=1)
+            columns = _decimated(whole, stage)
+            self._held[i] = whole[:, stage * columns.shape[1] :].copy()
         return columns
+
+
+def _decimated(columns: np.ndarray, stage: int) -> np.ndarray:
+    """Every `stage`-th sample of the filtered columns, as products with a matrix whose columns are the shifted filter."""
+    length = 2 * _REACH * stage + 1
+    count = max(0, (columns.shape[1] - length) // stage + 1)
+    shifted = _shifted_filter(stage)
+    found = np.empty((len(columns), count))
+    for start in range(0, count, _TOGETHER):
+        number = min(_TOGETHER, count - start)
+        first, reach = start * stage, (number - 1) * stage + length
+        found[:, start : start + number] = columns[:, first : first + reach] @ shifted[:reach, :number]
+    return found
+
+
+@cache
+def _shifted_filter(stage: int) -> np.ndarray:
+    length = 2 * _REACH * stage + 1
+    taps = np.sinc(np.arange(-_REACH * stage, _REACH * stage + 1) / stage) * np.hamming(length)
+    matrix = np.zeros(((_TOGETHER - 1) * stage + length, _TOGETHER))
+    for k in range(_TOGETHER):
+        matrix[k * stage : k * stage + length, k] = taps / taps.sum()
+    return matrix

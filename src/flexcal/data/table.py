@@ -292,10 +292,11 @@ def _is_number(cell: str) -> bool:
 
 def _check_finite(table: Table, frame: pl.DataFrame) -> None:
     for name, values in table.columns.items():
-        missing = frame[name].is_null().to_numpy()
-        if missing.any():
+        if frame[name].null_count():
             raise table.error(
-                int(np.argmax(missing)), name, "the value is missing; complete or remove the row."
+                int(np.argmax(frame[name].is_null().to_numpy())),
+                name,
+                "the value is missing; complete or remove the row.",
             )
         if values.dtype.kind == "f" and not np.isfinite(values).all():
             row = int(np.argmin(np.isfinite(values)))

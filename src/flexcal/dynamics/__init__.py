@@ -11,32 +11,68 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
+from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
+from flexcal.dynamics.feasible import feasible_least_squares
+from flexcal.dynamics.friction_choice import Candidate, Trial
+from flexcal.dynamics.friction_library import (
+    AsymmetricCoulomb,
+    LoadCoulomb,
+    Presliding,
+    Stribeck,
+    SublinearViscous,
+    WarmUp,
+)
+from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
+from flexcal.dynamics.friction_terms import FRICTION_TERMS
+from flexcal.dynamics.joint_log import JointLog
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
-from flexcal.dynamics.regression import RegressionData, Subsystem, Window, observe
+from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
+from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 
 __all__ = [
     "CLASSIC",
+    "FRICTION_TERMS",
+    "AsymmetricCoulomb",
     "BaseParameters",
+    "Batch",
+    "Candidate",
     "Column",
     "Coulomb",
     "Coupling",
     "DriveTerm",
+    "EssentialParameters",
+    "Experiment",
+    "ExperimentSystem",
+    "FrictionSelection",
+    "JointLog",
+    "LoadCoulomb",
     "Motion",
     "Observation",
+    "Presliding",
     "RegressionData",
     "RotorInertia",
+    "Stribeck",
+    "SublinearViscous",
     "Subsystem",
     "TorqueOffset",
+    "Trial",
     "Triangle",
     "Viscous",
+    "WarmUp",
     "Window",
+    "batches_each",
+    "essential_parameters",
+    "experiment_system",
+    "feasible_least_squares",
     "identify_with_prior",
     "observe",
     "ordinary_least_squares",
+    "select_friction",
     "weighted_least_squares",
 ]

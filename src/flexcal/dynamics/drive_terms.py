@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import ClassVar, Protocol
 
 import numpy as np
 
 from flexcal.dynamics.motion import Motion
-from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
+
+Memory = dict[str, tuple[float, float]]
+"""What terms carry from one block of an experiment to the next; empty at its start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +27,11 @@ class Column:
 class DriveTerm(Protocol):
     """A term of the torques, with one or more parameters of its own."""
 
-    def columns(self, model: RobotModel, motion: Motion) -> Iterator[Column]:
-        """Its columns, in a stable order; a parameter that several joints feel has one for each."""
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        """Its columns, in a stable order; a parameter that several joints feel has one for each.
+
+        `motion` continues what `memory` is of, which is brought up to its end.
+        """
         ...
 
 
@@ -38,7 +43,7 @@ class _PerJoint:
     def shape(self, motion: Motion) -> np.ndarray:
         raise NotImplementedError
 
-    def columns(self, model: RobotModel, motion: Motion) -> Iterator[Column]:
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         shape = self.shape(motion)
         for i, name in enumerate(model.joint_names):
             yield Column(f"{name}.{self.key}", i, shape[:, i])
@@ -92,7 +97,7 @@ class Coupling:
     feel of sign ṡ. What each joint feels of its own motion stands in its own rotor inertia and viscous friction.
     """
 
-    def columns(self, model: RobotModel, motion: Motion) -> Iterator[Column]:
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         for entry in model.config.drives.coupling:
             motor, joint, ratio = model.joint_index(entry.motor), model.joint_index(entry.joint), entry.ratio
             sign = np.sign(motion.dq[:, motor] + ratio * motion.dq[:, joint])
@@ -107,27 +112,3 @@ class Coupling:
 
 CLASSIC: tuple[DriveTerm, ...] = (RotorInertia(), Viscous(), Coulomb(), TorqueOffset(), Coupling())
 """The terms that the structural rank counts (FORMATS)."""
-
-_FRICTION: dict[str, DriveTerm] = {
-    "viscous": Viscous(),
-    "coulomb": Coulomb(),
-    "torque_offset": TorqueOffset(),
-}
-
-
-def chosen(friction: str | tuple[str, ...]) -> tuple[DriveTerm, ...]:
-    """Rotor inertia, the named friction terms and the coupling; "auto" stands for the classic ones.
-
-    Raises `FlexcalError` that lists the terms for an unknown one.
-    """
-    if isinstance(friction, str):
-        return CLASSIC
-    for name in friction:
-        if name not in _FRICTION:
-            raise FlexcalError(f"there is no friction term '{name}'; there are {', '.join(_FRICTION)}.")
-    return (RotorInertia(), *(_FRICTION[name] for name in dict.fromkeys(friction)), Coupling())
-
-
-def friction_names(terms: Sequence[DriveTerm]) -> tuple[str, ...]:
-    """The names of the friction terms among `terms`."""
-    return tuple(name for name, term in _FRICTION.items() if term in terms)

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 
 import numpy as np
 
+from flexcal.dynamics.batch_covariance import batch_covariance
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.triangle import Triangle, stacked
 from flexcal.errors import FlexcalError
@@ -19,17 +19,13 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
 
     Parameters that are no base parameters stay at the model's value, zero where it has none, and the kept ones absorb them. A base
     parameter that these data do not determine stays too and counts as dropped: the recording, not the robot, hides it. The covariance
-    is (WᵀW)⁻¹ σ̂² with σ̂² of Eq. 2.28 on the weighted system; it takes the errors for independent from row to row.
+    is that of `batch_covariance`, in place of (WᵀW)⁻¹ σ̂² (Eq. 2.30), which takes the errors for independent from row to row.
     Raises `FlexcalError` with no more rows than parameters.
     """
     from scipy.linalg import solve_triangular
 
     names = data.names
-    weighted = [
-        Triangle(s.triangle.factor / sigma, s.triangle.rows)
-        for s, sigma in zip(data.subsystems, noise, strict=True)
-    ]
-    system = stacked(weighted, [s.members for s in data.subsystems], len(names))
+    system = weighted_system(data, noise)
     base = data.base.found
     structural = [names[i] for i in base.kept]
     seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
@@ -47,13 +43,15 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
             f"{system.rows} equations do not determine {len(kept)} parameters; record for longer."
         )
     cost = float(factor[-1, -1] ** 2)
-    root = np.zeros((len(names), len(kept)))
-    root[kept] = scale[:, None] * solve_triangular(triangle, np.eye(len(kept))) * math.sqrt(cost / freedom)
+    root = scale[:, None] * solve_triangular(triangle, np.eye(len(kept)))
+    spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
+    covariance = np.zeros((len(names), len(names)))
+    covariance[np.ix_(kept, kept)] = spread.covariance
     return Estimate(
         parameters=Parameters(
             Parameter(name, unit_of(name), float(v)) for name, v in zip(names, found, strict=True)
         ),
-        covariance=root @ root.T,
+        covariance=covariance,
         rank=len(kept),
         dropped=_dropped(base.regrouping, names, base.kept, seen.dropped),
         identifiable=tuple(i in set(kept) for i in range(len(names))),
@@ -63,7 +61,17 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
         status="converged",
         message="linear least squares",
         iterations=1,
+        covariance_freedom=spread.freedom,
     )
+
+
+def weighted_system(data: RegressionData, noise: Sequence[float]) -> Triangle:
+    """All subsystems as one system of all columns, each divided by its `noise` (N m)."""
+    weighted = [
+        Triangle(s.triangle.factor / sigma, s.triangle.rows)
+        for s, sigma in zip(data.subsystems, noise, strict=True)
+    ]
+    return stacked(weighted, [s.members for s in data.subsystems], len(data.names))
 
 
 def _dropped(

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
 from flexcal.data import Recording
-from flexcal.data.filtering import central_difference, low_pass
+from flexcal.data.low_pass import LowPass
 
 _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
@@ -26,21 +28,90 @@ class Motion:
     def __len__(self) -> int:
         return len(self.time)
 
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        return "the motion"
+
+    @property
+    def samples(self) -> int:
+        """Of the whole experiment: this motion is all of it."""
+        return len(self)
+
+    @property
+    def top_speed(self) -> np.ndarray:
+        """The largest |q̇| of every joint (n,)."""
+        return np.abs(self.dq).max(axis=0)
+
+    def blocks(self) -> Iterator[Motion]:
+        """The experiment in parts that follow each other: here one."""
+        yield self
+
     def part(self, start: int, stop: int) -> Motion:
         """Samples from `start` to before `stop`."""
         at = slice(start, stop)
         return Motion(self.time[at], self.q[at], self.dq[at], self.ddq[at], self.torque[at])
 
     @classmethod
-    def of(cls, recording: Recording, cutoff_hz: float) -> Motion:
-        """Positions through a zero-phase low-pass, differentiated by central differences; the torque as measured.
+    def joined(cls, parts: Iterable[Motion]) -> Motion:
+        """Motions that follow each other as one."""
+        columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in parts), strict=True)
+        return cls(*(np.concatenate(column) for column in columns))
 
-        Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `low_pass` does.
-        """
-        step = recording.time_step
-        q = low_pass(recording.q, step, cutoff_hz)
-        dq = central_difference(q, step)
-        ddq = central_difference(dq, step)
-        border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
-        whole = cls(recording.time, q, dq, ddq, recording.torque)
-        return whole.part(border, len(whole) - border)
+    @classmethod
+    def of(cls, recording: Recording, cutoff_hz: float) -> Motion:
+        """All of a recording as `filtered_motion` gives it; raises `FlexcalError` as that does."""
+        return cls.joined(filtered_motion([recording], cutoff_hz))
+
+
+def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[Motion]:
+    """Positions through a zero-phase low-pass, differentiated by central differences; the torque as measured.
+
+    `recordings` follow each other without a seam, as blocks of one log; so do the motions, and they do not depend on where the blocks
+    are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
+    the samples are too few for it.
+    """
+    first, recordings = _peeked(recordings)
+    step, n = first.time_step, first.q.shape[1]
+    low_pass = LowPass(step, cutoff_hz)
+    border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
+    samples, number = 0, 2
+    held = np.zeros((0, 2 * n))
+    for values, own in _extended(recordings, low_pass):
+        samples += own
+        held = np.concatenate([held, values])
+        q = low_pass.apply(held[:, :n])
+        if len(q) < 5:
+            continue
+        dq = (q[2:] - q[:-2]) / (2 * step)
+        ddq = (dq[2:] - dq[:-2]) / (2 * step)
+        torque = held[low_pass.support + 2 :, n:][: len(ddq)]
+        time = first.start + step * np.arange(number, number + len(ddq))
+        block = Motion(time, q[2:-2], dq[1:-1], ddq, torque)
+        ended = own == 0
+        yield block.part(max(0, border - number), samples - border - number if ended else len(block))
+        number += len(block)
+        held = held[len(block) :]
+
+
+def _peeked(recordings: Iterable[Recording]) -> tuple[Recording, Iterator[Recording]]:
+    iterator = iter(recordings)
+    first = next(iterator)
+    return first, chain([first], iterator)
+
+
+def _extended(recordings: Iterable[Recording], low_pass: LowPass) -> Iterator[tuple[np.ndarray, int]]:
+    """Positions and torques side by side, with what the filter needs before and after them, and how many samples are measured ones."""
+    begun = False
+    end = np.zeros((0, 0))
+    for recording in recordings:
+        values = np.hstack([recording.q, recording.torque])
+        end = np.concatenate([end, values]) if end.size else values
+        if begun:
+            yield values, len(values)
+        elif len(end) > low_pass.support:
+            begun = True
+            yield np.concatenate([low_pass.before(end), end]), len(end)
+        if begun:
+            end = end[-low_pass.support - 1 :]
+    yield low_pass.before(end[::-1])[::-1], 0

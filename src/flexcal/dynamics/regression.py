@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
-from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.experiment_system import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
 from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
-from flexcal.errors import FlexcalError
+from flexcal.model.regressor import INERTIAL
 
-_BLOCK = 8192
-"""Samples that are worked on at once."""
-_STANDSTILL = 0.01
-"""A joint stands still below this share of its largest speed in the recording."""
+_SILENT = 1e-9
+"""A column smaller than this beside the largest of its kind is zero."""
+_ALL_BATCHES = 512
+"""Batches of all experiments together, at most, unless there are more experiments."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,17 +34,51 @@ class Subsystem:
 
 @dataclass(frozen=True, eq=False)
 class RegressionData:
-    """Everything that a linear estimator needs; `masked` are the rows left out because the robot stood still."""
+    """Everything that a linear estimator needs; `masked` are the rows left out because the robot stood still.
+
+    `batches` are the same equations once more, experiment by experiment in parts that follow each other in time.
+    """
 
     observation: Observation
     base: BaseParameters
     subsystems: tuple[Subsystem, ...]
     masked: int
+    batches: tuple[tuple[Batch, ...], ...]
 
     @property
     def names(self) -> tuple[str, ...]:
         """Names of all columns."""
         return self.observation.names
+
+    @property
+    def silent(self) -> tuple[str, ...]:
+        """Names of the drives' columns that these equations leave at zero, or at rounding beside the largest of their kind."""
+        size = np.zeros(len(self.names))
+        for s in self.subsystems:
+            size[s.members] = np.hypot(size[s.members], np.linalg.norm(s.triangle.matrix, axis=0))
+        links = len(INERTIAL) * self.observation.model.n
+        kinds = [name.rpartition(".")[2] for name in self.names]
+        largest: dict[str, float] = {}
+        for kind, norm in zip(kinds, size, strict=True):
+            largest[kind] = max(largest.get(kind, 0.0), norm)
+        drives = list(zip(self.names, kinds, size, strict=True))[links:]
+        return tuple(name for name, kind, norm in drives if norm <= _SILENT * largest[kind])
+
+    def noise(self) -> list[tuple[float, int]]:
+        """σ̂ of every subsystem from its own fit, by its rows less its rank (Eq. 2.28), and that rank; NaN without more rows.
+
+        Base parameters alone are fitted, and a column counts by its size at all joints: at one of them it may be the URDF's rounding.
+        """
+        sizes = np.zeros(len(self.names))
+        for s in self.subsystems:
+            sizes[s.members] += np.sum(s.triangle.matrix**2, axis=0)
+        scale = 1.0 / np.sqrt(np.where(sizes > 0, sizes, 1.0))
+        kept = set(self.base.found.kept)
+        found = []
+        for s in self.subsystems:
+            columns = np.array([i for i, number in enumerate(s.members) if number in kept])
+            found.append(s.triangle.part(columns).noise(scale[s.members[columns]]))
+        return found
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all joints stacked, and of each (n,)."""
@@ -54,72 +89,50 @@ class RegressionData:
             size[s.joint] += np.sum(s.triangle.right**2)
         return math.sqrt(missed.sum() / size.sum()), np.sqrt(missed / size)
 
-
-@dataclass(frozen=True)
-class Window:
-    """Rows from `start` to before `end`, s on the recording's clock."""
-
-    start: float = -math.inf
-    end: float = math.inf
+    @classmethod
+    def of(
+        cls, observation: Observation, base: BaseParameters, systems: Sequence[ExperimentSystem]
+    ) -> RegressionData:
+        """The systems of several experiments together."""
+        subsystems = [
+            Subsystem(joint, number, members, _merged(system, joint))
+            for number, system in enumerate(systems)
+            for joint, members in enumerate(observation.members)
+        ]
+        masked = sum(system.masked for system in systems)
+        return cls(observation, base, tuple(subsystems), masked, tuple(system.batches for system in systems))
 
 
 def observe(
     observation: Observation,
     base: BaseParameters,
-    motions: Sequence[Motion],
+    experiments: Sequence[Experiment],
     decimation: Decimation,
     *,
     mask_standstill: bool = True,
     windows: Sequence[Window] | None = None,
 ) -> RegressionData:
-    """The system of several experiments: torques and every column through the same decimation, block by block.
+    """The system of several experiments, in one pass over each.
 
     `windows` (one an experiment) restrict the rows that are kept. With `mask_standstill` rows at which all joints stand still are left
-    out. Raises `FlexcalError` where no row is left, or a column comes out as not finite.
+    out. Raises `FlexcalError` as `experiment_system` does.
     """
-    subsystems: list[Subsystem] = []
-    masked = 0
-    for experiment, motion in enumerate(motions):
-        window = Window() if windows is None else windows[experiment]
-        triangles = [Triangle.empty(len(members)) for members in observation.members]
-        for block in _blocks(motion, decimation):
-            time = decimation.apply(block.time[None])[0]
-            keep = (time >= window.start) & (time < window.end)
-            if mask_standstill:
-                still = _still(block, motion, decimation)
-                masked += int(np.sum(keep & still))
-                keep &= ~still
-            if not keep.any():
-                continue
-            torque = decimation.apply(block.torque.T)[:, keep]
-            for joint, columns in enumerate(observation.columns(block)):
-                rows = decimation.apply(columns)[:, keep].T
-                if not (np.isfinite(rows).all() and np.isfinite(torque[joint]).all()):
-                    raise FlexcalError(
-                        f"the equations of joint {joint + 1} in experiment {experiment + 1} are not finite."
-                    )
-                triangles[joint] = triangles[joint] + Triangle.of(rows, torque[joint])
-        if triangles[0].rows == 0:
-            raise FlexcalError(
-                f"no equation is left of experiment {experiment + 1}: it is too short for its filters, or the robot stands still in it."
-            )
-        subsystems += [
-            Subsystem(joint, experiment, members, triangle)
-            for joint, (members, triangle) in enumerate(zip(observation.members, triangles, strict=True))
-        ]
-    return RegressionData(observation, base, tuple(subsystems), masked)
+    chosen = [Window()] * len(experiments) if windows is None else windows
+    batches = batches_each(len(experiments))
+    systems = [
+        experiment_system(
+            observation, experiment, decimation, window, mask_standstill=mask_standstill, batches=batches
+        )
+        for experiment, window in zip(experiments, chosen, strict=True)
+    ]
+    return RegressionData.of(observation, base, systems)
 
 
-def _blocks(motion: Motion, decimation: Decimation) -> Iterator[Motion]:
-    """Parts that overlap by what the filter needs, so that their decimated rows follow each other as those of the whole."""
-    rows = max(1, _BLOCK // decimation.factor)
-    step = rows * decimation.factor
-    for start in range(0, len(motion) - 2 * decimation.support, step):
-        yield motion.part(start, min(start + step + 2 * decimation.support, len(motion)))
+def batches_each(experiments: int) -> int:
+    """How many batches each of so many experiments has at most, so that memory hardly grows with their number."""
+    return max(1, min(BATCHES, _ALL_BATCHES // max(1, experiments)))
 
 
-def _still(block: Motion, motion: Motion, decimation: Decimation) -> np.ndarray:
-    limit = _STANDSTILL * np.abs(motion.dq).max(axis=0)
-    moving = (np.abs(block.dq) > limit).any(axis=1)
-    kept = moving[decimation.support : len(block) - decimation.support]
-    return ~kept[:: decimation.factor]
+def _merged(system: ExperimentSystem, joint: int) -> Triangle:
+    factor = reduced([batch.factors[joint] for batch in system.batches])
+    return Triangle.padded(factor, sum(batch.rows for batch in system.batches))

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.drive_terms import DriveTerm, chosen
+from flexcal.dynamics.drive_terms import CLASSIC
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.periodic_motion import PeriodicMotion, real_rows
 from flexcal.errors import FlexcalError
@@ -29,7 +29,7 @@ _FIRST_SIGMA = 0.01
 def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     """All unknowns of the torques with their prior, and the names of those that are the robot's dynamics.
 
-    These are mass and centre of mass of every link, and the terms of the drives; the others are spring stiffnesses, geometric errors and
+    These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric errors and
     what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
     """
     lacking = [
@@ -69,12 +69,12 @@ class TrajectoryRows:
         payload: float | None,
     ) -> TrajectoryRows:
         """Linearised at the values of the parameters."""
-        x, terms = parameters.coordinates(), chosen(model.config.dynamics.friction)
+        x = parameters.coordinates()
         measured, predicted, jacobians = [], [], []
         for motion in motions:
             measured.append(real_rows(motion.torque))
             torque, jacobian = _links(model, parameters, x, motion, payload)
-            for number, joint, rows in _drives(model, parameters, terms, motion):
+            for number, joint, rows in _drives(model, parameters, motion):
                 torque[:, joint] += rows * parameters[number].value
                 jacobian[:, joint, number] += rows * parameters.natural_slope(x)[number]
             predicted.append(torque)
@@ -119,13 +119,13 @@ def _links(
 
 
 def _drives(
-    model: RobotModel, parameters: Parameters, terms: Sequence[DriveTerm], motion: PeriodicMotion
+    model: RobotModel, parameters: Parameters, motion: PeriodicMotion
 ) -> Iterator[tuple[int, int, np.ndarray]]:
     """Parameter, joint and rows (2 K + 1,) of every column of the drives, evaluated at the full rate."""
     q, dq, ddq = motion.states(motion.samples)
     full = Motion(np.arange(motion.samples), q, dq, ddq, np.zeros_like(q))
-    for term in terms:
-        for column in term.columns(model, full):
+    for term in CLASSIC:
+        for column in term.columns(model, full, {}):
             yield parameters.index(column.name), column.joint, motion.rows(column.values)
     rounded = np.nan_to_num(model.coulomb) * (np.tanh(dq / _REVERSAL_VELOCITY) - np.sign(dq))
     for joint, name in enumerate(model.joint_names):
@@ -135,8 +135,7 @@ def _drives(
 def _drive_names(model: RobotModel) -> tuple[str, ...]:
     still = np.zeros((1, model.n))
     motion = Motion(np.zeros(1), still, still, still, still)
-    terms = chosen(model.config.dynamics.friction)
-    return tuple(dict.fromkeys(column.name for term in terms for column in term.columns(model, motion)))
+    return tuple(dict.fromkeys(column.name for term in CLASSIC for column in term.columns(model, motion, {})))
 
 
 def _of_drive(name: str) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 _TOLERANCE = 1e-9
-"""A singular value below this, of columns of unit length, is taken as zero."""
+"""A singular value of comparable columns below this is taken as zero."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +24,13 @@ class Triangle:
     @classmethod
     def of(cls, matrix: np.ndarray, right: np.ndarray) -> Triangle:
         """Of W (rows, k) and Y (rows,)."""
-        return cls(_triangular(np.column_stack([matrix, right])), len(right))
+        return cls(triangular(np.column_stack([matrix, right])), len(right))
+
+    @classmethod
+    def padded(cls, factor: np.ndarray, rows: int) -> Triangle:
+        """Of a factor (·, k + 1) with no more than k + 1 rows, which stands for so many `rows`."""
+        size = factor.shape[1]
+        return cls(np.vstack([factor, np.zeros((size - len(factor), size))]), rows)
 
     @classmethod
     def empty(cls, columns: int) -> Triangle:
@@ -32,7 +38,7 @@ class Triangle:
         return cls(np.zeros((columns + 1, columns + 1)), 0)
 
     def __add__(self, other: Triangle) -> Triangle:
-        return Triangle(_triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
+        return Triangle(triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
 
     @property
     def matrix(self) -> np.ndarray:
@@ -48,11 +54,19 @@ class Triangle:
         """‖Y − W · parameters‖ for `parameters` (k,)."""
         return float(np.linalg.norm(self.right - self.matrix @ parameters))
 
-    def noise(self) -> tuple[float, int]:
-        """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that."""
-        norms = np.linalg.norm(self.matrix, axis=0)
-        scaled = self.matrix / np.where(norms > 0, norms, 1.0)
-        directions, sizes, _ = np.linalg.svd(scaled, full_matrices=False)
+    def part(self, columns: np.ndarray) -> Triangle:
+        """With the numbered `columns` of W alone."""
+        return Triangle(self.factor[:, [*columns, -1]], self.rows)
+
+    def noise(self, scale: np.ndarray | None = None) -> tuple[float, int]:
+        """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that.
+
+        `scale` (k,) makes the columns compare; without it each gets unit length.
+        """
+        if scale is None:
+            norms = np.linalg.norm(self.matrix, axis=0)
+            scale = 1.0 / np.where(norms > 0, norms, 1.0)
+        directions, sizes, _ = np.linalg.svd(self.matrix * scale, full_matrices=False)
         seen = directions[:, sizes > _TOLERANCE]
         rank = seen.shape[1]
         left = self.right - seen @ (seen.T @ self.right)
@@ -71,9 +85,7 @@ def stacked(triangles: Iterable[Triangle], members: Iterable[np.ndarray], column
     return total
 
 
-def _triangular(matrix: np.ndarray) -> np.ndarray:
+def triangular(matrix: np.ndarray) -> np.ndarray:
+    """R (k, k) of the QR of a matrix (·, k), with rows of zeros where that has fewer rows."""
     factor = np.linalg.qr(matrix, mode="r")
-    size = matrix.shape[1]
-    padded = np.zeros((size, size))
-    padded[: min(size, len(factor))] = factor[:size]
-    return padded
+    return np.vstack([factor, np.zeros((matrix.shape[1] - len(factor), matrix.shape[1]))])

@@ -11,14 +11,18 @@ from flexcal.estimation import Estimate
 
 
 def weighted_least_squares(data: RegressionData) -> Estimate:
-    """χ̂ with σ̂ of each subsystem from its own fit, by its rows less its rank (Eq. 2.28).
+    """χ̂ with the equations of each subsystem divided by its `noise_levels`; raises `FlexcalError` as that and `linear_fit` do."""
+    return linear_fit(data, noise_levels(data))
+
+
+def noise_levels(data: RegressionData) -> list[float]:
+    """σ̂ of each subsystem, N m, from its own fit, by its rows less its rank (Eq. 2.28).
 
     A subsystem that its own parameters fit exactly counts as if it had 1e-12 of its torque as noise. Raises `FlexcalError` where a
-    subsystem has no more rows than it determines parameters, and as `linear_fit` does.
+    subsystem has no more rows than it determines parameters.
     """
     noise = []
-    for s in data.subsystems:
-        sigma, rank = s.triangle.noise()
+    for s, (sigma, rank) in zip(data.subsystems, data.noise(), strict=True):
         if np.isnan(sigma):
             joint = data.observation.model.joint_names[s.joint]
             raise FlexcalError(
@@ -27,4 +31,4 @@ def weighted_least_squares(data: RegressionData) -> Estimate:
             )
         size = float(np.linalg.norm(s.triangle.right)) / np.sqrt(s.triangle.rows)
         noise.append(max(sigma, 1e-12 * size) or 1.0)
-    return linear_fit(data, noise)
+    return noise

@@ -38,7 +38,8 @@ class Estimate:
     (not known to a factor of two). `cost` is the minimised objective, prior included. `chi2` is the data's
     whitened residual sum of squares, prior rows excluded and with robust weights where a robust loss is used;
     `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
-    `outliers` are labels of groups, or row numbers where the problem has no groups.
+    `outliers` are labels of groups, or row numbers where the problem has no groups. `covariance_freedom` are the degrees of freedom of a
+    covariance that the scatter of few batches gave; without it the noise level's stand for them.
     """
 
     parameters: Parameters
@@ -53,6 +54,7 @@ class Estimate:
     message: str
     iterations: int
     outliers: tuple[int, ...] = ()
+    covariance_freedom: float | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     @property
@@ -88,7 +90,7 @@ class Estimate:
     def interval(self, name: str) -> tuple[float, float] | None:
         """95 % interval (low, high) in natural units, symmetric in the estimation coordinate; None when not identifiable.
 
-        Quantile of Student's t below 100 degrees of freedom, where the noise level is hardly better known, else normal.
+        Quantile of Student's t below 100 degrees of freedom, where the noise level or the covariance is hardly better known, else normal.
         """
         number = self.parameters.index(name)
         if not self.identifiable[number]:
@@ -131,8 +133,9 @@ class Estimate:
         return dict(zip(self.parameters.names, (float(v) for v in self.parameters.natural(x)), strict=True))
 
     def _quantile(self) -> float:
-        if not 0 < self.degrees_of_freedom < 100:
+        freedom = self.degrees_of_freedom if self.covariance_freedom is None else self.covariance_freedom
+        if not 0 < freedom < 100:
             return NORMAL_QUANTILE
         from scipy.special import stdtrit
 
-        return float(stdtrit(self.degrees_of_freedom, 0.975))
+        return float(stdtrit(freedom, 0.975))

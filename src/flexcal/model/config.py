@@ -133,7 +133,10 @@ class GeometryConfig:
 
 @dataclass(frozen=True)
 class DynamicsConfig:
-    """Signal treatment of the identification of dynamics; absent values are proposed from the data."""
+    """Signal treatment and friction of the identification of dynamics; an absent cut-off and decimation are proposed from the data.
+
+    friction: "classic" (viscous, Coulomb, offset), a list of terms, or "auto": the classic ones and what cross-validation adds to them.
+    """
 
     friction: str | tuple[str, ...] = "auto"
     cutoff_hz: float | None = None
@@ -141,8 +144,10 @@ class DynamicsConfig:
     mask_standstill: bool = True
 
     def __post_init__(self) -> None:
-        if isinstance(self.friction, str) and self.friction != "auto":
-            raise FlexcalError(f"friction must be 'auto' or a list of terms, not '{self.friction}'.")
+        if isinstance(self.friction, str) and self.friction not in ("auto", "classic"):
+            raise FlexcalError(
+                f"friction must be 'auto', 'classic' or a list of terms, not '{self.friction}'."
+            )
         if self.cutoff_hz is not None and not self.cutoff_hz > 0:
             raise FlexcalError(f"cutoff_hz must be positive, not {self.cutoff_hz:g} Hz.")
         if self.decimation is not None and self.decimation < 1:

@@ -10,7 +10,7 @@ import numpy as np
 from flexcal._kernels import Tree
 from flexcal.model.config import ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
-from flexcal.model.names import COUPLED
+from flexcal.model.names import COUPLED, FRICTION
 from flexcal.model.point import Payload, Point
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
@@ -95,6 +95,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         viscous=_per_joint(file, config, "viscous", n),
         coulomb=_per_joint(file, config, "coulomb", n),
         torque_offset=np.zeros(n),
+        friction=np.zeros((n, len(FRICTION))),
         coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
         delay=np.zeros(n),
         ratio=_per_joint(file, config, "ratio", n),

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
 SPRINGS = ("bearing_x", "bearing_y", "drive")
+FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_up")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
 
@@ -17,7 +18,8 @@ _UNITS = {
     "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad", "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
-    "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
+    "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
+    "warm_up": "N m s/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
 }  # fmt: skip
 
 
@@ -52,6 +54,8 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
                 table[f"{joint.name}.transmission_{order}_{key}"] = ("transmission", (i, h, k))
         for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
             table[f"{joint.name}.{key}"] = (key, (i,))
+        for k, key in enumerate(FRICTION):
+            table[f"{joint.name}.{key}"] = ("friction", (i, k))
         if i in elastic:
             for k, key in enumerate(SPRINGS):
                 if key == "drive" or elastic[i].bearings:

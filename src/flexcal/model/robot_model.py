@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 
@@ -59,6 +60,7 @@ class RobotModel:
     viscous: np.ndarray
     coulomb: np.ndarray
     torque_offset: np.ndarray
+    friction: np.ndarray
     coupling: np.ndarray
     delay: np.ndarray
     ratio: np.ndarray
@@ -75,6 +77,15 @@ class RobotModel:
         from flexcal.model.loading import load_robot
 
         return load_robot(Path(path), estimates=estimates)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the kernels' view, which is built anew where the robot arrives: other processes can be handed robots."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "tree"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        from flexcal.model.loading import kinematic_tree
+
+        self.__dict__.update(state, tree=kinematic_tree(state["joints"], state["bearing_frames"]))
 
     @property
     def n(self) -> int:

@@ -10,6 +10,7 @@ from pathlib import Path
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
+from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.robot_model import RobotModel
 
 NUISANCE = re.compile(r".*\.(pose_[0-9]+|half_gap)")
@@ -25,7 +26,8 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     """`model` with the estimates of `blocks`, which come from the file `path`.
 
     A joint whose backlash was estimated counts as declared to have backlash. Raises `InputError` for a name that the robot does not
-    have: the file is then of another robot, or robot.yaml has changed since.
+    have: the file is then of another robot, or robot.yaml has changed since; and for an elastic robot where `dynamics` has links that no
+    body can be, as linear least squares may: they give the right torques at the joints, and wrong ones everywhere else.
     """
     for block, estimate in blocks.items():
         unknown = [
@@ -37,7 +39,19 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
                 "identify again, or give the robot.yaml that belongs to it."
             )
         model = _with_backlash_joints(model.with_estimate(estimate), estimate)
+        if block == "dynamics" and model.elastic:
+            _check_bodies(model, estimate, path)
     return model
+
+
+def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
+    links = [joint.link for joint in model.joints if f"{joint.link}.mass" in estimate.parameters]
+    broken = [link for link in links if not is_body(estimate.values, link)]
+    if broken:
+        raise InputError(
+            f"{path}: no body can have the inertials that the block 'dynamics' gives {', '.join(broken)}, and springs need bodies; "
+            "run 'flexcal identify dynamics' with --estimator sdp."
+        )
 
 
 def _with_backlash_joints(model: RobotModel, estimate: Estimate) -> RobotModel:

@@ -28,6 +28,7 @@ class ExportedRobot:
             "lost": list(self.export.lost),
             "mean_loss_mm": self.export.mean_loss / MILLIMETRE,
             "max_loss_mm": self.export.max_loss / MILLIMETRE,
+            "remarks": list(self.export.remarks),
         }
 
 

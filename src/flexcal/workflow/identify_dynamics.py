@@ -2,39 +2,47 @@
 
 from __future__ import annotations
 
-import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
-from flexcal.data import Recording, provenance, read_estimates, read_recording
+from flexcal.data import provenance, read_estimates
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
+    CLASSIC,
     BaseParameters,
-    Motion,
+    EssentialParameters,
+    ExperimentSystem,
+    FrictionSelection,
     Observation,
     RegressionData,
-    Window,
-    drive_terms,
-    observe,
+    batches_each,
+    essential_parameters,
+    feasible_least_squares,
     ordinary_least_squares,
+    select_friction,
     weighted_least_squares,
 )
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
+from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.workflow.dynamics_remarks import dynamics_remarks
+from flexcal.workflow.log_systems import LogSystem, Treatment, log_systems
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
-EstimatorName = Literal["wls", "ols"]
+EstimatorName = Literal["wls", "ols", "sdp"]
 
-_ESTIMATORS = {"wls": weighted_least_squares, "ols": ordinary_least_squares}
+_ESTIMATORS = {
+    "wls": weighted_least_squares,
+    "ols": ordinary_least_squares,
+    "sdp": feasible_least_squares,
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,11 +50,19 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written."""
 
     estimate: Estimate
+    structural_rank: int
     train: RegressionData
     held_out: RegressionData | None
-    friction_terms: tuple[str, ...]
+    essential: EssentialParameters
+    friction: FrictionSelection
     seconds: float
     estimates: Path
+
+    @property
+    def bodiless(self) -> tuple[str, ...]:
+        """The links whose inertials no body can have: right for torques, useless for springs and for a URDF."""
+        links = (joint.link for joint in self.train.observation.model.joints)
+        return tuple(link for link in links if not is_body(self.estimate.values, link))
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -59,21 +75,46 @@ class RobotDynamics:
             percent["held_out"] = 100 * error
         percent["per_joint"] = dict(zip(joints, 100 * per_joint, strict=True))
         return {
-            "structural_rank": self.train.base.rank,
+            "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
             "equations": sum(s.triangle.rows for s in self.train.subsystems),
             "masked_rows": self.train.masked,
             "error_percent": percent,
-            "friction_terms": list(self.friction_terms),
+            "bodiless_links": list(self.bodiless),
+            "friction_terms": list(self.friction.names),
+            "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
+            "friction_tried": [
+                {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
+                for t in self.friction.trials
+            ],
+            "warnings": list(dynamics_remarks(self.train, self.estimate)),
             "base_parameters": self._base_parameters(),
+            "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
             "seconds": self.seconds,
             "estimates": self.estimates,
         }
 
+    def _essential_parameters(self) -> dict[str, Any]:
+        """What stays of the base parameters, with value and standard deviation, and the error of the torques with it alone."""
+        found = self.essential
+        percent = {"train": 100 * self.train.errors(found.parameters)[0], "held_out": None}
+        if self.held_out is not None:
+            percent["held_out"] = 100 * self.held_out.errors(found.parameters)[0]
+        stay = zip(found.names, found.values, found.std, strict=True)
+        return {
+            "parameters": [{"name": name, "estimate": value, "std": std} for name, value, std in stay],
+            "eliminated": list(found.eliminated),
+            "error_percent": percent,
+        }
+
     def _base_parameters(self) -> list[dict[str, Any]]:
-        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell."""
+        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell.
+
+        `essential` is its value where the others are left out, None where it is left out itself.
+        """
+        essential = dict(zip(self.essential.names, self.essential.values, strict=True))
         base, x = self.train.base, self.estimate.parameters.coordinates()
         hidden = {entry.name for entry in self.estimate.dropped}
         rows = []
@@ -85,7 +126,14 @@ class RobotDynamics:
             percent = None if std is None or value == 0 else 100 * std / abs(value)
             unit = self.estimate.parameters[name].unit
             rows.append(
-                {"name": expression, "unit": unit, "estimate": value, "std": std, "std_percent": percent}
+                {
+                    "name": expression,
+                    "unit": unit,
+                    "estimate": value,
+                    "std": std,
+                    "std_percent": percent,
+                    "essential": essential.get(name),
+                }
             )
         return rows
 
@@ -98,55 +146,67 @@ def identify_robot_dynamics(
     validate: Sequence[Path] = (),
     estimator: EstimatorName = "wls",
     out: Path | None = None,
+    jobs: int = 1,
     progress: Progress = silent,
 ) -> RobotDynamics:
     """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
 
-    The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what the filters would carry over, and
-    predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks. With `out`, estimates and
-    results.json go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and where robot.yaml lacks the cut-off or
-    the decimation or declares a payload; nothing is written then.
+    Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
+    of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
+    and the other blocks. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where the logs do not fit the
+    robot, and where robot.yaml lacks the cut-off or the decimation or declares a payload; nothing is written then.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
-    cutoff, decimation = _treatment(model)
-    terms = drive_terms.chosen(model.config.dynamics.friction)
-    observation = Observation(model, terms)
+    treatment = _treatment(model)
+
+    def systems(observation: Observation) -> list[LogSystem]:
+        return log_systems(
+            logs,
+            observation,
+            treatment,
+            hold_out=hold_out,
+            batches=batches_each(len(logs)),
+            jobs=jobs,
+            progress=progress,
+        )
+
+    def equations(observation: Observation) -> list[ExperimentSystem]:
+        return [system.early for system in systems(observation)]
+
+    declared = model.config.dynamics.friction
+    friction = select_friction(model, declared, equations, treatment.decimation)
+    observation = Observation(model, friction.terms)
     base = BaseParameters.of(observation)
-    mask = model.config.dynamics.mask_standstill
-    motions, early, late = [], [], []
-    for number, log in enumerate(logs):
-        recording = read_recording(log, model)
-        motions.append(Motion.of(recording, cutoff))
-        split, gone = _split(recording, hold_out, decimation)
-        early.append(Window(end=gone))
-        late.append(Window(start=split))
-        progress("reading", (number + 1) / len(logs))
-    train = observe(observation, base, motions, decimation, mask_standstill=mask, windows=early)
-    held_out = None
-    if hold_out > 0:
-        held_out = observe(observation, base, motions, decimation, mask_standstill=mask, windows=late)
-    elif validate:
-        others = [Motion.of(read_recording(log, model), cutoff) for log in validate]
-        held_out = observe(observation, base, others, decimation, mask_standstill=mask)
+    found = systems(observation)
+    train = RegressionData.of(observation, base, [system.early for system in found])
+    late = [system.late for system in found if system.late is not None]
+    if validate:
+        others = log_systems(
+            validate, observation, treatment, hold_out=0.0, batches=1, jobs=jobs, progress=progress
+        )
+        late = [system.early for system in others]
+    held_out = RegressionData.of(observation, base, late) if late else None
     estimate = _ESTIMATORS[estimator](train)
-    options = {"estimator": estimator, "hold_out": hold_out}
+    options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
+    essential = essential_parameters(train, estimate)
     seconds = time.perf_counter() - begun
-    found = RobotDynamics(estimate, train, held_out, drive_terms.friction_names(terms), seconds, target)
+    rank = BaseParameters.of(Observation(model, CLASSIC)).rank
+    result = RobotDynamics(estimate, rank, train, held_out, essential, friction, seconds, target)
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
-        write_results(out, found.document())
-    return found
+        write_results(out, result.document())
+    return result
 
 
-def _treatment(model: RobotModel) -> tuple[float, Decimation]:
-    """Cut-off (Hz) and decimation as declared."""
+def _treatment(model: RobotModel) -> Treatment:
+    """Cut-off and decimation as declared."""
     declared = model.config.dynamics
     if declared.cutoff_hz is None or declared.decimation is None:
         raise InputError(
@@ -157,12 +217,4 @@ def _treatment(model: RobotModel) -> tuple[float, Decimation]:
         raise InputError(
             f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
         )
-    return declared.cutoff_hz, Decimation(declared.decimation)
-
-
-def _split(recording: Recording, hold_out: float, decimation: Decimation) -> tuple[float, float]:
-    """When the held-out part begins, and when the rows of the fit end, which its filters must not reach; inf without one."""
-    if hold_out == 0:
-        return math.inf, math.inf
-    split = recording.start + (1.0 - hold_out) * recording.duration
-    return split, float(np.nextafter(split - decimation.support * recording.time_step, -math.inf))
+    return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)

@@ -1,0 +1,86 @@
+"""A low-pass without phase shift, of finite length: blocks that overlap give what the whole gives."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+
+_ORDER = 4
+_SMALLEST = 1e-12
+"""What the impulse response falls below, relative to its start, is cut off."""
+_SHORTEST_TRANSFORM = 8192
+
+
+@dataclass(frozen=True)
+class LowPass:
+    """A fourth-order Butterworth filter forwards and backwards, at samples `time_step` (s) apart: -6 dB at `cutoff_hz`.
+
+    Its response to frequency is |B|² of the bilinear transform, in closed form. The impulse response ends where its slowest mode has
+    fallen to 1e-12, `support` samples to either side. Raises `FlexcalError` where the cut-off is not below half the sampling rate.
+    """
+
+    time_step: float
+    cutoff_hz: float
+
+    def __post_init__(self) -> None:
+        if not 0 < self.cutoff_hz < 0.5 / self.time_step:
+            raise FlexcalError(
+                f"a cut-off of {self.cutoff_hz:g} Hz is not between 0 and {0.5 / self.time_step:g} Hz, half the sampling rate."
+            )
+
+    @property
+    def _corner(self) -> float:
+        return math.tan(math.pi * self.cutoff_hz * self.time_step)
+
+    @cached_property
+    def support(self) -> int:
+        """Samples before and after a filtered one that it depends on."""
+        angles = math.pi * (2 * np.arange(_ORDER) + _ORDER + 1) / (2 * _ORDER)
+        poles = self._corner * np.exp(1j * angles)
+        slowest = np.abs((1 + poles) / (1 - poles)).max()
+        return math.ceil(math.log(_SMALLEST) / math.log(slowest))
+
+    @cached_property
+    def _response(self) -> tuple[int, np.ndarray]:
+        """Length of the transforms, and the transform of the finite impulse response, delayed by the support."""
+        length = max(_SHORTEST_TRANSFORM, 1 << (8 * self.support).bit_length())
+        half_angle = math.pi * np.arange(length // 2 + 1) / length
+        with np.errstate(over="ignore"):
+            gain = 1.0 / (1.0 + (np.tan(half_angle) / self._corner) ** (2 * _ORDER))
+        impulse = np.roll(np.fft.irfft(gain, length), self.support)
+        impulse[2 * self.support + 1 :] = 0.0
+        return length, np.fft.rfft(impulse / impulse.sum())
+
+    def extended(self, values: np.ndarray) -> np.ndarray:
+        """`values` (N, n) with `support` samples more at either end, turned about the end sample by half a turn.
+
+        Raises `FlexcalError` where there are too few samples for it.
+        """
+        return np.concatenate([self.before(values), values, self.before(values[::-1])[::-1]])
+
+    def before(self, values: np.ndarray) -> np.ndarray:
+        """The `support` samples that precede `values` (N, n) then; raises `FlexcalError` where N is not above that."""
+        if len(values) <= self.support:
+            raise FlexcalError(
+                f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {self.support + 1} are needed."
+            )
+        return 2 * values[0] - values[self.support : 0 : -1]
+
+    def apply(self, values: np.ndarray) -> np.ndarray:
+        """`values` (N, n) filtered, (N - 2 · support, n): samples nearer to an end do not exist."""
+        length, response = self._response
+        lost = 2 * self.support
+        rows = np.ascontiguousarray(values.T)
+        found = np.empty((rows.shape[0], max(0, rows.shape[1] - lost)))
+        step = length - lost
+        for start in range(0, found.shape[1], step):
+            part = np.fft.rfft(rows[:, start : start + length], length, axis=1)
+            filtered = np.fft.irfft(part * response, length, axis=1)[:, lost:]
+            stop = min(start + step, found.shape[1])
+            found[:, start:stop] = filtered[:, : stop - start]
+        return found.T

@@ -1,0 +1,90 @@
+"""From `friction:` of robot.yaml and recordings to the terms of the drives."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.cross_validation import folds
+from flexcal.dynamics.drive_terms import CLASSIC, DriveTerm
+from flexcal.dynamics.experiment_system import ExperimentSystem
+from flexcal.dynamics.friction_choice import (
+    Candidate,
+    Trial,
+    best_shapes,
+    candidate_columns,
+    forward_selection,
+)
+from flexcal.dynamics.friction_terms import LIBRARY, Scale, plain_terms, variants
+from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.wls import weighted_least_squares
+from flexcal.model import RobotModel
+from flexcal.model.regressor import INERTIAL
+
+_CLASSIC = ("viscous", "coulomb", "torque_offset")
+
+
+@dataclass(frozen=True)
+class FrictionSelection:
+    """All `terms` of the drives, the `names` of the friction terms among them, and what was tried beyond the plain ones."""
+
+    terms: tuple[DriveTerm, ...]
+    names: tuple[str, ...]
+    chosen: tuple[Candidate, ...]
+    trials: tuple[Trial, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The names, each with its shape."""
+        shapes = {candidate.name: candidate.label for candidate in self.chosen}
+        return tuple(shapes.get(name, name) for name in self.names)
+
+
+def select_friction(
+    model: RobotModel,
+    friction: str | tuple[str, ...],
+    equations: Callable[[Observation], Sequence[ExperimentSystem]],
+    decimation: Decimation,
+) -> FrictionSelection:
+    """The terms that `friction` names; the shapes of those of the library, and with "auto" which of them, by cross-validation.
+
+    `equations` gives those of the fit for any observation, after `decimation`; nothing else is looked at. Raises `FlexcalError` for an
+    unknown term, and as `weighted_least_squares` does.
+    """
+    names = _CLASSIC if isinstance(friction, str) else friction
+    plain = CLASSIC if isinstance(friction, str) else plain_terms(names)
+    library = LIBRARY if friction == "auto" else tuple(name for name in LIBRARY if name in names)
+    if not library:
+        return FrictionSelection(plain, names, (), ())
+    scale = _scale(model, equations)
+    candidates = [candidate for name in library for candidate in variants(name, scale)]
+    wide = Observation(model, (*plain, *candidates))
+    systems = equations(wide)
+    base = BaseParameters.of(Observation(model, plain)).found
+    fixed = [wide.names.index(name) for name in base.kept_names]
+    reach = -(-2 * decimation.support // decimation.factor)
+    blocks = folds(systems, wide.members, len(wide.names), fixed, reach)
+    groups = {candidate: candidate_columns(wide, candidate) for candidate in candidates}
+    choice = (
+        forward_selection(blocks, fixed, groups)
+        if friction == "auto"
+        else best_shapes(blocks, fixed, groups, library)
+    )
+    taken = tuple(candidate.name for candidate in choice.chosen)
+    return FrictionSelection(
+        (*plain, *(candidate.term for candidate in choice.chosen)),
+        (*(name for name in names if name not in library), *taken),
+        choice.chosen,
+        choice.trials,
+    )
+
+
+def _scale(model: RobotModel, equations: Callable[[Observation], Sequence[ExperimentSystem]]) -> Scale:
+    classic = Observation(model, CLASSIC)
+    systems = equations(classic)
+    data = RegressionData.of(classic, BaseParameters.of(classic), systems)
+    found = weighted_least_squares(data).parameters.coordinates()
+    return Scale.of(systems, classic, found[: len(INERTIAL) * model.n])

@@ -1,0 +1,35 @@
+"""The axes on which motors turn: those of the joints, but for motors that turn with several."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.model import RobotModel
+
+
+@dataclass(frozen=True)
+class MotorAxis:
+    """The motor of the joint `name`, number `joint`.
+
+    It turns by the sum of ratio · q_j over (j, ratio) in `shares`, and joint j feels ratio times its torque.
+    """
+
+    name: str
+    joint: int
+    shares: tuple[tuple[int, float], ...]
+
+    def of(self, values: np.ndarray) -> np.ndarray:
+        """Positions, velocities or accelerations of the joints (N, n) seen on this axis, (N,)."""
+        return sum((ratio * values[:, joint] for joint, ratio in self.shares), np.zeros(len(values)))
+
+
+def motor_axes(model: RobotModel) -> tuple[MotorAxis, ...]:
+    """One axis a joint, with what `drives: coupling:` declares."""
+    axes = []
+    for number, name in enumerate(model.joint_names):
+        entries = [entry for entry in model.config.drives.coupling if entry.motor == name]
+        shares = ((number, 1.0), *((model.joint_index(entry.joint), entry.ratio) for entry in entries))
+        axes.append(MotorAxis(name, number, shares))
+    return tuple(axes)

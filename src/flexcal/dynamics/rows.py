@@ -1,0 +1,162 @@
+"""The equations of one experiment, filtered and decimated, block by block (Eq. 2.26)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from flexcal.data.filtering import Decimation, DecimationStream
+from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.observation import Observation
+
+_BLOCK = 512
+"""Samples, about, whose columns are in memory at once; they fit a processor's cache."""
+_STANDSTILL = 0.01
+"""A joint stands still below this share of its largest speed in the recording."""
+
+
+class Experiment(Protocol):
+    """One recording; it can be gone through again and again."""
+
+    @property
+    def name(self) -> str:
+        """What messages call it."""
+        ...
+
+    @property
+    def samples(self) -> int:
+        """How many there are."""
+        ...
+
+    @property
+    def top_speed(self) -> np.ndarray:
+        """The largest |q̇| of every joint (n,)."""
+        ...
+
+    def blocks(self) -> Iterator[Motion]:
+        """The motion in parts that follow each other."""
+        ...
+
+
+@dataclass(frozen=True)
+class Window:
+    """Rows from `start` to before `end`, s on the recording's clock."""
+
+    start: float = -math.inf
+    end: float = math.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """M equations of every joint that follow each other.
+
+    `systems` has for every joint W and, last, Y transposed (members + 1, M). `number` (M,) counts the rows of the experiment, whatever
+    is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth
+    of its top speed.
+    """
+
+    number: np.ndarray
+    time: np.ndarray
+    still: np.ndarray
+    systems: list[np.ndarray]
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    @property
+    def columns(self) -> list[np.ndarray]:
+        """For every joint W transposed (members, M)."""
+        return [system[:-1] for system in self.systems]
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Y of all joints (n, M)."""
+        return np.array([system[-1] for system in self.systems])
+
+    def where(self, keep: np.ndarray) -> Rows:
+        """The rows that `keep` (M,) marks."""
+        if keep.all():
+            return self
+        systems = [system[:, keep] for system in self.systems]
+        return Rows(self.number[keep], self.time[keep], self.still[keep], systems)
+
+
+def rows(
+    observation: Observation, experiment: Experiment, decimation: Decimation, window: Window
+) -> Iterator[Rows]:
+    """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
+
+    Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
+    """
+    ends = np.cumsum(observation.widths)
+    slowest = _STANDSTILL * experiment.top_speed
+    stream = DecimationStream(decimation)
+    centres = _Centres(decimation)
+    memory: Memory = {}
+    reach = math.inf
+    for start, piece in _pieces(experiment.blocks(), decimation.factor * max(1, _BLOCK // decimation.factor)):
+        if len(piece) > 1:
+            reach = (decimation.support + 1) * float(piece.time[1] - piece.time[0])
+        if piece.time[-1] < window.start - reach:
+            observation.follow(piece, memory)
+            continue
+        if piece.time[0] > window.end + reach:
+            return
+        still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
+        centres.push(start, piece.time, still)
+        systems = stream.push(observation.systems(piece, memory))
+        number, time, still = centres.pop(systems.shape[1])
+        found = Rows(number, time, still, np.split(systems, ends[:-1]))
+        inside = (time >= window.start) & (time < window.end)
+        if inside.any():
+            yield found.where(inside)
+
+
+class _Centres:
+    """Time and standstill of the samples that decimated rows stand for, until their rows are complete.
+
+    A row stands still where the robot does anywhere in the main lobe of its filter, one row to either side: what friction is at rest, no
+    sign of a velocity tells, and the row holds a part of it.
+    """
+
+    def __init__(self, decimation: Decimation) -> None:
+        self._decimation = decimation
+        self._number: int | None = None
+        self._first = decimation.support
+        self._held = np.zeros((2, 0))
+
+    def push(self, start: int, time: np.ndarray, still: np.ndarray) -> None:
+        if self._number is None:
+            self._number = start // self._decimation.factor
+        self._held = np.hstack([self._held, [time, still]])
+
+    def pop(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        factor, size = self._decimation.factor, self._held.shape[1]
+        centres = self._first + factor * np.arange(count)
+        time, still = self._held
+        before = np.concatenate([[0.0], np.cumsum(still)])
+        low, high = np.maximum(centres - factor + 1, 0), np.minimum(centres + factor, size)
+        number = (self._number or 0) + np.arange(count)
+        self._number = (self._number or 0) + count
+        spent = min(size, max(0, self._first + factor * (count - 1)))
+        self._held, self._first = self._held[:, spent:], self._first + factor * count - spent
+        return number, time[centres], before[high] > before[low]
+
+
+def _pieces(motions: Iterable[Motion], size: int) -> Iterator[tuple[int, Motion]]:
+    """Parts of `size` samples (the last one shorter), each with the number of its first sample."""
+    start, held = 0, None
+    for motion in motions:
+        whole = motion if held is None else Motion.joined([held, motion])
+        full = len(whole) // size * size
+        for first in range(0, full, size):
+            yield start + first, whole.part(first, first + size)
+        start += full
+        held = whole.part(full, len(whole))
+    if held is not None and len(held):
+        yield start, held

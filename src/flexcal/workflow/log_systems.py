@@ -1,0 +1,114 @@
+"""Joint logs to the equations that the estimators need, one after the other or in several processes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Window, experiment_system
+from flexcal.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """What is done to a log before its equations are written: low-pass of the positions, decimation, and whether standstill is masked."""
+
+    cutoff_hz: float
+    decimation: Decimation
+    mask_standstill: bool
+
+
+@dataclass(frozen=True, eq=False)
+class LogSystem:
+    """The equations of one log: those of the fit, and those of its last part, where that is held out."""
+
+    early: ExperimentSystem
+    late: ExperimentSystem | None
+
+
+def log_systems(
+    logs: Sequence[Path],
+    observation: Observation,
+    treatment: Treatment,
+    *,
+    hold_out: float,
+    batches: int,
+    jobs: int,
+    progress: Progress,
+) -> list[LogSystem]:
+    """The equations of every log, in their order, whatever the number of `jobs` (processes) is.
+
+    The last share `hold_out` of the time of every log is kept apart, by what the filters reach over. Each log has at most about so many
+    `batches`. Raises `InputError` and `FlexcalError` as `JointLog` and `experiment_system` do.
+    """
+    if jobs == 1:
+        found = []
+        for number, log in enumerate(logs):
+
+            def within(stage: str, share: float, number: int = number) -> None:
+                progress(stage, (number + share) / len(logs))
+
+            found.append(_log_system(log, observation, treatment, hold_out, batches, within))
+        return found
+    from joblib import Parallel, delayed
+
+    parts = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_log_system)(log, observation, treatment, hold_out, batches, silent) for log in logs
+    )
+    progress("reading", 0.0)
+    found = []
+    for part in parts:
+        found.append(part)
+        progress("reading", len(found) / len(logs))
+    return found
+
+
+def _log_system(
+    log: Path,
+    observation: Observation,
+    treatment: Treatment,
+    hold_out: float,
+    batches: int,
+    progress: Progress,
+) -> LogSystem:
+    experiment = _Watched(log, observation.model, treatment.cutoff_hz, progress)
+    progress("reading", 0.0)
+    early, late = Window(), None
+    if hold_out > 0:
+        start, end = experiment.span
+        split = end - hold_out * (end - start)
+        reach = treatment.decimation.support * experiment.time_step
+        early, late = Window(end=float(np.nextafter(split - reach, -math.inf))), Window(start=split)
+
+    def system(window: Window, batches: int) -> ExperimentSystem:
+        return experiment_system(
+            observation,
+            experiment,
+            treatment.decimation,
+            window,
+            mask_standstill=treatment.mask_standstill,
+            batches=batches,
+        )
+
+    found = LogSystem(system(early, batches), None if late is None else system(late, 1))
+    progress("reading", 1.0)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Watched(JointLog):
+    """A log that says how much of it is read."""
+
+    progress: Progress
+
+    def blocks(self) -> Iterator[Motion]:
+        seen = 0
+        for motion in super().blocks():
+            yield motion
+            seen += len(motion)
+            self.progress("reading", min(1.0, seen / max(1, self.samples)))

@@ -1,0 +1,109 @@
+"""Logs of any length: read in blocks they give what they give as a whole, in memory that does not grow, in any number of processes."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.data import Recording, read_recording, write_recording
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    CLASSIC,
+    BaseParameters,
+    JointLog,
+    Motion,
+    Observation,
+    Window,
+    joint_log,
+    observe,
+    weighted_least_squares,
+)
+from flexcal.dynamics.rows import rows
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.progress import silent
+from flexcal.workflow.log_systems import Treatment, log_systems
+
+STEP = 1 / 200
+
+
+@pytest.fixture(scope="module")
+def observation(tx40: RobotModel) -> Observation:
+    return Observation(tx40, CLASSIC)
+
+
+@pytest.fixture
+def logs(swing: Motion, tmp_path: Path) -> list[Path]:
+    rng = np.random.default_rng(9)
+    paths = [tmp_path / "one.parquet", tmp_path / "two.csv"]
+    for path in paths:
+        torque = np.cos(swing.q) + 0.1 * rng.normal(size=swing.q.shape)
+        write_recording(path, Recording(STEP, swing.q, torque, start=1.0))
+    return paths
+
+
+def test_blocks_give_the_whole(
+    logs: list[Path], observation: Observation, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(joint_log, "_ROWS", 333)
+    for path in logs:
+        log, whole = JointLog(path, observation.model, 10.0), read_recording(path, observation.model)
+        motion = Motion.of(whole, 10.0)
+        assert (log.samples, log.span) == (len(motion), (1.0, pytest.approx(1.0 + whole.duration)))
+        np.testing.assert_allclose(log.top_speed, motion.top_speed, rtol=1e-12)
+        assert sum(1 for _ in log.blocks()) > 3
+        parts = Motion.joined(log.blocks())
+        np.testing.assert_allclose(parts.time, motion.time, atol=1e-12)
+        np.testing.assert_allclose(parts.ddq, motion.ddq, atol=1e-10)
+        estimates = [
+            weighted_least_squares(
+                observe(observation, BaseParameters.of(observation), [experiment], Decimation(2))
+            )
+            for experiment in (log, motion)
+        ]
+        coordinates = [e.parameters.coordinates() for e in estimates]
+        np.testing.assert_allclose(coordinates[0], coordinates[1], rtol=1e-10, atol=1e-10)
+        np.testing.assert_allclose(estimates[0].covariance, estimates[1].covariance, rtol=1e-8, atol=1e-18)
+
+
+def test_processes_change_nothing(logs: list[Path], observation: Observation) -> None:
+    treatment = Treatment(10.0, Decimation(4), True)
+    alone, several = (
+        log_systems(
+            logs, observation, treatment, hold_out=0.3, batches=16, jobs=jobs, progress=silent
+        )
+        for jobs in (1, 2)
+    )  # fmt: skip
+    for one, other in zip(alone, several, strict=True):
+        assert one.late is not None and other.late is not None
+        for mine, theirs in zip(
+            one.early.batches + one.late.batches, other.early.batches + other.late.batches, strict=True
+        ):
+            assert (mine.number, mine.rows) == (theirs.number, theirs.rows)
+            for factor, same in zip(mine.factors, theirs.factors, strict=True):
+                np.testing.assert_allclose(factor, same, rtol=0, atol=1e-12)
+
+
+def test_a_window_reads_no_more_than_it_needs(swing: Motion, observation: Observation) -> None:
+    """The rows of a window are those that all rows have there, number and all."""
+    decimation = Decimation(4)
+    everything = list(rows(observation, swing, decimation, Window()))
+    number, time = (np.concatenate([getattr(part, key) for part in everything]) for key in ("number", "time"))
+    np.testing.assert_array_equal(number, np.arange(len(number)))
+    np.testing.assert_allclose(time, swing.time[decimation.support :: 4][: len(time)])
+    part = list(rows(observation, swing, decimation, Window(6.0, 7.0)))
+    inside = (time >= 6.0) & (time < 7.0)
+    np.testing.assert_array_equal(np.concatenate([p.number for p in part]), number[inside])
+    for joint in range(6):
+        found = np.hstack([p.columns[joint] for p in part])
+        expected = np.hstack([p.columns[joint] for p in everything])[:, inside]
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_a_gap_is_refused(swing: Motion, observation: Observation, tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    write_recording(path, Recording(STEP, swing.q, swing.torque))
+    lines = path.read_text().splitlines(keepends=True)
+    path.write_text("".join(lines[:800] + lines[900:]))
+    with pytest.raises(InputError, match=r"log\.csv: a gap of 0\.505 s precedes the sample at 4\.495 s"):
+        _ = JointLog(path, observation.model, 10.0).samples

@@ -1,0 +1,54 @@
+"""Filtered motion: the same wherever a log is cut into blocks, and that of the whole."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.signal import butter, sosfiltfilt
+
+from flexcal.data import Recording
+from flexcal.dynamics import Motion
+from flexcal.dynamics.motion import filtered_motion
+from flexcal.errors import FlexcalError
+
+STEP, CUTOFF = 1 / 500, 20.0
+
+
+@pytest.fixture
+def recording(rng: np.random.Generator) -> Recording:
+    time = STEP * np.arange(6000)
+    q = np.stack([np.sin(2 * np.pi * f * time) for f in (0.3, 1.1)], axis=1) + 1e-5 * rng.normal(
+        size=(6000, 2)
+    )
+    return Recording(time_step=STEP, q=q, torque=rng.normal(size=(6000, 2)), start=3.0)
+
+
+def test_it_is_the_filtered_recording_and_its_derivatives(recording: Recording) -> None:
+    motion = Motion.of(recording, CUTOFF)
+    border = 25
+    assert len(motion) == 6000 - 2 * border
+    np.testing.assert_allclose(motion.time, recording.time[border:-border], rtol=1e-14)
+    np.testing.assert_array_equal(motion.torque, recording.torque[border:-border])
+    q = sosfiltfilt(butter(4, CUTOFF, fs=1 / STEP, output="sos"), recording.q, axis=0, padlen=3000)
+    inside = slice(600, -600)
+    np.testing.assert_allclose(motion.q[inside], q[border:-border][inside], atol=1e-10)
+    dq = np.gradient(q, STEP, axis=0)
+    np.testing.assert_allclose(motion.dq[inside], dq[border:-border][inside], atol=1e-9)
+    ddq = np.gradient(dq, STEP, axis=0)
+    np.testing.assert_allclose(motion.ddq[inside], ddq[border:-border][inside], atol=1e-7)
+
+
+def test_blocks_give_the_whole(recording: Recording, rng: np.random.Generator) -> None:
+    cuts = np.r_[0, 3, 200, np.sort(rng.choice(np.arange(300, 5990), 7, replace=False)), 5998, 6000]
+    blocks = [
+        Recording(STEP, recording.q[a:b], recording.torque[a:b], start=3.0 + a * STEP)
+        for a, b in pairwise(cuts)
+    ]
+    parts, whole = Motion.joined(filtered_motion(blocks, CUTOFF)), Motion.of(recording, CUTOFF)
+    for name, tolerance in (("time", 1e-12), ("q", 1e-14), ("dq", 1e-12), ("ddq", 1e-10), ("torque", 0.0)):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), rtol=0, atol=tolerance)
+
+
+def test_too_short_a_recording(recording: Recording) -> None:
+    with pytest.raises(FlexcalError, match="too few for a cut-off of 20 Hz"):
+        Motion.of(Recording(STEP, recording.q[:100], recording.torque[:100]), CUTOFF)
