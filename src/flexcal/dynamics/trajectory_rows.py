@@ -29,8 +29,8 @@ _FIRST_SIGMA = 0.01
 def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     """All unknowns of the torques with their prior, and the names of those that are the robot's dynamics.
 
-    These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric errors and
-    what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
+    These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric
+    errors and what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
     """
     lacking = [
         name for name, value in zip(model.joint_names, model.rotor_inertia, strict=True) if not value > 0
