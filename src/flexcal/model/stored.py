@@ -45,7 +45,7 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
 
 
 def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
-    links = [joint.link for joint in model.joints if f"{joint.link}.mass" in estimate.parameters]
+    links = [joint.link for joint in model.joints if f"{joint.link}.mc_x" in estimate.parameters]
     broken = [link for link in links if not is_body(estimate.values, link)]
     if broken:
         raise InputError(
