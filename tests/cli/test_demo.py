@@ -13,10 +13,16 @@ import pytest
 QUANTITY = {"estimate": 1.05e5, "std": 2e3, "low": 1.01e5, "high": 1.09e5, "truth": 1e5, "identifiable": True}
 UNKNOWN = {"estimate": 7e5, "std": None, "low": None, "high": None, "truth": 1.4e5, "identifiable": False}
 ERRORS = {"poses": 150, "mean_mm": 0.034, "p90_mm": 0.048, "max_mm": 0.111}
+STAGE_ONE = {
+    "stiffness": {"joint_1": {"drive": QUANTITY}, "joint_3": {"bearing_y": UNKNOWN}},
+    "damping": {"joint_1": {"drive": QUANTITY}},
+}
 DOCUMENT = {
-    "stage1": {
-        "stiffness": {"joint_1": {"drive": QUANTITY}, "joint_3": {"bearing_y": UNKNOWN}},
-        "damping": {"joint_1": {"drive": QUANTITY}},
+    "stage1": STAGE_ONE,
+    "cad_alone": {
+        "stage1": STAGE_ONE,
+        "calibration": ERRORS,
+        "verification": {"elastic": {**ERRORS, "max_mm": 0.198}, "elastic_unambiguous": ERRORS},
     },
     "identifiability": {"parameters": 47, "rank": 29, "dropped": []},
     "calibration": ERRORS,
@@ -58,6 +64,7 @@ def test_text_shows_truth_beside_estimate(run, calls: list[dict[str, Any]], tmp_
     page = run("demo", "--out", tmp_path / "out").out
     assert "+5.0 %" in page and "identifiable" in page and "29 of 47" in page
     assert "0.034" in page and "report.html" in page
+    assert "CAD alone" in page and "0.198" in page
 
 
 def test_examples_in_the_current_folder_come_first(
