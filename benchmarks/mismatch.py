@@ -12,6 +12,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # one process a core below
 import argparse
 import shutil
 import tempfile
+from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -74,12 +75,11 @@ def one(label: str, seed: int) -> Outcome:
 
 def run() -> list[tuple[str, float, str]]:
     """Share of intervals that contain the truth over the promised 0.95, with the χ² beside it."""
-    return collect(range(2000, 2002))
+    return list(collect(range(2000, 2002)))
 
 
-def collect(seeds: range) -> list[tuple[str, float, str]]:
+def collect(seeds: range) -> Iterator[tuple[str, float, str]]:
     """All mismatches on all seeds, one process a core."""
-    results = []
     with ProcessPoolExecutor(os.cpu_count()) as pool:
         waiting = {label: [pool.submit(one, label, seed) for seed in seeds] for label in MISMATCHES}
         for label, futures in waiting.items():
@@ -93,8 +93,7 @@ def collect(seeds: range) -> list[tuple[str, float, str]]:
                 f"({', '.join(f'{flag} {count}' for flag, count in named.items())}); "
                 f"inside: springs {100 * np.mean(springs < 1.96):.0f} %, geometry {100 * np.mean(geometry < 1.96):.0f} %"
             )
-            results.append((label, float(np.mean(np.concatenate([springs, geometry]) < 1.96)) / 0.95, note))
-    return results
+            yield label, float(np.mean(np.concatenate([springs, geometry]) < 1.96)) / 0.95, note
 
 
 if __name__ == "__main__":
@@ -103,4 +102,4 @@ if __name__ == "__main__":
     parser.add_argument("--count", type=int, default=4)
     given = parser.parse_args()
     for label, ratio, note in collect(range(given.first, given.first + given.count)):
-        print(f"{label:32s} {ratio:6.2f}   {note}")
+        print(f"{label:32s} {ratio:6.2f}   {note}", flush=True)

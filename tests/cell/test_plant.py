@@ -7,6 +7,7 @@ import pytest
 
 from flexcal.cell.config import CellConfig, MismatchConfig, SpreadConfig
 from flexcal.cell.plant import Plant, build_plant, linearise, unresolved
+from flexcal.cell.resolution import resolved_plant
 from flexcal.cell.rest import rest
 from flexcal.cell.truth import draw_truth
 from flexcal.model import RobotModel, static_equilibrium
@@ -96,3 +97,12 @@ def test_steps_too_long_for_robot_or_friction_are_seen(tx90l: RobotModel) -> Non
     assert judge(config, 0.25e-3) is None
     assert judge(config, 1e-3) == "the robot's fastest modes"
     assert judge(harsh, 0.25e-3) == "the motors' Coulomb friction near standstill"
+
+
+def test_a_wrist_too_light_for_its_springs_moves_rigidly(tx90l: RobotModel) -> None:
+    """With every motor free and nothing in the hand; with the springs of the first joints as they are."""
+    config = CellConfig(mismatch=MismatchConfig(elastic_wrist=50e3))
+    plant, substeps = resolved_plant(tx90l, config, q=POSE, free=range(6), payload=0.0, rate_hz=4000.0)
+    rigid, same = resolved_plant(tx90l, CellConfig(), q=POSE, free=range(6), payload=0.0, rate_hz=4000.0)
+    assert (plant.coordinates, substeps) == (rigid.coordinates, same)
+    assert unresolved(plant) is None

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 
 import numpy as np
 
@@ -25,8 +26,30 @@ def resolved_plant(
 ) -> tuple[Plant, int]:
     """The plant and its steps per tick: as many as configured, doubled until the true robot's fastest modes are resolved.
 
-    Raises `FlexcalError` where no refinement resolves them.
+    Springs that the mismatch puts into a wrist too light for any refinement, as it is without a payload, are left out: their modes lie far
+    above whatever moves the robot. Raises `FlexcalError` where no refinement resolves the others.
     """
+    plant = _refined(truth, config, q=q, free=free, payload=payload, rate_hz=rate_hz)
+    if isinstance(plant, str) and config.mismatch.elastic_wrist > 0:
+        stiff = replace(config, mismatch=replace(config.mismatch, elastic_wrist=0.0))
+        plant = _refined(truth, stiff, q=q, free=free, payload=payload, rate_hz=rate_hz)
+    if isinstance(plant, str):
+        raise FlexcalError(
+            f"{plant}; raise the controller's substeps or rate, or friction's coulomb_velocity."
+        )
+    return plant
+
+
+def _refined(
+    truth: RobotModel,
+    config: CellConfig,
+    *,
+    q: np.ndarray,
+    free: Collection[int],
+    payload: float | None,
+    rate_hz: float,
+) -> tuple[Plant, int] | str:
+    """As `resolved_plant`, or what the last refinement still misses."""
     phrase = ""
     for refinement in REFINEMENTS:
         substeps = config.controller.substeps * refinement
@@ -36,4 +59,4 @@ def resolved_plant(
         if missed is None:
             return plant, substeps
         phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"
-    raise FlexcalError(f"{phrase}; raise the controller's substeps or rate, or friction's coulomb_velocity.")
+    return phrase
