@@ -233,3 +233,15 @@ def test_bodies_that_could_be_built(tx40: Path, capsys: pytest.CaptureFixture[st
     robot = RobotModel.from_yaml(tx40 / "robot.yaml")
     inertias = pin.buildModelFromUrdf(str(urdf)).inertias
     assert [i.mass for i in list(inertias)[1:]] == pytest.approx(list(robot.mass), rel=1e-12)
+
+
+def test_a_robot_that_stands_still_is_refused(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tx40 / "exciting.parquet"
+    recorded = pl.read_parquet(log).head(12_000)
+    noise = np.random.default_rng(5).normal(scale=1e-5, size=(6, len(recorded)))
+    still = recorded.with_columns(pl.Series(f"motor_{k + 1}", 0.3 + noise[k]) for k in range(6))
+    still.write_parquet(log)
+    assert main(["identify", "dynamics", str(tx40 / "robot.yaml"), str(log)]) == 2
+    error = capsys.readouterr().err
+    assert "exciting.parquet" in error and "the robot stands still" in error
+    assert not (tx40 / "estimates.yaml").exists()

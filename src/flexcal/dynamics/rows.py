@@ -18,6 +18,8 @@ _BLOCK = 512
 """Samples, about, whose columns are in memory at once; they fit a processor's cache."""
 _STANDSTILL = 0.01
 """A joint stands still below this share of its largest speed in the recording."""
+_AT_REST = 1e-3
+"""rad/s or m/s, below which it stands still in any case: there it is noise that seems to move it."""
 
 
 class Experiment(Protocol):
@@ -94,7 +96,7 @@ def rows(
     Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
     """
     ends = np.cumsum(observation.widths)
-    slowest = _STANDSTILL * experiment.top_speed
+    slowest = np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
     memory: Memory = {}
