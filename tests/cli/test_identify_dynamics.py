@@ -212,6 +212,32 @@ def test_two_ways_to_validate_exclude_each_other(tx40: Path, capsys: pytest.Capt
     assert "exclude each other" in refusal(arguments, capsys)
 
 
+def test_rows_that_are_grossly_wrong(tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    """A sensor that drops to zero now and then: irls predicts the intact torques nearly as wls does without, wls does not."""
+    log = with_friction(tx40, "classic") / "exciting.parquet"
+    table = pl.read_parquet(log)
+    arguments = [
+        "--validate",
+        str(tmp_path / "intact.parquet"),
+        "--out",
+        str(tmp_path / "out"),
+        "--estimator",
+    ]
+    table.write_parquet(tmp_path / "intact.parquet")
+    intact = identified(tx40, capsys, *arguments, "wls")["error_percent"]["held_out"]
+    lost = np.arange(len(table)) % 2000 < 100
+    torques = [
+        pl.when(pl.Series(lost)).then(0.0).otherwise(pl.col(f"torque_{i}")).alias(f"torque_{i}")
+        for i in range(1, 7)
+    ]
+    table.with_columns(torques).write_parquet(log)
+    linear, robust = (
+        identified(tx40, capsys, *arguments, name)["error_percent"]["held_out"] for name in ("wls", "irls")
+    )
+    assert robust < intact + 0.3
+    assert linear > intact + 2.0
+
+
 def test_bodies_that_could_be_built(tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     """sdp finds them, wls says that it has not; the URDF gets them."""
     robot = tx40 / "robot.yaml"

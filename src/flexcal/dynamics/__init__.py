@@ -25,12 +25,14 @@ from flexcal.dynamics.friction_library import (
 )
 from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
+from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
+from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
@@ -57,6 +59,7 @@ __all__ = [
     "MotionBandwidth",
     "Observation",
     "Presliding",
+    "RecordedRows",
     "RegressionData",
     "RotorInertia",
     "Stribeck",
@@ -72,6 +75,7 @@ __all__ = [
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
+    "huber_least_squares",
     "identify_with_prior",
     "log_blocks",
     "motion_bandwidth",

@@ -52,9 +52,11 @@ def experiment_system(
     *,
     mask_standstill: bool,
     batches: int = BATCHES,
+    weights: np.ndarray | None = None,
 ) -> ExperimentSystem:
     """One pass over an experiment, in at most about so many `batches` of equal length.
 
+    `weights` (n, rows) are those of every joint's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
     """
     total = max(0, experiment.samples - 2 * decimation.support - 1) // decimation.factor + 1
@@ -67,6 +69,8 @@ def experiment_system(
         if mask_standstill:
             masked += int(block.still.sum())
             block = block.where(~block.still)
+        if weights is not None:
+            block = block.weighted(weights[:, block.number])
         if len(block):
             first = min(first, float(block.time[0]))
             last = float(block.time[-1])

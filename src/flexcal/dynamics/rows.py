@@ -87,6 +87,12 @@ class Rows:
         systems = [system[:, keep] for system in self.systems]
         return Rows(self.number[keep], self.time[keep], self.still[keep], systems)
 
+    def weighted(self, weights: np.ndarray) -> Rows:
+        """Every joint's rows times the root of their `weights` (n, M)."""
+        roots = np.sqrt(weights)
+        systems = [system * root for system, root in zip(self.systems, roots, strict=True)]
+        return Rows(self.number, self.time, self.still, systems)
+
 
 def rows(
     observation: Observation, experiment: Experiment, decimation: Decimation, window: Window

@@ -15,11 +15,14 @@ from flexcal.dynamics import (
     EssentialParameters,
     ExperimentSystem,
     FrictionSelection,
+    JointLog,
     Observation,
+    RecordedRows,
     RegressionData,
     batches_each,
     essential_parameters,
     feasible_least_squares,
+    huber_least_squares,
     ordinary_least_squares,
     select_friction,
     weighted_least_squares,
@@ -31,12 +34,12 @@ from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
-from flexcal.workflow.log_systems import LogSystem, log_systems
+from flexcal.workflow.log_systems import LogSystem, log_systems, split
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
 
-EstimatorName = Literal["wls", "ols", "sdp"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls"]
 
 _ESTIMATORS = {
     "wls": weighted_least_squares,
@@ -161,6 +164,7 @@ def identify_robot_dynamics(
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where the logs do not fit the
     robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed.
+    `irls` goes through the logs again and again, in this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -200,7 +204,10 @@ def identify_robot_dynamics(
         )
         late = [system.early for system in others]
     held_out = RegressionData.of(observation, base, late) if late else None
-    estimate = _ESTIMATORS[estimator](train)
+    if estimator == "irls":
+        estimate = huber_least_squares(train, _recorded(logs, train, treatment, hold_out))
+    else:
+        estimate = _ESTIMATORS[estimator](train)
     options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
@@ -215,3 +222,14 @@ def identify_robot_dynamics(
     if out is not None:
         write_results(out, result.document())
     return result
+
+
+def _recorded(
+    logs: Sequence[Path], train: RegressionData, treatment: Treatment, hold_out: float
+) -> RecordedRows:
+    """The rows of the fit once more, log after log in this process."""
+    experiments = [JointLog(log, train.observation.model, treatment.cutoff_hz) for log in logs]
+    windows = [split(experiment, treatment, hold_out)[0] for experiment in experiments]
+    return RecordedRows(
+        train.observation, train.base, experiments, windows, treatment.decimation, treatment.mask_standstill
+    )

@@ -67,6 +67,16 @@ def _onward(progress: Progress, number: int, logs: int) -> Progress:
     return within
 
 
+def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window, Window | None]:
+    """What of a log is fitted, and its last share `hold_out` of time, if there is one; the filters reach from neither into the other."""
+    if hold_out == 0:
+        return Window(), None
+    start, end = log.span
+    border = end - hold_out * (end - start)
+    reach = treatment.decimation.support * log.time_step
+    return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
+
+
 def _log_system(
     log: Path,
     observation: Observation,
@@ -77,12 +87,7 @@ def _log_system(
 ) -> LogSystem:
     experiment = _Watched(log, observation.model, treatment.cutoff_hz, progress)
     progress("reading", 0.0)
-    early, late = Window(), None
-    if hold_out > 0:
-        start, end = experiment.span
-        split = end - hold_out * (end - start)
-        reach = treatment.decimation.support * experiment.time_step
-        early, late = Window(end=float(np.nextafter(split - reach, -math.inf))), Window(start=split)
+    early, late = split(experiment, treatment, hold_out)
 
     def system(window: Window, batches: int) -> ExperimentSystem:
         return experiment_system(

@@ -1,0 +1,64 @@
+"""The rows of all experiments of a fit, for an estimator that must see them one by one and goes through them again."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.experiment_system import experiment_system
+from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.regression import RegressionData, batches_each
+from flexcal.dynamics.rows import Experiment, Window, rows
+
+
+@dataclass(frozen=True, eq=False)
+class RecordedRows:
+    """Where the equations of a fit come from; every method is one pass over all `experiments`, of which each has a window.
+
+    Of the rows that are kept between passes only one number a row and joint stays in memory.
+    """
+
+    observation: Observation
+    base: BaseParameters
+    experiments: Sequence[Experiment]
+    windows: Sequence[Window]
+    decimation: Decimation
+    mask_standstill: bool = True
+
+    def residuals(self, parameters: np.ndarray) -> list[np.ndarray]:
+        """Y − W χ (n, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
+        found = []
+        for experiment, window in zip(self.experiments, self.windows, strict=True):
+            missed = np.full(
+                (self.observation.model.n, experiment.samples // self.decimation.factor + 1), np.nan
+            )
+            for block in rows(self.observation, experiment, self.decimation, window):
+                part = block.where(~block.still) if self.mask_standstill else block
+                predicted = [
+                    parameters[members] @ columns
+                    for members, columns in zip(self.observation.members, part.columns, strict=True)
+                ]
+                missed[:, part.number] = part.torque - predicted
+            found.append(missed)
+        return found
+
+    def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
+        """The equations, each multiplied by the root of its weight: (n, rows) an experiment, as `residuals` are."""
+        batches = batches_each(len(self.experiments))
+        systems = [
+            experiment_system(
+                self.observation,
+                experiment,
+                self.decimation,
+                window,
+                mask_standstill=self.mask_standstill,
+                batches=batches,
+                weights=own,
+            )
+            for experiment, window, own in zip(self.experiments, self.windows, weights, strict=True)
+        ]
+        return RegressionData.of(self.observation, self.base, systems)

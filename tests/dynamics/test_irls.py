@@ -1,0 +1,144 @@
+"""Huber's loss: the truth without noise, and rows that are grossly wrong leave the intervals true."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    CLASSIC,
+    BaseParameters,
+    Motion,
+    Observation,
+    RecordedRows,
+    Window,
+    huber_least_squares,
+    observe,
+    weighted_least_squares,
+)
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+
+NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
+
+
+@pytest.fixture(scope="module")
+def observation(tx40: RobotModel) -> Observation:
+    return Observation(tx40, CLASSIC)
+
+
+@pytest.fixture(scope="module")
+def base(observation: Observation) -> BaseParameters:
+    return BaseParameters.of(observation)
+
+
+@pytest.fixture(scope="module")
+def truth(observation: Observation) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
+
+
+@pytest.fixture(scope="module")
+def clean(observation: Observation, truth: np.ndarray, swing: Motion) -> Motion:
+    """At 50 Hz, with the torques of the truth."""
+    short = Motion(*(part[::4] for part in (swing.time, swing.q, swing.dq, swing.ddq, swing.torque)))
+    torques = [truth[m] @ c for m, c in zip(observation.members, observation.columns(short), strict=True)]
+    return replace(short, torque=np.stack(torques, axis=1))
+
+
+def recorded(observation: Observation, base: BaseParameters, motions: list[Motion]) -> RecordedRows:
+    return RecordedRows(observation, base, motions, [Window()] * len(motions), Decimation(1))
+
+
+def robust(observation: Observation, base: BaseParameters, motions: list[Motion]) -> Estimate:
+    data = observe(observation, base, motions, Decimation(1))
+    return huber_least_squares(data, recorded(observation, base, motions))
+
+
+def errors(estimate: Estimate, observation: Observation, truth: np.ndarray) -> dict[str, float]:
+    """Of the base parameters."""
+    hidden = {entry.name for entry in estimate.dropped}
+    expected = estimate.regrouped(dict(zip(observation.names, truth, strict=True)))
+    return {name: estimate.values[name] - v for name, v in expected.items() if name not in hidden}
+
+
+def test_without_noise_the_truth_comes_back(
+    observation: Observation, base: BaseParameters, clean: Motion, truth: np.ndarray
+) -> None:
+    found = robust(observation, base, [clean])
+    assert found.rank == 61
+    assert max(map(abs, errors(found, observation, truth).values())) < 1e-8
+
+
+def test_it_is_the_minimum_of_the_loss(
+    observation: Observation, base: BaseParameters, clean: Motion, rng: np.random.Generator
+) -> None:
+    """Two experiments of different noise: Huber's sum, with scales by the median, has no slope that the standard deviations would see."""
+    from scipy.special import huber
+
+    motions = [
+        replace(clean, torque=clean.torque + scale * NOISE * rng.standard_t(2, size=clean.torque.shape))
+        for scale in (1.0, 3.0)
+    ]
+    found = robust(observation, base, motions)
+    x = found.parameters.coordinates()
+    columns = observation.columns(clean)
+
+    def missed(motion: Motion, at: np.ndarray) -> np.ndarray:
+        predicted = [at[m] @ c for m, c in zip(observation.members, columns, strict=True)]
+        return motion.torque - np.stack(predicted, axis=1)
+
+    scales = [1.4826 * np.median(np.abs(missed(motion, x)), axis=0) for motion in motions]
+
+    def loss(at: np.ndarray) -> float:
+        return sum(
+            float(np.sum(huber(1.345, missed(m, at) / s))) for m, s in zip(motions, scales, strict=True)
+        )
+
+    for number in base.found.kept:
+        step = 0.1 * np.sqrt(found.covariance[number, number]) * (np.arange(len(x)) == number)
+        ahead, behind = loss(x + step), loss(x - step)
+        curvature, slope = ahead - 2 * loss(x) + behind, (ahead - behind) / 2
+        assert abs(slope) < 0.3 * curvature  # the minimum along this axis is within 0.03 standard deviations
+
+
+def test_a_second_pass_gives_the_equations_of_the_first(
+    observation: Observation, base: BaseParameters, swing: Motion, truth: np.ndarray, rng: np.random.Generator
+) -> None:
+    """Decimated and in windows; weights of one change nothing, and residuals are those that the factors know the norm of."""
+    noisy = replace(swing, torque=rng.normal(size=swing.torque.shape))
+    windows = [Window(end=4.0), Window(start=5.0)]
+    data = observe(observation, base, [noisy, noisy], Decimation(4), windows=windows)
+    again = RecordedRows(observation, base, [noisy, noisy], windows, Decimation(4))
+    residuals = again.residuals(truth)
+    weighted = again.weighted([np.ones_like(r) for r in residuals])
+    for first, second in zip(data.subsystems, weighted.subsystems, strict=True):
+        np.testing.assert_array_equal(first.triangle.factor, second.triangle.factor)
+        own = residuals[first.experiment][first.joint]
+        assert np.isfinite(own).sum() == first.triangle.rows
+        expected = first.triangle.residual(truth[first.members])
+        assert np.sqrt(np.nansum(own**2)) == pytest.approx(expected, rel=1e-10)
+
+
+def test_gross_errors_leave_the_intervals_true(
+    observation: Observation, base: BaseParameters, clean: Motion, truth: np.ndarray, rng: np.random.Generator
+) -> None:
+    """One row in twenty is off by about thirty standard deviations; sixteen recordings of 61 parameters."""
+    inside, plain_inside, squares, plain_squares = [], [], [], []
+    for _ in range(16):
+        wrong = np.where(rng.random(clean.torque.shape) < 0.05, 30.0, 1.0)
+        noisy = replace(clean, torque=clean.torque + wrong * NOISE * rng.normal(size=clean.torque.shape))
+        found = robust(observation, base, [noisy])
+        plain = weighted_least_squares(observe(observation, base, [noisy], Decimation(1)))
+        misses = errors(plain, observation, truth)
+        for name, error in errors(found, observation, truth).items():
+            low, high = found.interval(name) or (np.nan, np.nan)
+            reach = (high - low) / 2
+            inside.append(abs(error) <= reach)
+            plain_inside.append(abs(misses[name]) <= reach)
+            squares.append((error / reach) ** 2)
+            plain_squares.append((misses[name] / reach) ** 2)
+    assert 0.93 < np.mean(inside) < 0.97
+    assert np.mean(plain_inside) < 0.35
+    assert np.mean(plain_squares) > 16 * np.mean(squares)
