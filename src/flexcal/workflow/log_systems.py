@@ -79,8 +79,7 @@ def _log_system(
     progress("reading", 0.0)
     early, late = Window(), None
     if hold_out > 0:
-        start, end = experiment.span
-        split = end - hold_out * (end - start)
+        split = held_out_from(experiment, hold_out)
         reach = treatment.decimation.support * experiment.time_step
         early, late = Window(end=float(np.nextafter(split - reach, -math.inf))), Window(start=split)
 
@@ -97,6 +96,12 @@ def _log_system(
     found = LogSystem(system(early, batches), None if late is None else system(late, 1))
     progress("reading", 1.0)
     return found
+
+
+def held_out_from(log: JointLog, share: float) -> float:
+    """When the last `share` of the time of a log begins, s on its clock."""
+    start, end = log.span
+    return end - share * (end - start)
 
 
 @dataclass(frozen=True, eq=False)
