@@ -90,9 +90,9 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
     facts = (
         Fact("How well are torques predicted?", significant(shown, 3), "% missed", f"Of {where}.{fitted}"),
         Fact(
-            "What is determined?",
+            "How many base parameters are determined?",
             f"{results['rank']} of {len(base)}",
-            "base parameters",
+            "",
             f"{len(results['essential_parameters']['parameters'])} of them are essential. A robot with viscous and Coulomb friction and "
             f"an offset alone would have {results['structural_rank']}.",
         ),

@@ -26,6 +26,8 @@ def correlation_map(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
             hovertemplate="%{y}<br>%{x}<br>%{z:.2f}<extra></extra>",
         )
     )
-    figure.update_xaxes(showticklabels=False, ticks="", title_text="base parameters, in the order of the table")
+    figure.update_xaxes(
+        showticklabels=False, ticks="", title_text="base parameters, in the order of the table"
+    )
     figure.update_yaxes(showticklabels=False, ticks="", autorange="reversed")
     return figure

@@ -69,7 +69,7 @@ def _spectra(
         "Where in frequency torques are missed",
         torque_spectra(joints, logs),
         "A flat red line is noise. Where it follows the grey one, the model lacks something there: at low frequencies mostly friction, at "
-        "a single peak a resonance or the ripple of a gear.",
+        "a single peak a resonance or the ripple of a gear. All rows count, standstill and what the fit never saw among them.",
         f"Amplitude densities of measured torque and residual of {len(joints)} joints.",
         choice,
     )
