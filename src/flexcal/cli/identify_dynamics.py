@@ -37,7 +37,7 @@ class IdentifyDynamics:
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 
     def run(self) -> None:

@@ -14,7 +14,7 @@ from flexcal.cli.options import Json
 
 @dataclass(frozen=True)
 class Report:
-    """Write report.html of a folder that demo, identify stiffness, calibrate or verify left with --out, from the numbers stored there.
+    """Write report.html of a folder that demo, identify, calibrate or verify left with --out, from the numbers stored there.
 
     Figures that need the fit itself are not in it; the verb that made the folder writes them all.
     """

@@ -70,7 +70,7 @@ STEPS = (
                 "IdentifyDynamics",
                 "joint logs to base parameters with intervals",
                 "flexcal identify dynamics robot.yaml exciting.parquet --hold-out last:0.3",
-                ("results.json",),
+                ("results.json", "report.html"),
             ),
         ),
     ),

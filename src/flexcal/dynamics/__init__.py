@@ -35,6 +35,7 @@ from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 
@@ -66,6 +67,7 @@ __all__ = [
     "SublinearViscous",
     "Subsystem",
     "TorqueOffset",
+    "TorquePrediction",
     "Trial",
     "Triangle",
     "Viscous",
@@ -81,6 +83,7 @@ __all__ = [
     "motion_bandwidth",
     "observe",
     "ordinary_least_squares",
+    "predict_torques",
     "select_friction",
     "weighted_least_squares",
 ]

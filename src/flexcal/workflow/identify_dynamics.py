@@ -33,7 +33,9 @@ from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
+from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogSystem, log_systems, split
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
@@ -50,12 +52,17 @@ _ESTIMATORS = {
 
 @dataclass(frozen=True, eq=False)
 class RobotDynamics:
-    """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written."""
+    """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
+
+    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were.
+    """
 
     estimate: Estimate
     structural_rank: int
     train: RegressionData
     held_out: RegressionData | None
+    hold_out: float
+    validated: tuple[Path, ...]
     essential: EssentialParameters
     friction: FrictionSelection
     treatment: Treatment
@@ -84,6 +91,7 @@ class RobotDynamics:
             "equations": sum(s.triangle.rows for s in self.train.subsystems),
             "masked_rows": self.train.masked,
             "error_percent": percent,
+            "hold_out": {"share": self.hold_out, "logs": [str(log) for log in self.validated]},
             "bodiless_links": list(self.bodiless),
             "signals": {
                 "cutoff_hz": self.treatment.cutoff_hz,
@@ -162,8 +170,9 @@ def identify_robot_dynamics(
 
     Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
-    and the other blocks. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where the logs do not fit the
-    robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed.
+    and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
+    not fit the robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
+    proposed.
     `irls` goes through the logs again and again, in this process alone.
     """
     begun = time.perf_counter()
@@ -216,11 +225,29 @@ def identify_robot_dynamics(
     seconds = time.perf_counter() - begun
     classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
     result = RobotDynamics(
-        estimate, classic.rank, train, held_out, essential, friction, treatment, seconds, target
+        estimate,
+        classic.rank,
+        train,
+        held_out,
+        hold_out,
+        tuple(validate),
+        essential,
+        friction,
+        treatment,
+        seconds,
+        target,
     )
     store_block(source, target, blocks, "dynamics", estimate)
     if out is not None:
-        write_results(out, result.document())
+        document = result.document()
+        write_results(out, document)
+        predictions = log_predictions(
+            logs, validate, observation, estimate, treatment, hold_out=hold_out, progress=progress
+        )
+        files = [robot, bare.urdf, *logs, *validate]
+        origin = provenance(files, options, source if blocks else None, tuple(blocks))
+        study = DynamicsStudy(model.name, document, estimate, predictions, origin)
+        write_dynamics_report(out / "report.html", study)
     return result
 
 

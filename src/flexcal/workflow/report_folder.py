@@ -9,12 +9,15 @@ import polars as pl
 
 from flexcal.data import read_estimates
 from flexcal.errors import InputError
+from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.report.stored import StoredStudy, write_stored_report
 from flexcal.workflow.experiment_files import read_responses
 from flexcal.workflow.results import RESULTS, read_results
 
 REPORT = "report.html"
 _REPORTED = ("calibration", "verification", "stage1")
+_DYNAMICS = "base_parameters"
+"""What results.json of `identify dynamics` holds, and no other."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -27,15 +30,23 @@ def report_folder(folder: Path) -> Path:
             f"{folder} holds no {RESULTS}; give the folder that demo, identify, calibrate or verify left with --out."
         )
     results = read_results(folder)
-    if not any(key in results for key in _REPORTED):
+    if not any(key in results for key in (*_REPORTED, _DYNAMICS)):
         raise InputError(
-            f"{folder / RESULTS} holds no calibration, verification or stiffness; give the folder of one of these."
+            f"{folder / RESULTS} holds no calibration, verification, stiffness or dynamics; give the folder of one of these."
         )
-    estimates, measured = folder / "estimates.yaml", sorted(folder.glob("response_pose_*.npz"))
+    path, measured = folder / "estimates.yaml", sorted(folder.glob("response_pose_*.npz"))
+    estimates = read_estimates(path) if path.is_file() else {}
+    if _DYNAMICS in results:
+        if "dynamics" not in estimates:
+            raise InputError(f"{path} holds no dynamics; run identify dynamics again.")
+        found = estimates["dynamics"]
+        dynamics = DynamicsStudy(folder.resolve().name, results, found, provenance=found.provenance)
+        write_dynamics_report(folder / REPORT, dynamics)
+        return folder / REPORT
     study = StoredStudy(
         name=folder.resolve().name,
         results=results,
-        estimates=read_estimates(estimates) if estimates.is_file() else {},
+        estimates=estimates,
         responses=read_responses(measured)[1],
         errors=_verification_errors(folder / "verification.csv"),
     )

@@ -1,0 +1,119 @@
+"""The report of identified dynamics (`flexcal identify dynamics`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path, PurePath
+from typing import Any
+
+from flexcal.dynamics import TorquePrediction
+from flexcal.estimation import Estimate
+from flexcal.report.dynamics_checks import (
+    check_base,
+    check_bodies,
+    check_joints,
+    check_shown,
+    check_unseen,
+)
+from flexcal.report.notation import significant
+from flexcal.report.page import Check, Fact, Page, Status, Verdict, tally, worst
+from flexcal.report.render import write_page
+from flexcal.report.sections.base_parameters import base_parameters_section
+from flexcal.report.sections.friction import friction_section
+from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.torques import torques_section
+
+_TRUST: dict[Status, tuple[str, str]] = {
+    "good": ("Yes", "Identified, and the torques can be trusted"),
+    "care": ("With care", "Identified; read the remarks before relying on it"),
+    "bad": ("No", "Do not rely on these dynamics yet"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class DynamicsStudy:
+    """Identified dynamics of the robot `name`.
+
+    `results` is the document of results.json, `estimate` what estimates.yaml holds. `predictions`, one a recording, are missing where only
+    the folder is left. `provenance` holds input files with their hashes.
+    """
+
+    name: str
+    results: Mapping[str, Any]
+    estimate: Estimate
+    predictions: Sequence[TorquePrediction] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def held_out(self) -> str:
+        """What the fit never saw, in words; empty for nothing."""
+        found = self.results.get("hold_out", {})
+        if found.get("logs"):
+            return " and ".join(PurePath(log).name for log in found["logs"])
+        return f"the last {100 * found['share']:.0f} % of every recording" if found.get("share") else ""
+
+
+def write_dynamics_report(path: str | Path, study: DynamicsStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, dynamics_page(study))
+
+
+def dynamics_page(study: DynamicsStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    return Page(
+        title=f"{study.name}: dynamics report",
+        subtitle=f"Inertias and friction from {results['equations']} equations of torque; {results['masked_rows']} rows at standstill "
+        f"left out · {len(results['friction_terms'])} friction terms",
+        verdict=dynamics_verdict(study),
+        sections=[
+            torques_section(results, study.held_out, study.predictions),
+            base_parameters_section(results, study.estimate),
+            friction_section(results),
+            provenance_section("", None, {"identification": results["seconds"]}, study.provenance),
+        ],
+        document=results,
+    )
+
+
+def dynamics_verdict(study: DynamicsStudy) -> Verdict:
+    """How well torques are predicted, what is determined, and whether that can be trusted."""
+    results, checks = study.results, dynamics_checks(study)
+    error, base = results["error_percent"], results["base_parameters"]
+    status = worst(checks)
+    answer, headline = _TRUST[status]
+    unseen = error["held_out"] if study.held_out else None
+    shown = error["train"] if unseen is None else unseen
+    where = study.held_out or "the recordings of the fit"
+    fitted = f" In the fit it is {significant(error['train'], 3)} %." if unseen is not None else ""
+    facts = (
+        Fact("How well are torques predicted?", significant(shown, 3), "% missed", f"Of {where}.{fitted}"),
+        Fact(
+            "How many base parameters are determined?",
+            f"{results['rank']} of {len(base)}",
+            "",
+            f"{len(results['essential_parameters']['parameters'])} of them are essential. A robot with viscous and Coulomb friction and "
+            f"an offset alone would have {results['structural_rank']}.",
+        ),
+        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+    )
+    sentence = (
+        f"Of {where}, the identified robot misses {significant(shown, 3)} % of the norm of the measured torques."
+        if unseen is not None
+        else f"In the recordings of the fit, the identified robot misses {significant(shown, 3)} % of the norm of the measured torques; "
+        "what it misses in other motions is not known."
+    )
+    return Verdict(status, headline, sentence, facts, (), "", checks)
+
+
+def dynamics_checks(study: DynamicsStudy) -> tuple[Check, ...]:
+    """The checks behind the verdict."""
+    results = study.results
+    return (
+        check_unseen(results["error_percent"], study.held_out),
+        check_joints(results["error_percent"]["per_joint"]),
+        check_base(results),
+        check_bodies(results["bodiless_links"]),
+        check_shown(results["remarks"]),
+    )

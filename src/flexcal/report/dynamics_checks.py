@@ -1,0 +1,89 @@
+"""The questions that decide whether identified dynamics can be trusted, each answered from results.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.notation import significant
+from flexcal.report.page import Check
+
+MUCH_WORSE = 1.5
+"""Error where the fit did not look over that in the fit, from which the fit has learnt its own recordings."""
+LARGE, TOO_LARGE = 10.0, 30.0
+"""Per cent of the norm of the torques from which an error is a lot, and from which the torques are not predicted."""
+JOINT_LARGE = 25.0
+"""Per cent of the norm of its own torques from which a joint is predicted badly; small torques are mostly friction."""
+_SHOWN = 3
+
+
+def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
+    """Whether torques that the fit never saw are predicted; `held_out` says which, empty for none."""
+    question = "Does it predict torques that the fit never saw?"
+    if not held_out:
+        return Check(
+            question,
+            "Not known: nothing was held out. Identify again with --hold-out last:0.3, or with --validate and another recording.",
+            "care",
+        )
+    unseen, train = error["held_out"], error["train"]
+    answer = (
+        f"Of {held_out}, {significant(unseen, 3)} % of the norm of the torques is missed, {significant(train, 3)} % in the fit. "
+        "The choice of friction terms did not look there either."
+    )
+    if unseen > TOO_LARGE:
+        return Check(question, f"{answer} That is too much: the model does not hold there.", "bad")
+    if unseen > MUCH_WORSE * train:
+        return Check(
+            question, f"{answer} That is a large step: friction changed, or the model is too rich.", "care"
+        )
+    if unseen > LARGE:
+        return Check(question, f"{answer} That is a lot; look at the spectra of what is left.", "care")
+    return Check(question, answer, "good")
+
+
+def check_joints(per_joint: Mapping[str, float]) -> Check:
+    """Whether every joint by itself is predicted."""
+    question = "Is every joint predicted?"
+    worst = max(per_joint, key=lambda joint: per_joint[joint])
+    answer = f"The worst is {worst}: {significant(per_joint[worst], 3)} % of the norm of its own torques is missed."
+    if per_joint[worst] > JOINT_LARGE:
+        return Check(question, f"{answer} Its torques are small, or its friction is another.", "care")
+    return Check(question, answer, "good")
+
+
+def check_base(results: Mapping[str, Any]) -> Check:
+    """Whether the recordings determine every base parameter of the model."""
+    question = "Do the recordings determine every base parameter?"
+    base, rank = results["base_parameters"], results["rank"]
+    answer = f"{rank} of {len(base)} are determined, by {results['equations']} equations."
+    if rank >= len(base):
+        return Check(question, answer, "good")
+    lost = [row["name"].split()[0] for row in base if row["std"] is None]
+    more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
+    return Check(
+        question,
+        f"{answer} Not {', '.join(lost[:_SHOWN])}{more}: a motion that excites them is missing.",
+        "care",
+    )
+
+
+def check_bodies(bodiless: list[str]) -> Check:
+    """Whether every link has inertials that a body can have."""
+    question = "Is every link a body that could be built?"
+    if not bodiless:
+        return Check(question, "Yes: every mass and every inertia is positive, as a body's is.", "good")
+    return Check(
+        question,
+        f"Not {', '.join(bodiless)}. Torques lose nothing by it, but springs and a URDF need bodies: identify with --estimator sdp.",
+        "care",
+    )
+
+
+def check_shown(remarks: list[str]) -> Check:
+    """Whether the recordings show every declared term of the drives."""
+    question = "Do the recordings show every term of the drives?"
+    if not remarks:
+        return Check(question, "Yes.", "good")
+    more = f"; and {len(remarks) - _SHOWN} more" if len(remarks) > _SHOWN else ""
+    return Check(question, f"Not all: {'; '.join(remarks[:_SHOWN])}{more}.", "care")

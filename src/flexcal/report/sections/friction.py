@@ -1,0 +1,46 @@
+"""Which friction terms the recordings support."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.notation import significant
+from flexcal.report.page import Block, Section, Table, Text
+
+
+def friction_section(results: Mapping[str, Any]) -> Section:
+    """The terms in the model and, where some were chosen from the recordings, everything that was tried."""
+    terms, shapes, tried = results["friction_terms"], results["friction_shapes"], results["friction_tried"]
+    labels = [f"{name} ({shapes[name]})" if name in shapes else name for name in terms]
+    blocks: list[Block] = [Text((f"In the model: {_words(labels)}.",))]
+    if tried:
+        fitting = [k for k, row in enumerate(tried) if set(row["terms"]) <= set(labels)]
+        taken = max(fitting, key=lambda k: len(tried[k]["terms"]))
+        rows = tuple(
+            (_words(row["terms"]) or "plain terms only", significant(row["cross_validation_percent"], 4))
+            for row in tried
+        )
+        rule = (
+            "a further term has to lower the error by a hundredth of itself"
+            if not tried[0]["terms"]
+            else "robot.yaml names the terms, and each has the shape with the smallest error"
+        )
+        blocks.append(
+            Table(
+                "table-friction",
+                "Terms tried beyond the plain ones, in order",
+                ("terms", "cross-validated error / %"),
+                rows,
+                "Errors are of parts of the training data that were left out in turn, as a share of the norm of the torques. In bold: "
+                f"what was taken; {rule}.",
+                strong=(taken,),
+            )
+        )
+    else:
+        blocks.append(Text(("No term was chosen from the recordings: robot.yaml names them.",)))
+    return Section("friction", "Friction", "", tuple(blocks))
+
+
+def _words(labels: list[str]) -> str:
+    return " + ".join(label.replace("_", " ") for label in labels)

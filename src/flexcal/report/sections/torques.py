@@ -1,0 +1,75 @@
+"""How well the identified robot predicts torques, over time and over frequency."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import PurePath
+from typing import Any
+
+from flexcal.dynamics import TorquePrediction
+from flexcal.report.figures.torque_spectra import torque_spectra
+from flexcal.report.figures.torque_traces import torque_traces
+from flexcal.report.notation import significant
+from flexcal.report.page import Block, FigureBlock, Section, Selector, Table
+
+
+def torques_section(
+    results: Mapping[str, Any], held_out: str, predictions: Sequence[TorquePrediction]
+) -> Section:
+    """Errors by joint and, where there are `predictions`, the torques themselves; `held_out` says what the fit never saw, if anything."""
+    error = results["error_percent"]
+    where = held_out or "the recordings of the fit"
+    rows = [(joint, significant(value, 3)) for joint, value in error["per_joint"].items()]
+    overall = error["held_out"] if held_out else error["train"]
+    rows.append(("all joints", significant(overall, 3)))
+    blocks: list[Block] = [
+        Table(
+            "table-torques",
+            f"Torques missed, of {where}",
+            ("joint", "missed / % of the norm of its torques"),
+            tuple(rows),
+            strong=(len(rows) - 1,),
+        )
+    ]
+    if predictions:
+        joints = tuple(error["per_joint"])
+        labels = [f"{k}: {PurePath(log.name).name}" for k, log in enumerate(predictions, 1)]
+        logs = dict(zip(labels, predictions, strict=True))
+        choice = (Selector("recording", "log", tuple(labels)),) if len(labels) > 1 else ()
+        blocks += [_traces(joints, logs, choice), _spectra(joints, logs, choice)]
+    return Section(
+        "torques",
+        "Torques: predicted against measured",
+        "What counts is whether the robot's torques are predicted in motions that the fit never saw.",
+        tuple(blocks),
+    )
+
+
+def _traces(
+    joints: tuple[str, ...], logs: Mapping[str, TorquePrediction], choice: tuple[Selector, ...]
+) -> FigureBlock:
+    stride = max(log.stride for log in logs.values())
+    thinned = f" Of a long recording only one row in up to {stride} is drawn." if stride > 1 else ""
+    return FigureBlock(
+        "figure-torques",
+        "Torques over time",
+        torque_traces(joints, logs),
+        "Grey is the motor torque as measured, at the joint; blue is predicted in the part that was fitted, red in the part that the fit "
+        f"never saw. Standstill is drawn too, though it was not fitted.{thinned}",
+        f"Measured and predicted torque of {len(joints)} joints against time.",
+        choice,
+    )
+
+
+def _spectra(
+    joints: tuple[str, ...], logs: Mapping[str, TorquePrediction], choice: tuple[Selector, ...]
+) -> FigureBlock:
+    return FigureBlock(
+        "figure-spectra",
+        "Where in frequency torques are missed",
+        torque_spectra(joints, logs),
+        "A flat red line is noise. Where it follows the grey one, the model lacks something there: at low frequencies mostly friction, at "
+        "a single peak a resonance or the ripple of a gear. All rows count, standstill and what the fit never saw among them.",
+        f"Amplitude densities of measured torque and residual of {len(joints)} joints.",
+        choice,
+    )
