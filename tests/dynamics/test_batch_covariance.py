@@ -1,5 +1,6 @@
 """Standard deviations and intervals where errors hang together in time and between joints."""
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,6 @@ from scipy.signal import lfilter
 from flexcal.data import read_recording
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
-    CLASSIC,
     BaseParameters,
     Motion,
     Observation,
@@ -19,34 +19,15 @@ from flexcal.dynamics import (
     weighted_least_squares,
 )
 from flexcal.dynamics.rows import rows
-from flexcal.model import RobotModel
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 RATE = 100.0
 
 
 @pytest.fixture(scope="module")
-def observation(tx40: RobotModel) -> Observation:
-    return Observation(tx40, CLASSIC)
-
-
-@pytest.fixture(scope="module")
-def base(observation: Observation) -> BaseParameters:
-    return BaseParameters.of(observation)
-
-
-@pytest.fixture(scope="module")
-def tour(observation: Observation) -> Motion:
+def tour(observation: Observation, sines: Callable[[int, float], Motion]) -> Motion:
     """Eighty seconds of six joints on sums of sines, with the torques of the CAD robot and unit friction."""
-    rng = np.random.default_rng(7)
-    time = np.arange(8000) / RATE
-    rate = 2 * np.pi * 0.1 * np.array([1, 2, 3, 5, 7])
-    size, phase = rng.normal(size=(5, 6)), rng.uniform(0, 2 * np.pi, (5, 6))
-    angle = time[:, None, None] * rate[:, None] + phase
-    q = np.sum(size * np.sin(angle), axis=1)
-    dq = np.sum(size * rate[:, None] * np.cos(angle), axis=1)
-    ddq = -np.sum(size * rate[:, None] ** 2 * np.sin(angle), axis=1)
-    motion = Motion(time, q, dq, ddq, np.zeros_like(q))
+    motion = sines(8000, RATE)
     columns = observation.columns(motion)
     torques = [truth(observation)[m] @ c for m, c in zip(observation.members, columns, strict=True)]
     return replace(motion, torque=np.stack(torques, axis=1))

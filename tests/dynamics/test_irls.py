@@ -7,7 +7,6 @@ import pytest
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
-    CLASSIC,
     BaseParameters,
     Motion,
     Observation,
@@ -18,19 +17,8 @@ from flexcal.dynamics import (
     weighted_least_squares,
 )
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
-
-
-@pytest.fixture(scope="module")
-def observation(tx40: RobotModel) -> Observation:
-    return Observation(tx40, CLASSIC)
-
-
-@pytest.fixture(scope="module")
-def base(observation: Observation) -> BaseParameters:
-    return BaseParameters.of(observation)
 
 
 @pytest.fixture(scope="module")

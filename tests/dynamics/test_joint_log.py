@@ -8,8 +8,8 @@ import pytest
 from flexcal.data import Recording, read_recording, write_recording
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
-    CLASSIC,
     BaseParameters,
+    ExperimentSystem,
     JointLog,
     Motion,
     Observation,
@@ -20,17 +20,11 @@ from flexcal.dynamics import (
 )
 from flexcal.dynamics.rows import rows
 from flexcal.errors import InputError
-from flexcal.model import RobotModel
 from flexcal.progress import silent
-from flexcal.workflow.log_systems import log_systems
+from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.treatment import Treatment
 
 STEP = 1 / 200
-
-
-@pytest.fixture(scope="module")
-def observation(tx40: RobotModel) -> Observation:
-    return Observation(tx40, CLASSIC)
 
 
 @pytest.fixture
@@ -69,17 +63,17 @@ def test_blocks_give_the_whole(
 
 def test_processes_change_nothing(logs: list[Path], observation: Observation) -> None:
     treatment = Treatment(10.0, Decimation(4), True)
-    alone, several = (
-        log_systems(
-            logs, observation, treatment, hold_out=0.3, batches=16, jobs=jobs, progress=silent
-        )
-        for jobs in (1, 2)
-    )  # fmt: skip
-    for one, other in zip(alone, several, strict=True):
-        assert one.late is not None and other.late is not None
-        for mine, theirs in zip(
-            one.early.batches + one.late.batches, other.early.batches + other.late.batches, strict=True
-        ):
+
+    def systems(jobs: int) -> list[ExperimentSystem]:
+        parts = []
+        for log in read_logs(logs, observation.model, treatment, jobs=jobs):
+            early, late = split(log, treatment, 0.3)
+            assert late is not None
+            parts += [LogPart(log, early), LogPart(log, late)]
+        return log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
+
+    for one, other in zip(systems(1), systems(2), strict=True):
+        for mine, theirs in zip(one.batches, other.batches, strict=True):
             assert (mine.number, mine.rows) == (theirs.number, theirs.rows)
             for factor, same in zip(mine.factors, theirs.factors, strict=True):
                 np.testing.assert_allclose(factor, same, rtol=0, atol=1e-12)

@@ -9,7 +9,6 @@ import pytest
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
-    CLASSIC,
     BaseParameters,
     Motion,
     Observation,
@@ -24,20 +23,10 @@ from flexcal.dynamics import (
 )
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel, inertial_parameters
+from flexcal.model import inertial_parameters
 
 ESTIMATORS = [ordinary_least_squares, weighted_least_squares]
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
-
-
-@pytest.fixture(scope="module")
-def observation(tx40: RobotModel) -> Observation:
-    return Observation(tx40, CLASSIC)
-
-
-@pytest.fixture(scope="module")
-def base(observation: Observation) -> BaseParameters:
-    return BaseParameters.of(observation)
 
 
 @pytest.fixture(scope="module")

@@ -29,34 +29,17 @@ def resolved_plant(
     Springs that the mismatch puts into a wrist too light for any refinement, as it is without a payload, are left out: their modes lie far
     above whatever moves the robot. Raises `FlexcalError` where no refinement resolves the others.
     """
-    plant = _refined(truth, config, q=q, free=free, payload=payload, rate_hz=rate_hz)
-    if isinstance(plant, str) and config.mismatch.elastic_wrist > 0:
-        stiff = replace(config, mismatch=replace(config.mismatch, elastic_wrist=0.0))
-        plant = _refined(truth, stiff, q=q, free=free, payload=payload, rate_hz=rate_hz)
-    if isinstance(plant, str):
-        raise FlexcalError(
-            f"{plant}; raise the controller's substeps or rate, or friction's coulomb_velocity."
-        )
-    return plant
-
-
-def _refined(
-    truth: RobotModel,
-    config: CellConfig,
-    *,
-    q: np.ndarray,
-    free: Collection[int],
-    payload: float | None,
-    rate_hz: float,
-) -> tuple[Plant, int] | str:
-    """As `resolved_plant`, or what the last refinement still misses."""
+    configs = [config]
+    if config.mismatch.elastic_wrist > 0:
+        configs.append(replace(config, mismatch=replace(config.mismatch, elastic_wrist=0.0)))
     phrase = ""
-    for refinement in REFINEMENTS:
-        substeps = config.controller.substeps * refinement
-        step = 1 / (rate_hz * substeps)
-        plant = build_plant(truth, config, q=q, free=free, payload=payload, time_step=step)
-        missed = unresolved(plant)
-        if missed is None:
-            return plant, substeps
-        phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"
-    return phrase
+    for tried in configs:
+        for refinement in REFINEMENTS:
+            substeps = config.controller.substeps * refinement
+            step = 1 / (rate_hz * substeps)
+            plant = build_plant(truth, tried, q=q, free=free, payload=payload, time_step=step)
+            missed = unresolved(plant)
+            if missed is None:
+                return plant, substeps
+            phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"
+    raise FlexcalError(f"{phrase}; raise the controller's substeps or rate, or friction's coulomb_velocity.")

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.experiment_system import ExperimentSystem, reduced
-from flexcal.dynamics.triangle import Triangle
+from flexcal.dynamics.triangle import Triangle, widened
 from flexcal.errors import FlexcalError
 
 FOLDS = 10
@@ -50,8 +50,8 @@ def folds(
                 inside = reduced([p.factors[joint] for p in test])
                 outside = reduced([p.factors[joint] for p in train])
                 sigma = _noise(outside, sum(p.rows for p in train), np.isin(numbers, weigh_by))
-                own.append(_wide(inside, numbers, columns))
-                other.append(_wide(outside / sigma, numbers, columns))
+                own.append(widened(inside, numbers, columns))
+                other.append(widened(outside / sigma, numbers, columns))
             result.append(Fold(reduced(other), reduced(own)))
     if not result:
         raise FlexcalError(
@@ -125,10 +125,3 @@ def _noise(system: np.ndarray, rows: int, known: np.ndarray) -> float:
     sigma, _ = Triangle.padded(reduced([system[:, np.append(known, True)]]), rows).noise()
     size = float(np.linalg.norm(system[:, -1])) / math.sqrt(rows)
     return sigma if sigma > 0 else size or 1.0
-
-
-def _wide(system: np.ndarray, members: np.ndarray, columns: int) -> np.ndarray:
-    wide = np.zeros((len(system), columns + 1))
-    wide[:, members] = system[:, :-1]
-    wide[:, -1] = system[:, -1]
-    return wide

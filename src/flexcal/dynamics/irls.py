@@ -55,13 +55,11 @@ def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimat
 
 
 def _robust_noise(data: RegressionData, residuals: Sequence[np.ndarray]) -> list[float]:
-    """σ̂ of each subsystem, N m, by the median; at least 1e-12 of its torque, as nothing is exact."""
-    found = []
-    for s in data.subsystems:
-        size = float(np.linalg.norm(s.triangle.right)) / np.sqrt(s.triangle.rows)
-        middle = float(np.nanmedian(np.abs(residuals[s.experiment][s.joint])))
-        found.append(max(_NORMAL * middle, 1e-12 * size) or 1.0)
-    return found
+    """σ̂ of each subsystem, N m, by the median."""
+    return [
+        s.floored(_NORMAL * float(np.nanmedian(np.abs(residuals[s.experiment][s.joint]))))
+        for s in data.subsystems
+    ]
 
 
 def _weights(residuals: Sequence[np.ndarray], noise: Sequence[float]) -> list[np.ndarray]:

@@ -54,6 +54,11 @@ class JointLog:
         """s."""
         return self._summary[3]
 
+    def surveyed(self) -> JointLog:
+        """The same, gone through once, so that what it says of itself is known."""
+        _ = self._summary
+        return self
+
     def blocks(self) -> Iterator[Motion]:
         """The filtered motion in parts that follow each other."""
         return filtered_motion(log_blocks(self.path, self.model), self.cutoff_hz)

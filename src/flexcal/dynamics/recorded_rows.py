@@ -38,11 +38,7 @@ class RecordedRows:
             )
             for block in rows(self.observation, experiment, self.decimation, window):
                 part = block.where(~block.still) if self.mask_standstill else block
-                predicted = [
-                    parameters[members] @ columns
-                    for members, columns in zip(self.observation.members, part.columns, strict=True)
-                ]
-                missed[:, part.number] = part.torque - predicted
+                missed[:, part.number] = part.torque - part.predicted(self.observation.members, parameters)
             found.append(missed)
         return found
 

@@ -31,6 +31,11 @@ class Subsystem:
     members: np.ndarray
     triangle: Triangle
 
+    def floored(self, sigma: float) -> float:
+        """A noise level (N m), at least 1e-12 of the torque: equations that are fitted exactly still need one."""
+        size = float(np.linalg.norm(self.triangle.right)) / np.sqrt(self.triangle.rows)
+        return max(sigma, 1e-12 * size) or 1.0
+
 
 @dataclass(frozen=True, eq=False)
 class RegressionData:

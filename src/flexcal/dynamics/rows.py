@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -79,6 +79,10 @@ class Rows:
     def torque(self) -> np.ndarray:
         """Y of all joints (n, M)."""
         return np.array([system[-1] for system in self.systems])
+
+    def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
+        """W χ of all joints (n, M) for `parameters` (p,), of which `members` are the numbers of every joint's own."""
+        return np.array([parameters[own] @ w for own, w in zip(members, self.columns, strict=True)])
 
     def where(self, keep: np.ndarray) -> Rows:
         """The rows that `keep` (M,) marks."""

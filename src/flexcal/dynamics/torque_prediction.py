@@ -64,9 +64,7 @@ def predict_torques(
         step = step if np.isfinite(step) else float(steps[-1])
         before = float(block.time[-1])
         torque = block.torque.T
-        model = np.stack(
-            [parameters[m] @ w for m, w in zip(observation.members, block.columns, strict=True)], axis=1
-        )
+        model = block.predicted(observation.members, parameters).T
         spectrum.push(np.hstack([torque, torque - model]))
         kept = block.number % stride == 0
         times.append(block.time[kept])

@@ -78,11 +78,16 @@ def stacked(triangles: Iterable[Triangle], members: Iterable[np.ndarray], column
     """One system of all `columns` from triangles that know only their `members` of them."""
     total = Triangle.empty(columns)
     for triangle, numbers in zip(triangles, members, strict=True):
-        wide = np.zeros((len(triangle.factor), columns + 1))
-        wide[:, numbers] = triangle.matrix
-        wide[:, -1] = triangle.right
-        total = total + Triangle(wide, triangle.rows)
+        total = total + Triangle(widened(triangle.factor, numbers, columns), triangle.rows)
     return total
+
+
+def widened(system: np.ndarray, members: np.ndarray, columns: int) -> np.ndarray:
+    """[W, Y] (·, columns + 1) of all `columns` from a system (·, k + 1) that knows only its `members` of them."""
+    wide = np.zeros((len(system), columns + 1))
+    wide[:, members] = system[:, :-1]
+    wide[:, -1] = system[:, -1]
+    return wide
 
 
 def triangular(matrix: np.ndarray) -> np.ndarray:

@@ -29,6 +29,5 @@ def noise_levels(data: RegressionData) -> list[float]:
                 f"{s.triangle.rows} equations of {joint} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
                 "record for longer, or decimate less."
             )
-        size = float(np.linalg.norm(s.triangle.right)) / np.sqrt(s.triangle.rows)
-        noise.append(max(sigma, 1e-12 * size) or 1.0)
+        noise.append(s.floored(sigma))
     return noise

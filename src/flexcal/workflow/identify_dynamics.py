@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -15,10 +16,10 @@ from flexcal.dynamics import (
     EssentialParameters,
     ExperimentSystem,
     FrictionSelection,
-    JointLog,
     Observation,
     RecordedRows,
     RegressionData,
+    Window,
     batches_each,
     essential_parameters,
     feasible_least_squares,
@@ -36,7 +37,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.log_predictions import log_predictions
-from flexcal.workflow.log_systems import LogSystem, log_systems, split
+from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
@@ -172,8 +173,7 @@ def identify_robot_dynamics(
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
     not fit the robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
-    proposed.
-    `irls` goes through the logs again and again, in this process alone.
+    proposed. `irls` goes through the logs again and again, in this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -186,37 +186,30 @@ def identify_robot_dynamics(
         )
     treatment = treatment_of(model, logs)
 
-    def systems(observation: Observation) -> list[LogSystem]:
-        return log_systems(
-            logs,
-            observation,
-            treatment,
-            hold_out=hold_out,
-            batches=batches_each(len(logs)),
-            jobs=jobs,
-            progress=progress,
-        )
+    read = read_logs(logs, model, treatment, jobs=jobs)
+    windows = [split(log, treatment, hold_out) for log in read]
+    fitted = [LogPart(log, early) for log, (early, _) in zip(read, windows, strict=True)]
+    unseen = [LogPart(log, late) for log, (_, late) in zip(read, windows, strict=True) if late is not None]
+    others = read_logs(validate, model, treatment, jobs=jobs)
+    unseen += [LogPart(log, Window()) for log in others]
+
+    def systems(parts: list[LogPart], observation: Observation, batches: int) -> list[ExperimentSystem]:
+        return log_systems(parts, observation, treatment, batches=batches, jobs=jobs, progress=progress)
 
     def equations(observation: Observation) -> list[ExperimentSystem]:
-        return [system.early for system in systems(observation)]
+        return systems(fitted, observation, batches_each(len(logs)))
 
     declared = model.config.dynamics.friction
     friction = select_friction(model, declared, equations, treatment.decimation)
     observation = Observation(model, friction.terms)
     base = BaseParameters.of(observation)
-    found = systems(observation)
-    train = RegressionData.of(observation, base, [system.early for system in found])
-    late = [system.late for system in found if system.late is not None]
-    if validate:
-        others = log_systems(
-            validate, observation, treatment, hold_out=0.0, batches=1, jobs=jobs, progress=progress
-        )
-        late = [system.early for system in others]
-    held_out = RegressionData.of(observation, base, late) if late else None
-    if estimator == "irls":
-        estimate = huber_least_squares(train, _recorded(logs, train, treatment, hold_out))
-    else:
-        estimate = _ESTIMATORS[estimator](train)
+    train = RegressionData.of(observation, base, equations(observation))
+    held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
+    estimate = (
+        huber_least_squares(train, _recorded(fitted, train, treatment))
+        if estimator == "irls"
+        else _ESTIMATORS[estimator](train)
+    )
     options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
@@ -241,22 +234,22 @@ def identify_robot_dynamics(
     if out is not None:
         document = result.document()
         write_results(out, document)
+        borders = [math.inf if late is None else late.start for _, late in windows]
+        borders += [-math.inf] * len(others)
         predictions = log_predictions(
-            logs, validate, observation, estimate, treatment, hold_out=hold_out, progress=progress
+            [*read, *others], borders, observation, estimate, treatment, progress=progress
         )
-        files = [robot, bare.urdf, *logs, *validate]
-        origin = provenance(files, options, source if blocks else None, tuple(blocks))
+        if validate:
+            files = [robot, bare.urdf, *logs, *validate]
+            origin = provenance(files, options, source if blocks else None, tuple(blocks))
         study = DynamicsStudy(model.name, document, estimate, predictions, origin)
         write_dynamics_report(out / "report.html", study)
     return result
 
 
-def _recorded(
-    logs: Sequence[Path], train: RegressionData, treatment: Treatment, hold_out: float
-) -> RecordedRows:
+def _recorded(fitted: Sequence[LogPart], train: RegressionData, treatment: Treatment) -> RecordedRows:
     """The rows of the fit once more, log after log in this process."""
-    experiments = [JointLog(log, train.observation.model, treatment.cutoff_hz) for log in logs]
-    windows = [split(experiment, treatment, hold_out)[0] for experiment in experiments]
+    logs, windows = [part.log for part in fitted], [part.window for part in fitted]
     return RecordedRows(
-        train.observation, train.base, experiments, windows, treatment.decimation, treatment.mask_standstill
+        train.observation, train.base, logs, windows, treatment.decimation, treatment.mask_standstill
     )

@@ -6,65 +6,69 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Window, experiment_system
+from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.workflow.treatment import Treatment
 
 
 @dataclass(frozen=True, eq=False)
-class LogSystem:
-    """The equations of one log: those of the fit, and those of its last part, where that is held out."""
+class LogPart:
+    """What of a log lies in a window of time."""
 
-    early: ExperimentSystem
-    late: ExperimentSystem | None
+    log: JointLog
+    window: Window
+
+
+def read_logs(paths: Sequence[Path], model: RobotModel, treatment: Treatment, *, jobs: int) -> list[JointLog]:
+    """The logs, to be gone through again and again; of those for several `jobs` (processes) the first pass is done there."""
+    logs = [JointLog(path, model, treatment.cutoff_hz) for path in paths]
+    if jobs == 1:
+        return logs
+    from joblib import Parallel, delayed
+
+    surveyed: Any = Parallel(n_jobs=jobs)(delayed(log.surveyed)() for log in logs)
+    return surveyed
 
 
 def log_systems(
-    logs: Sequence[Path],
+    parts: Sequence[LogPart],
     observation: Observation,
     treatment: Treatment,
     *,
-    hold_out: float,
     batches: int,
     jobs: int,
     progress: Progress,
-) -> list[LogSystem]:
-    """The equations of every log, in their order, whatever the number of `jobs` (processes) is.
+) -> list[ExperimentSystem]:
+    """The equations of every part, in their order, whatever the number of `jobs` (processes) is.
 
-    The last share `hold_out` of the time of every log is kept apart, by what the filters reach over. Each log has at most about so many
-    `batches`. Raises `InputError` and `FlexcalError` as `JointLog` and `experiment_system` do.
+    Each part has at most about so many `batches`. Raises `InputError` and `FlexcalError` as `JointLog` and `experiment_system` do.
     """
     if jobs == 1:
         return [
-            _log_system(log, observation, treatment, hold_out, batches, _onward(progress, number, len(logs)))
-            for number, log in enumerate(logs)
+            _log_system(part, observation, treatment, batches, _onward(progress, number, len(parts)))
+            for number, part in enumerate(parts)
         ]
     from joblib import Parallel, delayed
 
-    parts = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_log_system)(log, observation, treatment, hold_out, batches, silent) for log in logs
+    systems = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(_log_system)(part, observation, treatment, batches, silent) for part in parts
     )
     progress("reading", 0.0)
     found = []
-    for part in parts:
-        found.append(part)
-        progress("reading", len(found) / len(logs))
+    for system in systems:
+        found.append(system)
+        progress("reading", len(found) / len(parts))
     return found
 
 
-def _onward(progress: Progress, number: int, logs: int) -> Progress:
-    """Tells how much of all logs is done from how much of this one is; a second pass over it takes nothing back."""
-    reached = number / logs
-
-    def within(stage: str, share: float) -> None:
-        nonlocal reached
-        reached = max(reached, (number + share) / logs)
-        progress(stage, reached)
-
-    return within
+def _onward(progress: Progress, number: int, parts: int) -> Progress:
+    """Tells how much of all parts is done from how much of this one is."""
+    return lambda stage, share: progress(stage, (number + share) / parts)
 
 
 def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window, Window | None]:
@@ -78,41 +82,43 @@ def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window,
 
 
 def _log_system(
-    log: Path,
-    observation: Observation,
-    treatment: Treatment,
-    hold_out: float,
-    batches: int,
-    progress: Progress,
-) -> LogSystem:
-    experiment = _Watched(log, observation.model, treatment.cutoff_hz, progress)
+    part: LogPart, observation: Observation, treatment: Treatment, batches: int, progress: Progress
+) -> ExperimentSystem:
     progress("reading", 0.0)
-    early, late = split(experiment, treatment, hold_out)
-
-    def system(window: Window, batches: int) -> ExperimentSystem:
-        return experiment_system(
-            observation,
-            experiment,
-            treatment.decimation,
-            window,
-            mask_standstill=treatment.mask_standstill,
-            batches=batches,
-        )
-
-    found = LogSystem(system(early, batches), None if late is None else system(late, 1))
+    found = experiment_system(
+        observation,
+        _Watched(part.log, progress),
+        treatment.decimation,
+        part.window,
+        mask_standstill=treatment.mask_standstill,
+        batches=batches,
+    )
     progress("reading", 1.0)
     return found
 
 
 @dataclass(frozen=True, eq=False)
-class _Watched(JointLog):
+class _Watched:
     """A log that says how much of it is read."""
 
+    log: JointLog
     progress: Progress
+
+    @property
+    def name(self) -> str:
+        return self.log.name
+
+    @property
+    def samples(self) -> int:
+        return self.log.samples
+
+    @property
+    def top_speed(self) -> np.ndarray:
+        return self.log.top_speed
 
     def blocks(self) -> Iterator[Motion]:
         seen = 0
-        for motion in super().blocks():
+        for motion in self.log.blocks():
             yield motion
             seen += len(motion)
             self.progress("reading", min(1.0, seen / max(1, self.samples)))
