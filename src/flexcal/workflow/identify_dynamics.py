@@ -7,7 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 from flexcal.data import provenance, read_estimates
 from flexcal.dynamics import (
@@ -22,11 +22,7 @@ from flexcal.dynamics import (
     Window,
     batches_each,
     essential_parameters,
-    feasible_least_squares,
-    huber_least_squares,
-    ordinary_least_squares,
     select_friction,
-    weighted_least_squares,
 )
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
@@ -36,19 +32,12 @@ from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
+from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
-
-EstimatorName = Literal["wls", "ols", "sdp", "irls"]
-
-_ESTIMATORS = {
-    "wls": weighted_least_squares,
-    "ols": ordinary_least_squares,
-    "sdp": feasible_least_squares,
-}
 
 
 @dataclass(frozen=True, eq=False)
@@ -205,11 +194,7 @@ def identify_robot_dynamics(
     base = BaseParameters.of(observation)
     train = RegressionData.of(observation, base, equations(observation))
     held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
-    estimate = (
-        huber_least_squares(train, _recorded(fitted, train, treatment))
-        if estimator == "irls"
-        else _ESTIMATORS[estimator](train)
-    )
+    estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
     options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)

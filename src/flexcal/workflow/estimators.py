@@ -1,0 +1,28 @@
+"""The estimators of dynamic parameters, by the names that users choose them by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Literal
+
+from flexcal.dynamics import (
+    RecordedRows,
+    RegressionData,
+    feasible_least_squares,
+    huber_least_squares,
+    ordinary_least_squares,
+    weighted_least_squares,
+)
+from flexcal.estimation import Estimate
+
+EstimatorName = Literal["wls", "ols", "sdp", "irls"]
+
+Estimator = Callable[[RegressionData, RecordedRows], Estimate]
+"""Of the equations, and of the rows that they came from, for those that need to see them again."""
+
+ESTIMATORS: dict[EstimatorName, Estimator] = {
+    "wls": lambda data, _: weighted_least_squares(data),
+    "ols": lambda data, _: ordinary_least_squares(data),
+    "sdp": lambda data, _: feasible_least_squares(data),
+    "irls": huber_least_squares,
+}
