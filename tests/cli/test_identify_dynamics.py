@@ -271,3 +271,21 @@ def test_a_robot_that_stands_still_is_refused(tx40: Path, capsys: pytest.Capture
     error = capsys.readouterr().err
     assert "exciting.parquet" in error and "the robot stands still" in error
     assert not (tx40 / "estimates.yaml").exists()
+
+
+@pytest.mark.parametrize("name", ["iv", pytest.param("didim", marks=pytest.mark.slow)])
+def test_estimators_that_simulate_the_robot(
+    name: str, tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    """At 250 Hz, for speed. They miss the unseen torques about as wls does, and say that they know no controller."""
+    log = with_friction(tx40, "classic") / "exciting.parquet"
+    robot = tx40 / "robot.yaml"
+    robot.write_text(robot.read_text().replace("decimation: 100,", "decimation: 5,"))
+    pl.read_parquet(log).gather_every(20).write_parquet(log)
+    held = ("--hold-out", "last:0.3", "--out", str(tmp_path / "out"), "--estimator")
+    linear, found = identified(tx40, capsys, *held, "wls"), identified(tx40, capsys, *held, name)
+    assert linear["remarks"] == []
+    assert found["rank"] == 61
+    assert abs(found["error_percent"]["held_out"] - linear["error_percent"]["held_out"]) < 0.5
+    assert found["error_percent"]["train"] > linear["error_percent"]["train"]
+    assert f"declares no controller: {name} simulated one" in found["remarks"][0]

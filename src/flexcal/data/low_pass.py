@@ -56,16 +56,17 @@ class LowPass:
         impulse[2 * self.support + 1 :] = 0.0
         return length, np.fft.rfft(impulse / impulse.sum())
 
-    def before(self, values: np.ndarray) -> np.ndarray:
-        """The `support` samples that precede `values` (N, n) when they go on as they begin, turned about the first by half a turn.
+    def before(self, values: np.ndarray, beyond: int = 0) -> np.ndarray:
+        """The samples that precede `values` (N, n) when they go on as they begin, turned about the first by half a turn.
 
-        Raises `FlexcalError` where N is not above the support.
+        There are `support` of them, and so many `beyond`. Raises `FlexcalError` where N is not above their number.
         """
-        if len(values) <= self.support:
+        count = self.support + beyond
+        if len(values) <= count:
             raise FlexcalError(
-                f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {self.support + 1} are needed."
+                f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {count + 1} are needed."
             )
-        return 2 * values[0] - values[self.support : 0 : -1]
+        return 2 * values[0] - values[count:0:-1]
 
     def apply(self, values: np.ndarray) -> np.ndarray:
         """`values` (N, n) filtered, (N - 2 · support, n): samples nearer to an end do not exist."""

@@ -1,6 +1,7 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.didim import direct_and_inverse
 from flexcal.dynamics.drive_terms import (
     CLASSIC,
     Column,
@@ -25,6 +26,7 @@ from flexcal.dynamics.friction_library import (
 )
 from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
+from flexcal.dynamics.instrumental_variables import instrumental_variables
 from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion
@@ -35,6 +37,7 @@ from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
@@ -63,6 +66,7 @@ __all__ = [
     "RecordedRows",
     "RegressionData",
     "RotorInertia",
+    "SimulatedExperiment",
     "Stribeck",
     "SublinearViscous",
     "Subsystem",
@@ -74,11 +78,13 @@ __all__ = [
     "WarmUp",
     "Window",
     "batches_each",
+    "direct_and_inverse",
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
     "huber_least_squares",
     "identify_with_prior",
+    "instrumental_variables",
     "log_blocks",
     "motion_bandwidth",
     "observe",

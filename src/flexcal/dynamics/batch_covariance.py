@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.dynamics.experiment_system import Batch
 from flexcal.dynamics.regression import RegressionData
 
 _LEVERAGE = 0.9
@@ -25,9 +26,9 @@ class BatchCovariance:
 
 @dataclass(frozen=True, eq=False)
 class _Scores:
-    """Of one experiment, batch by batch (zero for one without rows), in coordinates in which WᵀW is one.
+    """Of one experiment, batch by batch (zero for one without rows), in coordinates in which the information of all is one.
 
-    `score` (B, k) is Wᵀ times the residual, `information` (B, k, k) WᵀW; `batches` have rows.
+    `score` (B, k) is the estimating function, `information` (B, k, k) the batch's share; `batches` have rows.
     """
 
     score: np.ndarray
@@ -43,71 +44,82 @@ def batch_covariance(
     root: np.ndarray,
     variance: float,
 ) -> BatchCovariance:
-    """(WᵀW)⁻¹ M (WᵀW)⁻¹ with M the covariance of Wᵀρ as the batches show it (Newey & West 1987).
+    """(WᵀW)⁻¹ M (WᵀW)⁻¹ of least squares, with M the covariance of Wᵀρ as the batches show it: `score_covariance`.
 
     `parameters` (p,) are the estimate; `kept` the numbers of the estimated ones among them; `root` (k, k) has root · rootᵀ = (WᵀW)⁻¹ of the
-    system weighted by `noise` (one a subsystem), whose mean squared error is `variance`. M sums the outer squares of the scores of
+    system weighted by `noise` (one a subsystem), whose mean squared error is `variance`.
+    """
+    members = data.observation.members
+    seen = [np.vstack([rows_of(root, kept, own), np.zeros(len(kept))]) for own in members]
+    missed = [np.append(-parameters[own], 1.0) for own in members]
+    return score_covariance(data.batches, noise, seen, missed, root, variance)
+
+
+def rows_of(matrix: np.ndarray, kept: Sequence[int], members: np.ndarray) -> np.ndarray:
+    """The rows (m, k) of a matrix (k, k) that belong to `members`, of which `kept` have one; zero for the others."""
+    found = np.zeros((len(members), matrix.shape[1]))
+    _, at, rows = np.intersect1d(members, kept, return_indices=True)
+    found[at] = matrix[rows]
+    return found
+
+
+def score_covariance(
+    experiments: Sequence[Sequence[Batch]],
+    noise: Sequence[float],
+    seen: Sequence[np.ndarray],
+    missed: Sequence[np.ndarray],
+    root: np.ndarray,
+    variance: float,
+) -> BatchCovariance:
+    """root · M · rootᵀ with M the covariance of the scores Qᵀρ as the batches show it (Newey & West 1987).
+
+    A joint's columns (width) of a batch times `seen` (width, k) give its part of Q, with QᵀQ = 1 over all joints and batches, and times
+    `missed` (width,) the errors ρ, both divided by the subsystem's `noise`. M sums the outer squares of the scores of
     all windows of ℓ batches that follow each other, which is Bartlett's kernel, over joints together. ℓ is the bandwidth of Andrews (1991)
     for the first autocorrelation of the scores, all parameters pooled. The scores of a window are freed of what the fit took from its
-    residuals, so that independent errors give (WᵀW)⁻¹ σ² without bias (Bell & McCaffrey 2002). So many parameters from so few batches
-    leave correlations uncertain: they are drawn towards those of (WᵀW)⁻¹, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ.
+    residuals, so that independent errors give root · rootᵀ σ² without bias (Bell & McCaffrey 2002). So many parameters from so few batches
+    leave correlations uncertain: they are drawn towards those of root · rootᵀ, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ.
     """
-    experiments = _scores(data, noise, parameters, kept, root)
-    batches = sum(e.batches for e in experiments)
-    window = _bandwidth(experiments, batches)
-    size = len(kept)
+    joints, size = len(seen), root.shape[1]
+    found = [
+        _scores(own, noise[joints * number : joints * (number + 1)], seen, missed)
+        for number, own in enumerate(experiments)
+    ]
+    batches = sum(e.batches for e in found)
+    window = _bandwidth(found, batches)
     middle = np.zeros((size, size))
-    for experiment in experiments:
+    for experiment in found:
         middle += _windows(experiment, window, variance)
     freedom = min(batches - 1.0, 1.5 * batches / window)
-    found = root @ middle @ root.T
-    std = np.sqrt(np.diag(found))
+    spread = root @ middle @ root.T
+    std = np.sqrt(np.diag(spread))
     nominal = root @ root.T
     expected = np.sqrt(np.diag(nominal))
     share = size / (size + freedom)
-    mixed = (1.0 - share) * found + share * nominal * np.outer(std / expected, std / expected)
+    mixed = (1.0 - share) * spread + share * nominal * np.outer(std / expected, std / expected)
     return BatchCovariance(mixed, freedom, window)
 
 
 def _scores(
-    data: RegressionData,
-    noise: Sequence[float],
-    parameters: np.ndarray,
-    kept: Sequence[int],
-    root: np.ndarray,
-) -> list[_Scores]:
-    place = {number: i for i, number in enumerate(kept)}
-    joints = data.observation.model.n
-    columns = [
-        np.array([i for i, m in enumerate(members) if m in place]) for members in data.observation.members
-    ]
-    roots = [
-        root[[place[m] for m in members[at]]] for members, at in zip(data.observation.members, columns, strict=True)
-    ]  # fmt: skip
-    found = []
-    for number, batches in enumerate(data.batches):
-        length = batches[-1].number + 1
-        score = np.zeros((length, len(kept)))
-        information = np.zeros((length, len(kept), len(kept)))
-        for batch in batches:
-            seen, missed = [], []
-            for joint, factor in enumerate(batch.factors):
-                sigma = noise[number * joints + joint]
-                seen.append(factor[:, columns[joint]] @ roots[joint] / sigma)
-                members = data.observation.members[joint]
-                missed.append((factor[:, -1] - factor[:, :-1] @ parameters[members]) / sigma)
-            matrix = np.vstack(seen)
-            score[batch.number] = np.concatenate(missed) @ matrix
-            information[batch.number] = matrix.T @ matrix
-        found.append(_Scores(score, information, len(batches)))
-    return found
+    batches: Sequence[Batch], noise: Sequence[float], seen: Sequence[np.ndarray], missed: Sequence[np.ndarray]
+) -> _Scores:
+    length, size = batches[-1].number + 1, seen[0].shape[1]
+    score = np.zeros((length, size))
+    information = np.zeros((length, size, size))
+    for batch in batches:
+        scaled = [factor / sigma for factor, sigma in zip(batch.factors, noise, strict=True)]
+        matrix = np.vstack([factor @ q for factor, q in zip(scaled, seen, strict=True)])
+        errors = np.concatenate([factor @ e for factor, e in zip(scaled, missed, strict=True)])
+        score[batch.number] = errors @ matrix
+        information[batch.number] = matrix.T @ matrix
+    return _Scores(score, information, len(batches))
 
 
 def _bandwidth(experiments: Sequence[_Scores], batches: int) -> int:
     """Andrews' (1991) bandwidth of Bartlett's kernel for first-order autoregressive scores, at most a quarter of the batches."""
     product = sum(float(np.sum(e.score[1:] * e.score[:-1])) for e in experiments)
     size = sum(float(np.sum(e.score**2)) for e in experiments)
-    r = min(max(product / size, 0.0), 0.97) if size > 0 else 0.0
+    r = min(abs(product / size), 0.97) if size > 0 else 0.0
     best = 1.1447 * (4 * r**2 / ((1 - r) ** 2 * (1 + r) ** 2) * batches) ** (1 / 3)
     return max(1, min(math.ceil(best), batches // 4))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -59,23 +60,34 @@ def experiment_system(
     `weights` (n, rows) are those of every joint's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
     """
+    blocks = rows(observation, experiment, decimation, window)
+    if weights is not None:
+        blocks = (block.weighted(weights[:, block.number]) for block in blocks)
+    length = batch_length(experiment, decimation, batches)
+    return batched(blocks, experiment.name, length, mask_standstill=mask_standstill)
+
+
+def batch_length(experiment: Experiment, decimation: Decimation, batches: int) -> int:
+    """Rows of a batch without gaps, for at most about so many `batches`."""
     total = max(0, experiment.samples - 2 * decimation.support - 1) // decimation.factor + 1
-    length = -(-total // batches)
+    return -(-total // batches)
+
+
+def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: bool) -> ExperimentSystem:
+    """The rows of the experiment `name` in batches of `length`; raises `FlexcalError` as `experiment_system` does."""
     found: list[Batch] = []
     masked = 0
     current: _Growing | None = None
     first, last = math.inf, -math.inf
-    for block in rows(observation, experiment, decimation, window):
+    for block in blocks:
         if mask_standstill:
             masked += int(block.still.sum())
             block = block.where(~block.still)
-        if weights is not None:
-            block = block.weighted(weights[:, block.number])
         if len(block):
             first = min(first, float(block.time[0]))
             last = float(block.time[-1])
         if not all(np.isfinite(system).all() for system in block.systems):
-            raise FlexcalError(f"the equations of {experiment.name} are not finite.")
+            raise FlexcalError(f"the equations of {name} are not finite.")
         for part in _split(block, length):
             number = int(part.number[0]) // length
             if current is None or current.number != number:
@@ -85,7 +97,7 @@ def experiment_system(
     found += [] if current is None else [current.batch()]
     if not found:
         raise FlexcalError(
-            f"no equation is left of {experiment.name}: it is too short for its filters, or the robot stands still in it."
+            f"no equation is left of {name}: it is too short for its filters, or the robot stands still in it."
         )
     return ExperimentSystem(tuple(found), length, last - first, masked)
 

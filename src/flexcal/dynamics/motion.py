@@ -13,6 +13,8 @@ from flexcal.data.low_pass import LowPass
 
 _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
+_BESIDE = 2
+"""Samples on either side that the second difference of first differences takes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,47 +73,63 @@ def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterat
     are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
     the samples are too few for it.
     """
-    first, recordings = _peeked(recordings)
-    step, n = first.time_step, first.q.shape[1]
-    low_pass = LowPass(step, cutoff_hz)
-    border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
-    samples, number = 0, 2
-    held = np.zeros((0, 2 * n))
-    for values, own in _extended(recordings, low_pass):
-        samples += own
-        held = np.concatenate([held, values])
-        q = low_pass.apply(held[:, :n])
-        if len(q) < 5:
-            continue
-        dq = (q[2:] - q[:-2]) / (2 * step)
-        ddq = (dq[2:] - dq[:-2]) / (2 * step)
-        torque = held[low_pass.support + 2 :, n:][: len(ddq)]
-        time = first.start + step * np.arange(number, number + len(ddq))
-        block = Motion(time, q[2:-2], dq[1:-1], ddq, torque)
-        ended = own == 0
-        yield block.part(max(0, border - number), samples - border - number if ended else len(block))
-        number += len(block)
-        held = held[len(block) :]
-
-
-def _peeked(recordings: Iterable[Recording]) -> tuple[Recording, Iterator[Recording]]:
     iterator = iter(recordings)
     first = next(iterator)
-    return first, chain([first], iterator)
+    step = first.time_step
+    border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
+    columns = ((recording.q, recording.torque) for recording in chain([first], iterator))
+    number, held = 0, None
+    for q, dq, ddq, torque in smoothed(columns, LowPass(step, cutoff_hz)):
+        time = first.start + step * np.arange(number, number + len(q))
+        block = Motion(time, q, dq, ddq, torque).part(max(0, border - number), len(q))
+        number += len(q)
+        held = block if held is None else Motion.joined([held, block])
+        if len(held) > border:
+            yield held.part(0, len(held) - border)
+            held = held.part(len(held) - border, len(held))
 
 
-def _extended(recordings: Iterable[Recording], low_pass: LowPass) -> Iterator[tuple[np.ndarray, int]]:
-    """Positions and torques side by side, with what the filter needs before and after them, and how many samples are measured ones."""
+def smoothed(
+    blocks: Iterable[tuple[np.ndarray, np.ndarray]], low_pass: LowPass
+) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+    """Filtered values, their first and second central differences, and what goes with them as it was, for every sample of all blocks.
+
+    A block is values (N, k) and what goes with them (N, m). Raises `FlexcalError` as `LowPass.before` does.
+    """
+    step = low_pass.time_step
+    waiting: list[np.ndarray] = []
+
+    def watched() -> Iterator[np.ndarray]:
+        for values, beside in blocks:
+            waiting.append(beside)
+            yield values
+
+    held = None
+    for values in _extended(watched(), low_pass):
+        held = values if held is None else np.concatenate([held, values])
+        x = low_pass.apply(held)
+        count = len(x) - 2 * _BESIDE
+        if count <= 0:
+            continue
+        dx = (x[2:] - x[:-2]) / (2 * step)
+        ddx = (dx[2:] - dx[:-2]) / (2 * step)
+        beside = np.concatenate(waiting)
+        waiting[:] = [beside[count:]]
+        yield x[_BESIDE:-_BESIDE], dx[1:-1], ddx, beside[:count]
+        held = held[count:]
+
+
+def _extended(blocks: Iterable[np.ndarray], low_pass: LowPass) -> Iterator[np.ndarray]:
+    """The blocks, with what filter and differences need before the first and after the last sample."""
     begun = False
     end = np.zeros((0, 0))
-    for recording in recordings:
-        values = np.hstack([recording.q, recording.torque])
+    for values in blocks:
         end = np.concatenate([end, values]) if end.size else values
         if begun:
-            yield values, len(values)
-        elif len(end) > low_pass.support:
+            yield values
+        elif len(end) > low_pass.support + _BESIDE:
             begun = True
-            yield np.concatenate([low_pass.before(end), end]), len(end)
+            yield np.concatenate([low_pass.before(end, _BESIDE), end])
         if begun:
-            end = end[-low_pass.support - 1 :]
-    yield low_pass.before(end[::-1])[::-1], 0
+            end = end[-low_pass.support - _BESIDE - 1 :]
+    yield low_pass.before(end[::-1], _BESIDE)[::-1]

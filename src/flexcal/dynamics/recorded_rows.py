@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
-from flexcal.dynamics.experiment_system import experiment_system
+from flexcal.dynamics.experiment_system import ExperimentSystem, batch_length, batched, experiment_system
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData, batches_each
-from flexcal.dynamics.rows import Experiment, Window, rows
+from flexcal.dynamics.rows import Experiment, Rows, Window, rows
+from flexcal.dynamics.simulated_experiment import SimulatedExperiment
+
+_Join = Callable[[np.ndarray, np.ndarray], np.ndarray]
+"""Of the columns and torques (·, M) of a joint as recorded and as simulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,3 +62,45 @@ class RecordedRows:
             for experiment, window, own in zip(self.experiments, self.windows, weights, strict=True)
         ]
         return RegressionData.of(self.observation, self.base, systems)
+
+    def simulated(self, parameters: np.ndarray) -> RegressionData:
+        """The equations with the observation matrix of the simulated closed loop with `parameters` (p,), and the measured torques.
+
+        Raises `FlexcalError` as `SimulatedExperiment` does.
+        """
+        systems = self._simulated(parameters, lambda measured, simulated: simulated)
+        return RegressionData.of(self.observation, self.base, systems)
+
+    def instrumented(self, parameters: np.ndarray) -> list[ExperimentSystem]:
+        """The equations with what stands for the noise-free W before it: every joint's columns are [Z, W, Y], twice its members and one.
+
+        Z is the observation matrix of the simulated closed loop with `parameters` (p,), through the filters of W, at the same rows.
+        Raises `FlexcalError` as `SimulatedExperiment` does.
+        """
+        return self._simulated(parameters, lambda measured, simulated: np.vstack([simulated[:-1], measured]))
+
+    def _simulated(self, parameters: np.ndarray, join: _Join) -> list[ExperimentSystem]:
+        batches = batches_each(len(self.experiments))
+        return [
+            batched(
+                self._following(experiment, window, parameters, join),
+                experiment.name,
+                batch_length(experiment, self.decimation, batches),
+                mask_standstill=self.mask_standstill,
+            )
+            for experiment, window in zip(self.experiments, self.windows, strict=True)
+        ]
+
+    def _following(
+        self,
+        experiment: Experiment,
+        window: Window,
+        parameters: np.ndarray,
+        join: _Join,
+    ) -> Iterator[Rows]:
+        """Rows whose systems are joined of the measured and the simulated ones, still where the recorded robot is."""
+        simulated = SimulatedExperiment(self.observation, parameters, experiment, self.decimation)
+        pairs = (rows(self.observation, e, self.decimation, window) for e in (experiment, simulated))
+        for measured, model in zip(*pairs, strict=True):
+            systems = [join(w, z) for w, z in zip(measured.systems, model.systems, strict=True)]
+            yield replace(measured, systems=systems)

@@ -4,18 +4,26 @@ from __future__ import annotations
 
 from flexcal.dynamics import RegressionData
 from flexcal.estimation import Estimate
+from flexcal.workflow.estimators import EstimatorName
 
 _SHOWN = 3
 
 
-def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
-    """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named."""
+def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
+    """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named.
+
+    So is a controller that was simulated but not declared.
+    """
     base = data.base.found
     structural = {base.names[i] for i in base.kept}
     absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
     silent = set(data.silent)
     drives = [name for name in data.names if name.rpartition(".")[0] in data.observation.model.joint_names]
     remarks = []
+    if estimator in ("iv", "didim") and data.observation.model.controller is None:
+        remarks.append(
+            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, with gains by each joint's inertia"
+        )
     for name in drives:
         if name in silent:
             remarks.append(f"{name} stays as it was: these recordings leave its column at zero")

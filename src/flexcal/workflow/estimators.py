@@ -8,14 +8,16 @@ from typing import Literal
 from flexcal.dynamics import (
     RecordedRows,
     RegressionData,
+    direct_and_inverse,
     feasible_least_squares,
     huber_least_squares,
+    instrumental_variables,
     ordinary_least_squares,
     weighted_least_squares,
 )
 from flexcal.estimation import Estimate
 
-EstimatorName = Literal["wls", "ols", "sdp", "irls"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "iv", "didim"]
 
 Estimator = Callable[[RegressionData, RecordedRows], Estimate]
 """Of the equations, and of the rows that they came from, for those that need to see them again."""
@@ -25,4 +27,6 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "ols": lambda data, _: ordinary_least_squares(data),
     "sdp": lambda data, _: feasible_least_squares(data),
     "irls": huber_least_squares,
+    "iv": instrumental_variables,
+    "didim": direct_and_inverse,
 }

@@ -48,6 +48,7 @@ class RobotDynamics:
     """
 
     estimate: Estimate
+    estimator: EstimatorName
     structural_rank: int
     train: RegressionData
     held_out: RegressionData | None
@@ -94,7 +95,7 @@ class RobotDynamics:
                 {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
                 for t in self.friction.trials
             ],
-            "remarks": list(dynamics_remarks(self.train, self.estimate)),
+            "remarks": list(dynamics_remarks(self.train, self.estimate, self.estimator)),
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
@@ -162,7 +163,7 @@ def identify_robot_dynamics(
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
     not fit the robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
-    proposed. `irls` goes through the logs again and again, in this process alone.
+    proposed. `irls`, `iv` and `didim` go through the logs again and again, in this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -204,6 +205,7 @@ def identify_robot_dynamics(
     classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
     result = RobotDynamics(
         estimate,
+        estimator,
         classic.rank,
         train,
         held_out,

@@ -1,0 +1,157 @@
+"""Estimators with a simulated closed loop: the loop itself, the truth without noise, and no bias where least squares has one."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from two_links import CONTROLLER, RATE, driven, errors, recorded, true_values, two_links
+
+from flexcal.data import Recording
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    CLASSIC,
+    Motion,
+    Observation,
+    SimulatedExperiment,
+    direct_and_inverse,
+    instrumental_variables,
+    observe,
+    weighted_least_squares,
+)
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel
+
+ENCODER = 1e-3
+TORQUE = 0.5
+
+
+@pytest.fixture(scope="module")
+def declared(tmp_path_factory: pytest.TempPathFactory) -> Observation:
+    """With its controller."""
+    return Observation(two_links(tmp_path_factory.mktemp("declared"), CONTROLLER), CLASSIC)
+
+
+@pytest.fixture(scope="module")
+def unknown(tmp_path_factory: pytest.TempPathFactory) -> Observation:
+    """The same robot, with no word of a controller."""
+    return Observation(two_links(tmp_path_factory.mktemp("unknown")), CLASSIC)
+
+
+@pytest.fixture(scope="module")
+def clean(declared: Observation) -> Motion:
+    """Sixteen seconds at 100 Hz."""
+    return driven(declared, true_values(declared), 1600)
+
+
+def noisy(clean: Motion, rng: np.random.Generator) -> Motion:
+    """As it is measured: velocities and accelerations are differences of positions."""
+    shape = clean.q.shape
+    q, torque = clean.q + ENCODER * rng.normal(size=shape), clean.torque + TORQUE * rng.normal(size=shape)
+    return Motion.of(Recording(1 / RATE, q, torque), 20.0)
+
+
+def test_a_linear_loop_answers_as_its_transfer_function(tmp_path: Path) -> None:
+    """One joint about the vertical: (kd s + kp) / (J s² + (v + kd) s + kp), J of the link and the rotor."""
+    (tmp_path / "wheel.urdf").write_text(
+        '<robot name="wheel"><link name="base"/><link name="disc"><inertial><mass value="2"/>'
+        '<inertia ixx="0.2" iyy="0.2" izz="0.3" ixy="0" ixz="0" iyz="0"/></inertial></link><joint name="axis" type="revolute">'
+        '<parent link="base"/><child link="disc"/><axis xyz="0 0 1"/>'
+        '<limit lower="-9" upper="9" effort="9" velocity="9"/></joint></robot>'
+    )
+    (tmp_path / "robot.yaml").write_text(
+        "robot: wheel.urdf\ncontroller: {kp: [200], kd: [12], rate_hz: 2000}\n"
+    )
+    observation = Observation(RobotModel.from_yaml(tmp_path / "robot.yaml"), CLASSIC)
+    values = dict(zip(observation.names, observation.values(), strict=True))
+    values |= {"axis.rotor_inertia": 0.2, "axis.viscous": 4.0}
+    time, omega = np.arange(2000) / 500.0, 2 * np.pi * 2.0
+    q = np.sin(omega * time)[:, None]
+    command = Motion(time, q, omega * np.cos(omega * time)[:, None], -(omega**2) * q, 0 * q)
+    run = SimulatedExperiment(observation, np.array(list(values.values())), command, Decimation(1))
+    found = Motion.joined(run.blocks())
+    s = 1j * omega
+    answer = (12 * s + 200) / (0.5 * s**2 + 16 * s + 200)
+    late = time > 1.0
+    for order, motion in enumerate((found.q, found.dq, found.ddq)):
+        expected = (answer * s**order * np.exp(1j * omega * time)).imag
+        assert np.abs(motion[late, 0] - expected[late]).max() < 0.01 * omega**order
+
+
+def test_without_noise_the_truth_comes_back(
+    declared: Observation, unknown: Observation, clean: Motion
+) -> None:
+    """IV with any instruments; DIDIM as far as the simulation's steps of 1 ms are right, if it knows the controller."""
+    truth, short = true_values(declared), clean.part(0, 800)
+    for observation in (declared, unknown):
+        rows = recorded(observation, short, 2)
+        data = observe(observation, rows.base, [short], Decimation(2))
+        found = instrumental_variables(data, rows)
+        assert found.rank == 13
+        assert np.abs(errors(found, observation, truth)[0]).max() < 1e-9
+        off = np.abs(errors(direct_and_inverse(data, rows), observation, truth)[0]).max()
+        assert off < 0.01 if observation is declared else 0.01 < off < 0.1
+
+
+def scores(unknown: Observation, clean: Motion, runs: int) -> tuple[np.ndarray, np.ndarray]:
+    """Errors over standard deviations (runs, k) of weighted least squares and of IV."""
+    truth, rng = true_values(unknown), np.random.default_rng(3)
+    linear, free = [], []
+    for _ in range(runs):
+        motion = noisy(clean, rng)
+        rows = recorded(unknown, motion, 2)
+        data = observe(unknown, rows.base, [motion], Decimation(2))
+        for found, kept in (
+            (weighted_least_squares(data), linear),
+            (instrumental_variables(data, rows), free),
+        ):
+            error, std = errors(found, unknown, truth)
+            kept.append(error / std)
+    return np.array(linear), np.array(free)
+
+
+def test_noisy_velocities_bias_least_squares_and_not_instrumental_variables(
+    unknown: Observation, clean: Motion
+) -> None:
+    linear, free = scores(unknown, clean, 6)
+    assert np.abs(linear.mean(axis=0)).max() > 5.0
+    assert np.abs(free.mean(axis=0)).max() < 1.2
+    assert np.mean(np.abs(linear) < 2.0) < 0.7
+    assert np.mean(np.abs(free) < 2.0) > 0.93
+
+
+@pytest.mark.slow
+def test_intervals_of_instrumental_variables_cover(unknown: Observation, clean: Motion) -> None:
+    """They are wider than needed: differences of positions are blue noise, of which the batches do not see all that cancels."""
+    linear, free = scores(unknown, clean, 200)
+    print(
+        f"scatter over reported {free.std(axis=0)}, mean {free.mean(axis=0)}, held {np.mean(np.abs(free) < 2.0):.3f}"
+    )
+    assert np.mean(np.abs(free) < 2.0) > 0.95 > np.mean(np.abs(linear) < 2.0)
+    assert np.abs(free.mean(axis=0)).max() < 0.5
+    assert 0.4 < free.std() < 1.0
+
+
+def test_didim_with_the_true_controller_holds_the_truth(declared: Observation, clean: Motion) -> None:
+    motion = noisy(clean, np.random.default_rng(4))
+    rows = recorded(declared, motion, 2)
+    data = observe(declared, rows.base, [motion], Decimation(2))
+    error, std = errors(direct_and_inverse(data, rows), declared, true_values(declared))
+    assert np.mean(np.abs(error / std) < 2.5) > 0.9
+    linear, _ = errors(weighted_least_squares(data), declared, true_values(declared))
+    inertia = 2
+    assert abs(error[inertia]) < 0.1 * abs(linear[inertia])
+
+
+def test_a_robot_that_cannot_be_simulated(unknown: Observation, clean: Motion) -> None:
+    values = true_values(unknown)
+    values[unknown.names.index("elbow.rotor_inertia")] = -5.0
+    with pytest.raises(FlexcalError, match="mass matrix that is not positive definite at q = "):
+        list(SimulatedExperiment(unknown, values, clean, Decimation(2)).blocks())
+
+
+def test_a_controller_that_does_not_hold_the_robot(tmp_path: Path, clean: Motion) -> None:
+    weak = Observation(two_links(tmp_path, "controller: {kp: [0, 0], kd: [0, 0], rate_hz: 100}"), CLASSIC)
+    values = true_values(weak)
+    values[weak.names.index("shoulder.torque_offset")] = 30.0
+    with pytest.raises(FlexcalError, match="the simulated robot does not follow the recorded path at"):
+        list(SimulatedExperiment(weak, values, clean, Decimation(2)).blocks())

@@ -1,0 +1,68 @@
+"""Two links that swing in a vertical plane under a position controller: a robot whose closed loop is simulated in a blink."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import BaseParameters, Motion, Observation, RecordedRows, Window
+from flexcal.dynamics.simulated_experiment import SimulatedExperiment
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+
+LINK = """<link name="{name}"><inertial><origin xyz="0.2 0 0.02"/><mass value="{mass}"/>
+<inertia ixx="0.02" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+JOINT = """<joint name="{name}" type="revolute"><parent link="{parent}"/><child link="{child}"/><origin xyz="{x} 0 0"/>
+<axis xyz="0 1 0"/><limit lower="-9" upper="9" effort="100" velocity="20"/></joint>"""
+URDF = f"""<robot name="two_links"><link name="base"/>{LINK.format(name="upper", mass=6)}{LINK.format(name="lower", mass=3)}
+{JOINT.format(name="shoulder", parent="base", child="upper", x=0)}{JOINT.format(name="elbow", parent="upper", child="lower", x=0.4)}
+</robot>"""
+CONTROLLER = "controller: {kp: [1500, 500], kd: [120, 40], rate_hz: 1000}\n"
+RATE = 100.0
+
+
+def two_links(folder: Path, extra: str = "") -> RobotModel:
+    (folder / "two_links.urdf").write_text(URDF)
+    (folder / "robot.yaml").write_text("robot: two_links.urdf\n" + extra)
+    return RobotModel.from_yaml(folder / "robot.yaml", estimates=False)
+
+
+def true_values(observation: Observation) -> np.ndarray:
+    """CAD, and drives that it does not know."""
+    values = dict(zip(observation.names, observation.values(), strict=True))
+    drives = {
+        "rotor_inertia": (0.4, 0.1),
+        "viscous": (3.0, 1.0),
+        "coulomb": (0.4, 0.15),
+        "torque_offset": (0.5, -0.3),
+    }
+    for key, (shoulder, elbow) in drives.items():
+        values[f"shoulder.{key}"], values[f"elbow.{key}"] = shoulder, elbow
+    return np.array(list(values.values()))
+
+
+def driven(observation: Observation, truth: np.ndarray, samples: int) -> Motion:
+    """What the robot with the `truth` does when its controller is told a sum of sines, and the torques that this takes."""
+    time = np.arange(samples) / RATE
+    rate = 2 * np.pi * 0.1 * np.array([1, 2, 3, 5, 7])
+    rng = np.random.default_rng(7)
+    size, phase = rng.normal(size=(5, 2)), rng.uniform(0, 2 * np.pi, (5, 2))
+    q = np.einsum("jn,tjn->tn", size, np.sin(time[:, None, None] * rate[:, None] + phase))
+    command = Motion(time, q, np.zeros_like(q), np.zeros_like(q), np.zeros_like(q))
+    simulated = Motion.joined(SimulatedExperiment(observation, truth, command, Decimation(1)).blocks())
+    torques = [truth[m] @ w for m, w in zip(observation.members, observation.columns(simulated), strict=True)]
+    return replace(simulated, torque=np.stack(torques, axis=1))
+
+
+def recorded(observation: Observation, motion: Motion, factor: int) -> RecordedRows:
+    base = BaseParameters.of(observation)
+    return RecordedRows(observation, base, [motion], [Window()], Decimation(factor))
+
+
+def errors(estimate: Estimate, observation: Observation, truth: np.ndarray) -> np.ndarray:
+    """Of the base parameters, and their standard deviations (2, k)."""
+    expected = estimate.regrouped(dict(zip(observation.names, truth, strict=True)))
+    hidden = {entry.name for entry in estimate.dropped}
+    rows = [(estimate.values[n] - v, estimate.std(n)) for n, v in expected.items() if n not in hidden]
+    return np.array(rows, dtype=float).T
