@@ -22,7 +22,7 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: Estima
     remarks = []
     if estimator in ("iv", "didim") and data.observation.model.controller is None:
         remarks.append(
-            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, with gains by each joint's inertia"
+            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, its gains by the inertia"
         )
     for name in drives:
         if name in silent:
