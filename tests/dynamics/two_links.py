@@ -20,6 +20,11 @@ URDF = f"""<robot name="two_links"><link name="base"/>{LINK.format(name="upper",
 </robot>"""
 CONTROLLER = "controller: {kp: [1500, 500], kd: [120, 40], rate_hz: 1000}\n"
 RATE = 100.0
+GAINS = np.array([1.3, 0.8])
+"""What torques must be multiplied by."""
+PAYLOAD = "payload: {frame: lower, mass: 4.0, com: [0.3, 0, 0]}\n"
+HELD = np.array([4.0, 1.6, 0.0, 0.1, 0.02, 0.0, -0.04, 0.7, 0.0, 0.7])
+"""The payload's ten parameters in the lower link: not where robot.yaml says, but for the mass."""
 
 
 def two_links(folder: Path, extra: str = "") -> RobotModel:
@@ -53,6 +58,21 @@ def driven(observation: Observation, truth: np.ndarray, samples: int) -> Motion:
     simulated = Motion.joined(SimulatedExperiment(observation, truth, command, Decimation(1)).blocks())
     torques = [truth[m] @ w for m, w in zip(observation.members, observation.columns(simulated), strict=True)]
     return replace(simulated, torque=np.stack(torques, axis=1))
+
+
+def swings(arm: Observation, held: np.ndarray, seed: int) -> Motion:
+    """Forty seconds of sums of sines, with torques that read 1/GAINS of what they are."""
+    rng, time = np.random.default_rng(seed), np.arange(2000) / 50.0
+    rate = 2 * np.pi * 0.1 * np.array([1, 2, 3, 5, 7])
+    size, phase = rng.normal(size=(5, 2)), rng.uniform(0, 2 * np.pi, (5, 2))
+    angle = time[:, None, None] * rate[:, None] + phase
+    q, dq = np.sum(size * np.sin(angle), axis=1), np.sum(size * rate[:, None] * np.cos(angle), axis=1)
+    ddq = -np.sum(size * rate[:, None] ** 2 * np.sin(angle), axis=1)
+    motion = Motion(time, q, dq, ddq, np.zeros_like(q))
+    values = true_values(arm)
+    values[10:20] += held
+    torques = [values[m] @ w for m, w in zip(arm.members, arm.columns(motion), strict=True)]
+    return replace(motion, torque=np.stack(torques, axis=1) / GAINS)
 
 
 def recorded(observation: Observation, motion: Motion, factor: int) -> RecordedRows:

@@ -125,6 +125,21 @@ def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
+def drive_gain_table(factors: Mapping[str, Mapping[str, Any]], declared: Sequence[float]) -> Table:
+    """One row a joint: the declared gain of its torque, what was found and its 95 % interval."""
+    table = Table(title="drive gains", title_justify="left")
+    table.add_column("joint")
+    for heading in ("declared", "found", "95 % interval"):
+        table.add_column(heading, justify="right")
+    for (name, factor), gain in zip(factors.items(), declared, strict=True):
+        found, interval = "not seen", ""
+        if factor["identifiable"]:
+            ends = sorted((gain * factor["low"], gain * factor["high"]))
+            found, interval = f"{gain * factor['estimate']:.5g}", f"{ends[0]:.5g} to {ends[1]:.5g}"
+        table.add_row(name.rpartition(".")[0], f"{gain:.5g}", found, interval)
+    return table
+
+
 def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """The best of what was tried with none, one, two … friction terms beyond the plain ones, with its cross-validated error."""
     best: dict[int, Mapping[str, Any]] = {}

@@ -65,6 +65,14 @@ STEPS = (
         "Before that, where CAD does not know the masses well: inertias and friction, from recordings of exciting motion",
         (
             Verb(
+                ("identify", "gains"),
+                "identify_gains",
+                "IdentifyGains",
+                "recordings with and without a payload to drive gains",
+                "flexcal identify gains robot.yaml logs/free.csv logs/loaded.csv",
+                ("results.json",),
+            ),
+            Verb(
                 ("identify", "dynamics"),
                 "identify_dynamics",
                 "IdentifyDynamics",

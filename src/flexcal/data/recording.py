@@ -41,7 +41,7 @@ class Recording:
     torque: (N, n) motor torques referred to the joint, N m (N).
     arm: (N, n) positions on the arm side of elastic joints, where measured.
     velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
-        `tau_ext`); temperature: (N,).
+        `tau_ext`); temperature: (N,); payload: (N,), kg, the same throughout.
     time_base, file: how the time stamps were and the file itself, where the recording comes from one.
 
     Raises `FlexcalError` where shapes do not fit or the time step is not positive.
@@ -58,6 +58,7 @@ class Recording:
     arm_velocity: np.ndarray | None = None
     external_torque: np.ndarray | None = None
     temperature: np.ndarray | None = None
+    payload: np.ndarray | None = None
     time_base: TimeBase | None = None
     file: Path | None = None
 
@@ -72,10 +73,10 @@ class Recording:
                 raise FlexcalError(
                     f"{name} of a recording has shape {values.shape}, but q has {self.q.shape}."
                 )
-        if self.temperature is not None and self.temperature.shape != self.q.shape[:1]:
-            raise FlexcalError(
-                f"temperature of a recording has shape {self.temperature.shape}, not ({len(self)},)."
-            )
+        for name in ("temperature", "payload"):
+            values = getattr(self, name)
+            if values is not None and values.shape != self.q.shape[:1]:
+                raise FlexcalError(f"{name} of a recording has shape {values.shape}, not ({len(self)},).")
 
     def __len__(self) -> int:
         return self.q.shape[0]

@@ -27,9 +27,10 @@ _FIELDS = {
     "dqa": "arm_velocity",
     "tau_ext": "external_torque",
     "temperature": "temperature",
+    "payload": "payload",
 }
 _REQUIRED = ("t", "q", "tau")
-_OPTIONAL = ("qa", "dq", "ddq", "dqa", "tau_ext", "temperature")
+_OPTIONAL = ("qa", "dq", "ddq", "dqa", "tau_ext", "temperature", "payload")
 
 
 def read_recording(path: str | Path, model: RobotModel, label: RecordingLabel | None = None) -> Recording:
@@ -127,8 +128,26 @@ def _stacked(model: RobotModel, table: Table, signals: dict[str, Signal]) -> np.
         values = signal.values(table)
         if quantity in ("q", "qa"):
             check_joint_units(model, table, signal, values)
+        if quantity == "payload":
+            _check_payload(model, table, signal, values[:, 0])
         parts.append(values)
     return np.concatenate(parts, axis=1)
+
+
+def _check_payload(model: RobotModel, table: Table, signal: Signal, held: np.ndarray) -> None:
+    if model.payload is None:
+        raise table.file.error(
+            "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame that it hangs on."
+        )
+    wrong = (held < 0) | (held != held[0])
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        sentence = (
+            f"a payload of {held[row]:g} kg; it must not be negative."
+            if held[row] < 0
+            else f"{held[row]:g} kg follow {held[0]:g} kg; a log has one payload, so cut it there into two files."
+        )
+        raise table.error(row, signal.columns[0], sentence)
 
 
 def _recording(
@@ -146,7 +165,7 @@ def _recording(
             continue
         width = len(standard_columns(quantity, n))
         part = values[:, column : column + width]
-        fields[_FIELDS[quantity]] = part[:, 0] if quantity == "temperature" else part
+        fields[_FIELDS[quantity]] = part[:, 0] if quantity in ("temperature", "payload") else part
         column += width
     return Recording(
         time_step=base.time_step,

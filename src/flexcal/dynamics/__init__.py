@@ -2,6 +2,7 @@
 
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.didim import direct_and_inverse
+from flexcal.dynamics.drive_gains import drive_gains
 from flexcal.dynamics.drive_terms import (
     CLASSIC,
     Column,
@@ -79,6 +80,7 @@ __all__ = [
     "Window",
     "batches_each",
     "direct_and_inverse",
+    "drive_gains",
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",

@@ -54,6 +54,11 @@ class JointLog:
         """s."""
         return self._summary[3]
 
+    @property
+    def payload(self) -> float | None:
+        """kg, as the column `payload` says; None where there is none."""
+        return self._summary[4]
+
     def surveyed(self) -> JointLog:
         """The same, gone through once, so that what it says of itself is known."""
         _ = self._summary
@@ -64,19 +69,22 @@ class JointLog:
         return filtered_motion(log_blocks(self.path, self.model), self.cutoff_hz)
 
     @cached_property
-    def _summary(self) -> tuple[int, np.ndarray, tuple[float, float], float]:
+    def _summary(self) -> tuple[int, np.ndarray, tuple[float, float], float, float | None]:
         read: list[tuple[float, float, float]] = []
+        held: list[float] = []
 
         def watched() -> Iterator[Recording]:
             for recording in log_blocks(self.path, self.model):
                 read.append((recording.start, recording.start + recording.duration, recording.time_step))
+                if recording.payload is not None:
+                    held.append(float(recording.payload[0]))
                 yield recording
 
         samples, top_speed = 0, np.zeros(self.model.n)
         for motion in filtered_motion(watched(), self.cutoff_hz):
             samples += len(motion)
             top_speed = np.maximum(top_speed, np.abs(motion.dq).max(axis=0, initial=0.0))
-        return samples, top_speed, (read[0][0], read[-1][1]), read[0][2]
+        return samples, top_speed, (read[0][0], read[-1][1]), read[0][2], held[0] if held else None
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:

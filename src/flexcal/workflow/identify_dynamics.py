@@ -24,7 +24,6 @@ from flexcal.dynamics import (
     essential_parameters,
     select_friction,
 )
-from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
@@ -33,6 +32,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
+from flexcal.workflow.log_payloads import require_unloaded
 from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
@@ -162,7 +162,7 @@ def identify_robot_dynamics(
     Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
-    not fit the robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
+    not fit the robot, and for a log with a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
     proposed. `irls`, `iv` and `didim` go through the logs again and again, in this process alone.
     """
     begun = time.perf_counter()
@@ -170,10 +170,6 @@ def identify_robot_dynamics(
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
-    if model.payload is not None:
-        raise InputError(
-            f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
-        )
     treatment = treatment_of(model, logs)
 
     read = read_logs(logs, model, treatment, jobs=jobs)
@@ -181,6 +177,7 @@ def identify_robot_dynamics(
     fitted = [LogPart(log, early) for log, (early, _) in zip(read, windows, strict=True)]
     unseen = [LogPart(log, late) for log, (_, late) in zip(read, windows, strict=True) if late is not None]
     others = read_logs(validate, model, treatment, jobs=jobs)
+    require_unloaded([*read, *others])
     unseen += [LogPart(log, Window()) for log in others]
 
     def systems(parts: list[LogPart], observation: Observation, batches: int) -> list[ExperimentSystem]:

@@ -1,0 +1,52 @@
+"""`flexcal identify gains`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
+
+
+@dataclass(frozen=True)
+class IdentifyGains:
+    """Find how many N m an ampere is at each joint, from recordings with and without the payload of robot.yaml.
+
+    Every log says in a column `payload` how many kg were held; the mass must be right, centre of mass and inertia are fitted.
+    robot.yaml stays as it is: put the line that is printed into its `signals: tau:`.
+    """
+
+    robot: Robot
+    logs: Annotated[
+        Positional[tuple[Path, ...]],
+        arg(
+            metavar="LOGS...",
+            help="joint logs (CSV or Parquet), with and without payload",
+            help_behavior_hint="",
+        ),
+    ]
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Logs that are read at once, each in a process of its own."""
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
+    """Folder for results.json."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the gains."""
+        from flexcal.cli.tables import drive_gain_table
+        from flexcal.workflow.identify_gains import identify_gains
+
+        require_robot(self.robot, *self.logs)
+        require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_gains(self.robot, self.logs, out=self.out, jobs=self.jobs, progress=progress)
+        document = found.document()
+        console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
+        console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
+        console.finish(document, f"flexcal identify dynamics {self.robot} {self.logs[0]}")

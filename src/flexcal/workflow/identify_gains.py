@@ -1,0 +1,84 @@
+"""Recordings with and without a payload to drive gains."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.dynamics import (
+    CLASSIC,
+    BaseParameters,
+    Observation,
+    RegressionData,
+    Window,
+    batches_each,
+    drive_gains,
+)
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.workflow.log_payloads import log_payloads
+from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
+from flexcal.workflow.results import quantities, write_results
+from flexcal.workflow.treatment import treatment_of
+
+
+@dataclass(frozen=True, eq=False)
+class IdentifiedGains:
+    """`factors`: what the torques must be multiplied by; `declared` (n,) are the gains of `signals: tau:`, 1 where there are none."""
+
+    factors: Estimate
+    declared: np.ndarray
+    payloads: tuple[float, ...]
+
+    @property
+    def gains(self) -> list[float]:
+        """To be declared in place of the old ones; where the recordings do not tell one it stays."""
+        found = zip(
+            self.declared, self.factors.parameters.coordinates(), self.factors.identifiable, strict=True
+        )
+        return [float(gain * factor) if told else float(gain) for gain, factor, told in found]
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+        return {
+            "parameters": quantities(self.factors),
+            "declared_gains": list(self.declared),
+            "gains": self.gains,
+            "payloads_kg": list(self.payloads),
+        }
+
+
+def identify_gains(
+    robot: Path,
+    logs: Sequence[Path],
+    *,
+    out: Path | None = None,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> IdentifiedGains:
+    """Drive gains of a robot.yaml from joint logs with and without its payload, whose mass alone is taken as known.
+
+    Friction is the classic one. With `out`, results.json goes to that folder; robot.yaml stays as it is. Raises `FlexcalError` where the
+    logs do not fit the robot, a log does not say whether the payload was held, and as `drive_gains` does.
+    """
+    model = RobotModel.from_yaml(robot, estimates=False)
+    treatment = treatment_of(model, logs)
+    read = read_logs(logs, model, treatment, jobs=jobs)
+    payloads = log_payloads(read)
+    observation = Observation(model, CLASSIC)
+    parts = [LogPart(log, Window()) for log in read]
+    systems = log_systems(
+        parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
+    )
+    data = RegressionData.of(observation, BaseParameters.of(observation), systems)
+    signal = model.config.signals.get("tau")
+    declared = np.ones(model.n) if signal is None or signal.gain is None else np.array(signal.gain)
+    result = IdentifiedGains(drive_gains(data, payloads), declared, tuple(payloads))
+    if out is not None:
+        write_results(out, result.document())
+    return result

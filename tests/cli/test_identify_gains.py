@@ -1,0 +1,97 @@
+"""`flexcal identify gains`: currents to torques by a payload of known mass, and what it refuses."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from two_links import GAINS, HELD, PAYLOAD, swings, two_links
+
+from flexcal.cli.main import main
+from flexcal.dynamics import CLASSIC, Observation
+
+DECLARED = np.array([50.0, 20.0])
+ROBOT = (
+    "dynamics: {cutoff_hz: 20, decimation: 1, friction: classic}\n"
+    "signals: {tau: {columns: [i1, i2], unit: A, gain: [50, 20]}}\n"
+)
+
+
+@pytest.fixture
+def arm(tmp_path: Path) -> Path:
+    """robot.yaml, free.csv and loaded.csv, with currents."""
+    observation = Observation(two_links(tmp_path, ROBOT + PAYLOAD), CLASSIC)
+    for name, held in (("free", 0 * HELD), ("loaded", HELD)):
+        motion = swings(observation, held, 7)
+        columns = {"t": motion.time} | {f"q{i + 1}": motion.q[:, i] for i in range(2)}
+        columns |= {f"i{i + 1}": motion.torque[:, i] / DECLARED[i] for i in range(2)}
+        columns["payload"] = np.full(len(motion), held[0])
+        pl.DataFrame(columns).write_csv(tmp_path / f"{name}.csv")
+    return tmp_path
+
+
+def arguments(arm: Path, *logs: str) -> list[str]:
+    return [str(arm / "robot.yaml"), *(str(arm / f"{log}.csv") for log in logs)]
+
+
+def refusal(verb: str, given: list[str], capsys: pytest.CaptureFixture[str]) -> str:
+    assert main(["identify", verb, *given]) == 2
+    return capsys.readouterr().err
+
+
+def test_gains_come_back_and_can_be_pasted(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Up to what a sample rate of 50 Hz makes of accelerations; the printed line gives factors of one."""
+    given = arguments(arm, "free", "loaded")
+    assert main(["identify", "gains", *given, "--out", str(arm / "out")]) == 0
+    line = next(text for text in capsys.readouterr().out.splitlines() if text.startswith("signals: "))
+    found = json.loads((arm / "out" / "results.json").read_text())
+    assert found["declared_gains"] == list(DECLARED)
+    assert found["payloads_kg"] == [0.0, HELD[0]]
+    assert found["gains"] == pytest.approx(list(DECLARED * GAINS), rel=0.01)
+    factor = found["parameters"]["elbow.drive_gain"]
+    assert factor["low"] < factor["estimate"] < factor["high"] and factor["identifiable"]
+    robot = (arm / "robot.yaml").read_text()
+    gain = line[line.index("gain: [") : line.index("]") + 1]
+    (arm / "robot.yaml").write_text(robot.replace("gain: [50, 20]", gain))
+    assert main(["identify", "gains", *given, "--json"]) == 0
+    again = json.loads(capsys.readouterr().out)["parameters"]
+    assert [again[f"{joint}.drive_gain"]["estimate"] for joint in ("shoulder", "elbow")] == pytest.approx(
+        [1, 1], rel=1e-4
+    )
+
+
+def test_the_robots_own_dynamics_take_the_free_logs(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["identify", "dynamics", *arguments(arm, "free"), "--out", str(arm / "out")]) == 0
+    message = refusal("dynamics", arguments(arm, "free", "loaded"), capsys)
+    assert "loaded.csv: recorded with a payload of 4 kg" in message
+
+
+@pytest.mark.parametrize(
+    ("payload", "message"),
+    [
+        (None, "the log does not say whether it was held; add a column 'payload'"),
+        (pl.lit(-1.0), "column payload: a payload of -1 kg; it must not be negative."),
+        (
+            pl.when(pl.col("t") < 1.0).then(0.0).otherwise(4.0),
+            "a log has one payload, so cut it there into two files",
+        ),
+        (pl.lit(0.0), "both with and without the payload that robot.yaml declares"),
+    ],
+)
+def test_payloads_that_do_not_work(
+    payload: pl.Expr | None, message: str, arm: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = arm / "loaded.csv"
+    table = pl.read_csv(log).drop("payload")
+    (table if payload is None else table.with_columns(payload.alias("payload"))).write_csv(log)
+    assert message in refusal("gains", [*arguments(arm, "free", "loaded"), "--out", str(arm / "out")], capsys)
+    assert not (arm / "out" / "results.json").exists()
+
+
+def test_a_payload_column_without_a_payload(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = arm / "robot.yaml"
+    robot.write_text(robot.read_text().replace(PAYLOAD, ""))
+    assert "there is a column 'payload', but robot.yaml declares none" in refusal(
+        "gains", arguments(arm, "free"), capsys
+    )

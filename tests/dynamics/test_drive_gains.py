@@ -1,0 +1,69 @@
+"""Drive gains from a payload of known mass: exact without noise, and free of the bias that noisy currents give least squares."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from two_links import GAINS, HELD, PAYLOAD, swings, two_links
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import CLASSIC, BaseParameters, Observation, RegressionData, drive_gains, observe
+from flexcal.errors import FlexcalError
+
+
+@pytest.fixture(scope="module")
+def arm(tmp_path_factory: pytest.TempPathFactory) -> Observation:
+    return Observation(two_links(tmp_path_factory.mktemp("arm"), PAYLOAD), CLASSIC)
+
+
+def recorded(arm: Observation, noise: float, seed: int) -> RegressionData:
+    """The same swings without and with the payload."""
+    rng = np.random.default_rng(seed)
+    motions = [swings(arm, held, 7) for held in (0 * HELD, HELD)]
+    noisy = [replace(m, torque=m.torque + noise * rng.normal(size=m.torque.shape)) for m in motions]
+    return observe(arm, BaseParameters.of(arm), noisy, Decimation(1))
+
+
+def test_without_noise_the_gains_come_back(arm: Observation) -> None:
+    """Though centre of mass and inertia of the payload are not those of robot.yaml."""
+    found = drive_gains(recorded(arm, 0.0, 0), [0.0, HELD[0]])
+    assert found.parameters.names == ("shoulder.drive_gain", "elbow.drive_gain")
+    assert found.parameters.coordinates() == pytest.approx(GAINS, rel=1e-9)
+    assert found.identifiable == (True, True)
+
+
+def scores(arm: Observation, runs: int) -> np.ndarray:
+    """Errors over standard deviations (runs, 2), with torques whose noise is a third of their size at the elbow."""
+    found = [drive_gains(recorded(arm, 3.0, seed), [0.0, HELD[0]]) for seed in range(runs)]
+    std = np.array([[e.std(name) for name in e.parameters.names] for e in found], dtype=float)
+    return (np.array([e.parameters.coordinates() for e in found]) - GAINS) / std
+
+
+def test_noise_in_the_torques_leaves_the_gains_unbiased(arm: Observation) -> None:
+    found = scores(arm, 12)
+    assert np.abs(found.mean(axis=0)).max() < 1.0
+    assert 0.5 < np.sqrt(np.mean(found**2)) < 1.6
+
+
+@pytest.mark.slow
+def test_intervals_of_gains_cover(arm: Observation) -> None:
+    found = scores(arm, 300)
+    print(f"mean {found.mean(axis=0)}, scatter {found.std(axis=0)}, held {np.mean(np.abs(found) < 1.98):.3f}")
+    assert 0.92 < np.mean(np.abs(found) < 1.98) < 0.98
+    assert np.abs(found.mean(axis=0)).max() < 0.3
+
+
+def test_a_gain_that_drowns_is_not_identifiable(arm: Observation) -> None:
+    found = drive_gains(recorded(arm, 300.0, 1), [0.0, HELD[0]])
+    hidden = [entry.name for entry in found.dropped]
+    assert hidden and not all(found.identifiable)
+    assert found.std(hidden[0]) is None
+
+
+def test_pairs_that_are_none(arm: Observation, tmp_path: Path) -> None:
+    data = recorded(arm, 1.0, 2)
+    bare = Observation(two_links(tmp_path), CLASSIC)
+    for payloads, observation in (([0.0, 0.0], arm), ([HELD[0], HELD[0]], arm), ([0.0, HELD[0]], bare)):
+        with pytest.raises(FlexcalError, match="both with and without the payload"):
+            drive_gains(replace(data, observation=observation), payloads)
