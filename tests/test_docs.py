@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexcal.dynamics.drive_gains import gain_name
 from flexcal.elasticity import stage_one_parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.frequency.response import POOLED_LINES, SMALLEST_FREEDOM
@@ -60,7 +61,8 @@ def produced(model: RobotModel) -> dict[str, str]:
         pose=0,
         sample_time=2.5e-4,
     )
-    names = {name: unit_of(name) for name in model.values}
+    gains = [gain_name(joint) for joint in model.joint_names]
+    names = {name: unit_of(name) for name in (*model.values, *gains)}
     return names | {item.name: item.unit for item in stage_one_parameters(model, [response], gaps=True)}
 
 

@@ -34,7 +34,7 @@ def test_without_noise_the_gains_come_back(arm: Observation) -> None:
 
 
 def scores(arm: Observation, runs: int) -> np.ndarray:
-    """Errors over standard deviations (runs, 2), with torques whose noise is a third of their size at the elbow."""
+    """Errors over standard deviations (runs, 2), with torques whose noise is a tenth of their size."""
     found = [drive_gains(recorded(arm, 3.0, seed), [0.0, HELD[0]]) for seed in range(runs)]
     std = np.array([[e.std(name) for name in e.parameters.names] for e in found], dtype=float)
     return (np.array([e.parameters.coordinates() for e in found]) - GAINS) / std
@@ -44,6 +44,27 @@ def test_noise_in_the_torques_leaves_the_gains_unbiased(arm: Observation) -> Non
     found = scores(arm, 12)
     assert np.abs(found.mean(axis=0)).max() < 1.0
     assert 0.5 < np.sqrt(np.mean(found**2)) < 1.6
+
+
+def test_least_squares_would_take_a_third(arm: Observation) -> None:
+    """The same equations by dense least squares, written out: right without noise, far too small with it."""
+    clean, noisy = (dense_least_squares(arm, noise) / GAINS for noise in (0.0, 3.0))
+    assert clean == pytest.approx([1.0, 1.0], rel=1e-6)
+    assert np.all(noisy < 0.8)
+
+
+def dense_least_squares(arm: Observation, noise: float) -> np.ndarray:
+    rng, parts, right = np.random.default_rng(0), [], []
+    for held in (0 * HELD, HELD):
+        motion = swings(arm, held, 7)
+        torque = motion.torque + noise * rng.normal(size=motion.torque.shape)
+        for joint, (members, columns) in enumerate(zip(arm.members, arm.columns(motion), strict=True)):
+            robot, gains = np.zeros((len(motion), len(arm.names))), np.zeros((len(motion), 2))
+            robot[:, members], gains[:, joint] = columns.T, -torque[:, joint]
+            loaded = robot[:, 10:20] if held.any() else np.zeros((len(motion), 10))
+            parts.append(np.hstack([robot, loaded[:, 1:], gains]))
+            right.append(-held[0] * loaded[:, 0])
+    return np.linalg.lstsq(np.vstack(parts), np.concatenate(right), rcond=1e-10)[0][-2:]
 
 
 @pytest.mark.slow

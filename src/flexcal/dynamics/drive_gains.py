@@ -46,8 +46,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
     covariance[np.ix_(kept, kept)] = fit.spread.covariance
     covariance = covariance[gains, gains]
     parameters = [
-        Parameter(f"{name}.drive_gain", "1", float(v))
-        for name, v in zip(names, fit.values[gains], strict=True)
+        Parameter(gain_name(name), "1", float(v)) for name, v in zip(names, fit.values[gains], strict=True)
     ]
     estimate = Estimate(
         parameters=Parameters(parameters),
@@ -72,6 +71,11 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
             Dropped(name, ()) for name, seen in zip(estimate.parameters.names, told, strict=True) if not seen
         ),
     )
+
+
+def gain_name(joint: str) -> str:
+    """Of the parameter that says what the torques of a joint must be multiplied by."""
+    return f"{joint}.drive_gain"
 
 
 def _positive(interval: tuple[float, float] | None) -> bool:
