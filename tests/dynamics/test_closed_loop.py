@@ -12,13 +12,16 @@ from flexcal.dynamics import (
     CLASSIC,
     Motion,
     Observation,
+    RegressionData,
     SimulatedExperiment,
     direct_and_inverse,
     instrumental_variables,
     observe,
+    simulated_iteration,
     weighted_least_squares,
 )
 from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 
 ENCODER = 1e-3
@@ -122,12 +125,12 @@ def test_noisy_velocities_bias_least_squares_and_not_instrumental_variables(
 @pytest.mark.slow
 def test_intervals_of_instrumental_variables_cover(unknown: Observation, clean: Motion) -> None:
     """They are wider than needed: differences of positions are blue noise, of which the batches do not see all that cancels."""
-    linear, free = scores(unknown, clean, 200)
+    linear, free = scores(unknown, clean, 60)
     print(
         f"scatter over reported {free.std(axis=0)}, mean {free.mean(axis=0)}, held {np.mean(np.abs(free) < 2.0):.3f}"
     )
     assert np.mean(np.abs(free) < 2.0) > 0.95 > np.mean(np.abs(linear) < 2.0)
-    assert np.abs(free.mean(axis=0)).max() < 0.5
+    assert np.abs(free.mean(axis=0)).max() < 0.7
     assert 0.4 < free.std() < 1.0
 
 
@@ -155,3 +158,18 @@ def test_a_controller_that_does_not_hold_the_robot(tmp_path: Path, clean: Motion
     values[weak.names.index("shoulder.torque_offset")] = 30.0
     with pytest.raises(FlexcalError, match="the simulated robot does not follow the recorded path at"):
         list(SimulatedExperiment(weak, values, clean, Decimation(2)).blocks())
+
+
+def test_it_starts_from_cad_where_no_robot_can_be_built_of_the_data(
+    unknown: Observation, clean: Motion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """And ends where it does otherwise."""
+    rows = recorded(unknown, clean.part(0, 800), 2)
+    data = observe(unknown, rows.base, [clean.part(0, 800)], Decimation(2))
+    usual = instrumental_variables(data, rows).parameters.coordinates()
+
+    def refuse(data: RegressionData) -> Estimate:
+        raise FlexcalError("no physically feasible parameters were found.")
+
+    monkeypatch.setattr(simulated_iteration, "feasible_least_squares", refuse)
+    assert instrumental_variables(data, rows).parameters.coordinates() == pytest.approx(usual, abs=1e-8)

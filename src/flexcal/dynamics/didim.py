@@ -19,7 +19,7 @@ def direct_and_inverse(data: RegressionData, recorded: RecordedRows) -> Estimate
 
     The simulated torques are W_sim χ exactly, so a step is the weighted least squares of the measured torques on W_sim. Only the torques
     are measured: positions serve to say what was commanded. Weights, covariance and what is dropped are those of `linear_fit` with W_sim.
-    Raises `FlexcalError` as `linear_fit`, `feasible_least_squares` and `SimulatedExperiment` do, and where the iteration does not settle.
+    Raises `FlexcalError` as `linear_fit` and `SimulatedExperiment` do, and where the iteration does not settle.
     """
 
     def step(robot: np.ndarray) -> Estimate:

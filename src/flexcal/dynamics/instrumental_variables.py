@@ -19,7 +19,7 @@ def instrumental_variables(data: RegressionData, recorded: RecordedRows) -> Esti
 
     The rows of a joint and experiment are divided by `noise_levels` of theirs. Which parameters the data tell, and what the others
     absorb, is as in `weighted_least_squares`; the covariance is (ZᵀW)⁻¹ M (WᵀZ)⁻¹ with M that of `score_covariance`. Raises
-    `FlexcalError` as `weighted_least_squares`, `feasible_least_squares`, `SimulatedExperiment` and `instrumental_fit` do, and where the
+    `FlexcalError` as `weighted_least_squares`, `SimulatedExperiment` and `instrumental_fit` do, and where the
     iteration does not settle.
     """
     linear, noise = weighted_least_squares(data), noise_levels(data)

@@ -22,12 +22,13 @@ _ITERATIONS = 20
 
 
 def simulated_iteration(data: RegressionData, step: Callable[[np.ndarray], Estimate], name: str) -> Estimate:
-    """The estimate that `step` makes of the simulation with its own parameters, from that of `feasible_least_squares`.
+    """The estimate that `step` makes of the simulation with its own parameters.
 
-    `step` gets parameters (p,) that move as the last estimate does, and whose links are bodies as far as no torque tells otherwise:
-    what the base parameters leave open stays as it was at the start. Raises `FlexcalError` where the steps do not settle.
+    It starts from that of `feasible_least_squares`, or from CAD where there is none. `step` gets parameters (p,) that move as the last
+    estimate does, and whose links are bodies as far as no torque tells otherwise: what the base parameters leave open stays as it was
+    at the start. Raises `FlexcalError` where the steps do not settle.
     """
-    robot = feasible_least_squares(data).parameters.coordinates()
+    robot = _first(data)
     kept, regrouping = np.array(data.base.found.kept), data.base.found.regrouping
     for iteration in range(1, _ITERATIONS + 1):
         found = step(robot)
@@ -41,3 +42,10 @@ def simulated_iteration(data: RegressionData, step: Callable[[np.ndarray], Estim
     raise FlexcalError(
         f"{name} does not settle in {_ITERATIONS} simulations; look at these data with --estimator wls."
     )
+
+
+def _first(data: RegressionData) -> np.ndarray:
+    try:
+        return feasible_least_squares(data).parameters.coordinates()
+    except FlexcalError:
+        return data.observation.values()
