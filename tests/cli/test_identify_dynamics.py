@@ -271,3 +271,11 @@ def test_a_robot_that_stands_still_is_refused(tx40: Path, capsys: pytest.Capture
     error = capsys.readouterr().err
     assert "exciting.parquet" in error and "the robot stands still" in error
     assert not (tx40 / "estimates.yaml").exists()
+
+
+def test_torques_of_motors_without_their_gears(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = tx40 / "robot.yaml"
+    robot.write_text(robot.read_text().replace("    matrix: joint_from_motor_torque.csv\n", ""))
+    message = refusal([str(robot), str(tx40 / "exciting.parquet")], capsys)
+    assert "exciting.parquet: the torques of joint_2 are" in message and "gear ratios" in message
+    assert not (tx40 / "estimates.yaml").exists()

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.data import Recording, read_recording_blocks
+from flexcal.dynamics.log_faults import LogFaults
 from flexcal.dynamics.motion import Motion, filtered_motion
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
@@ -80,7 +81,11 @@ class JointLog:
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
-    """The recording of a log in parts that follow each other; raises `InputError` as `read_recording` does, and for a gap."""
+    """The recording of a log in parts that follow each other.
+
+    Raises `InputError` as `read_recording` does, for a gap, and at the end for what `LogFaults` finds.
+    """
+    faults = LogFaults(path, model)
     for recording in read_recording_blocks(path, model, rows=_ROWS):
         base = recording.time_base
         if base is not None and base.gap > 0:
@@ -88,4 +93,6 @@ def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
                 f"{path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
                 f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
             )
+        faults.add(recording)
         yield recording
+    faults.check()
