@@ -277,5 +277,5 @@ def test_torques_of_motors_without_their_gears(tx40: Path, capsys: pytest.Captur
     robot = tx40 / "robot.yaml"
     robot.write_text(robot.read_text().replace("    matrix: joint_from_motor_torque.csv\n", ""))
     message = refusal([str(robot), str(tx40 / "exciting.parquet")], capsys)
-    assert "exciting.parquet: the torques of joint_2 are" in message and "gear ratios" in message
+    assert "exciting.parquet: the torque of joint_2 follows only" in message and "gear ratios" in message
     assert not (tx40 / "estimates.yaml").exists()

@@ -19,7 +19,9 @@ _CONTRADICTS = 0.3
 _POSES = 200
 """Samples of a block whose weight is looked at."""
 _TOO_WEAK = 1 / 20
-"""Torques below this share of the weight's are of the motor's side: gears begin beyond, errors of CAD and currents in A do not reach it."""
+"""Torques that follow less than this share of the weight are of the motors' side: gears begin beyond, currents in A do not reach it."""
+_SMALL = 1 / 8
+"""Of the weight's; friction may add that to torques of motors."""
 
 
 class LogFaults:
@@ -32,7 +34,7 @@ class LogFaults:
         self._torques = [CutEnds() for _ in range(model.n)]
         self._positions = [CutEnds() for _ in range(model.n)]
         self._rates = np.zeros((3, model.n))
-        self._weight = np.zeros((2, model.n))
+        self._weight = np.zeros((3, model.n))
         self._step = 0.0
 
     def add(self, recording: Recording) -> None:
@@ -44,8 +46,8 @@ class LogFaults:
         if recording.velocity is not None:
             self._compare(recording.q, recording.velocity)
         some = slice(None, None, max(1, len(recording) // _POSES))
-        self._weight[0] += np.sum(gravity_torque(self._model, recording.q[some]) ** 2, axis=0)
-        self._weight[1] += np.sum(recording.torque[some] ** 2, axis=0)
+        weight, torque = gravity_torque(self._model, recording.q[some]), recording.torque[some]
+        self._weight += [np.sum(x, axis=0) for x in (weight**2, weight * torque, torque**2)]
 
     def check(self) -> None:
         """Raises `InputError` for the first fault that the whole log shows."""
@@ -92,13 +94,12 @@ class LogFaults:
             )
 
     def _check_weight(self) -> None:
-        weight, torque = np.sqrt(self._weight)
-        heavy = weight > 0.1 * weight.max(initial=0.0)
-        if not heavy.any() or (torque[heavy] >= _TOO_WEAK * weight[heavy]).any():
+        weight, both, torque = self._weight[:, np.argmax(self._weight[0])]
+        share = abs(both) / weight if weight > 0 else 1.0
+        if share >= _TOO_WEAK or torque >= _SMALL**2 * weight:
             return
-        k = int(np.argmax(weight))
-        ratio = weight[k] / torque[k] if torque[k] else np.inf
+        name = self._model.joint_names[int(np.argmax(self._weight[0]))]
         raise InputError(
-            f"{self._path}: the torques of {self._model.joint_names[k]} are {ratio:.0f} times smaller than what weight alone "
-            "asks for; they look like torques of the motors: declare gear ratios as `tau: {gain: […]}` under `signals:`."
+            f"{self._path}: the torque of {name} follows only {share:.2%} of what its weight asks for; these look like torques "
+            "of the motors: declare gear ratios as `tau: {gain: […]}` under `signals:`."
         )
