@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal._kernels import Tree
+from flexcal.kernels import Tree
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
