@@ -15,7 +15,7 @@ from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 
 _BLOCK = 1000
-"""Samples, about, whose columns are in memory at once; they fit a processor's cache, and are no power of two, which would use little of it."""
+"""Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
 _STANDSTILL = 0.01
 """A joint stands still below this share of its largest speed in the recording."""
 _AT_REST = 1e-3
