@@ -158,7 +158,7 @@ def identify_robot_dynamics(
 ) -> RobotDynamics:
     """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
 
-    Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 192 bytes a sample of
+    Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
     six joints. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what the filters would carry
     over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks. With `out`, estimates,
     results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and where robot.yaml
