@@ -9,4 +9,5 @@ NB_MODULE(KERNELS, m) {
 #endif
     bind_closed_loop(m);
     bind_tree(m);
+    bind_triangle(m);
 }

@@ -10,8 +10,9 @@ import numpy as np
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment, Rows, Window, rows
-from flexcal.dynamics.triangle import appended, triangular
+from flexcal.dynamics.triangle import triangular
 from flexcal.errors import FlexcalError
+from flexcal.kernels import append
 
 BATCHES = 128
 """Batches of an experiment, at most: enough to see how its errors hang together in time, however long it is."""
@@ -95,14 +96,13 @@ class _Growing:
         self.number = number
         self._rows = 0
         self._spread = observation.spread
-        self._factors = [np.zeros((width, width), order="F") for width in observation.widths]
+        self._factors = [np.zeros((width, width)) for width in observation.widths]
 
     def add(self, part: Rows) -> None:
         """Spends the rows: what they are in is overwritten."""
         self._rows += len(part)
-        self._factors = [
-            appended(factor, system.T) for factor, system in zip(self._factors, part.reduced, strict=True)
-        ]
+        for factor, system in zip(self._factors, part.reduced, strict=True):
+            append(factor, np.ascontiguousarray(system))
 
     def batch(self) -> Batch:
         whole = [

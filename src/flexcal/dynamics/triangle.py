@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_PANEL = 8
-"""Columns that are reflected together: the fastest for the few columns of a joint."""
+from flexcal.kernels import append
+
 _TOLERANCE = 1e-9
 """A singular value of comparable columns below this is taken as zero."""
 
@@ -93,18 +93,8 @@ def widened(system: np.ndarray, members: np.ndarray, columns: int) -> np.ndarray
 
 
 def triangular(matrix: np.ndarray) -> np.ndarray:
-    """R (k, k) of the QR of a matrix (·, k), with rows of zeros where that has fewer rows."""
-    size = matrix.shape[1]
-    return appended(np.zeros((size, size), order="F"), np.array(matrix, dtype=float, order="F"))
-
-
-def appended(factor: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """R (k, k) of a triangular `factor` (k, k) with `rows` (·, k) below it; both are overwritten where they are in Fortran's order.
-
-    By Householder reflections that leave the zeros of the triangle alone (dtpqrt), so that no copy of the two together is made.
-    """
-    from scipy.linalg.lapack import dtpqrt  # pyright: ignore[reportAttributeAccessIssue]
-
-    if not rows.size:
-        return factor
-    return dtpqrt(0, min(_PANEL, rows.shape[1]), factor, rows, overwrite_a=1, overwrite_b=1)[0]
+    """R (k, k) of the QR of a matrix (·, k), by Householder reflections; the last rows are zero, to rounding, where it has fewer."""
+    columns = np.array(matrix.T, dtype=float, order="C")
+    factor = np.zeros((len(columns), len(columns)))
+    append(factor, columns)
+    return factor
