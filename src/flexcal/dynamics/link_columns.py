@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -27,7 +28,8 @@ class LinkColumns:
     spread: np.ndarray
 
 
-def link_columns(model: RobotModel) -> list[LinkColumns]:
+@lru_cache(maxsize=4)
+def link_columns(model: RobotModel) -> tuple[LinkColumns, ...]:
     """For every joint, by rank-revealing QR of its columns at random states."""
     names = inertial_names(model)
     q, dq, ddq = random_states(model, _SAMPLES_PER_COLUMN * len(names))
@@ -38,7 +40,7 @@ def link_columns(model: RobotModel) -> list[LinkColumns]:
         felt = np.array([number for number in range(len(names)) if _beyond(model, joint, number)])
         seen = analyse(matrix[:, joint, felt], [names[number] for number in felt], scale=scale[felt])
         found.append(LinkColumns(felt, felt[list(seen.kept)], seen.regrouping))
-    return found
+    return tuple(found)
 
 
 def _beyond(model: RobotModel, joint: int, column: int) -> bool:

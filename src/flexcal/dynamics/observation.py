@@ -51,7 +51,7 @@ class Observation:
         return tuple(found)
 
     @cached_property
-    def _links(self) -> list[LinkColumns]:
+    def _links(self) -> tuple[LinkColumns, ...]:
         return link_columns(self.model)
 
     @cached_property

@@ -15,7 +15,7 @@ _STEPS = 50
 def student_quantile(probability: float, freedom: float) -> float:
     """t that a variable of so many degrees of `freedom` (1 or more) stays below with this `probability` (0.5 to 1).
 
-    With t = √ν tan θ the distribution is the integral of cos^(ν-1), by Gauss and Legendre; Newton's steps come from below, as it is concave.
+    With t = √ν tan θ the distribution is the integral of cos^(ν-1) θ, by Gauss and Legendre; Newton's steps come from below.
     """
     density = math.exp(math.lgamma((freedom + 1) / 2) - math.lgamma(freedom / 2)) / math.sqrt(math.pi)
     nodes, weights = np.polynomial.legendre.leggauss(_NODES)
