@@ -64,10 +64,40 @@ class Motion:
         return cls.joined(filtered_motion([recording], cutoff_hz))
 
 
-def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[Motion]:
-    """Positions through a zero-phase low-pass, differentiated by central differences; the torque as measured.
+@dataclass(frozen=True, eq=False)
+class FilteredPositions:
+    """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before."""
 
-    `recordings` follow each other without a seam, as blocks of one log; so do the motions, and they do not depend on where the blocks
+    start: float
+    time_step: float
+    q: np.ndarray
+    torque: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.torque)
+
+    def part(self, start: int, stop: int) -> FilteredPositions:
+        """Samples from `start` to before `stop`."""
+        time = self.start + start * self.time_step
+        return FilteredPositions(time, self.time_step, self.q[start : stop + 4], self.torque[start:stop])
+
+    def motion(self) -> Motion:
+        """With velocities and accelerations by central differences."""
+        dq = (self.q[2:] - self.q[:-2]) / (2 * self.time_step)
+        ddq = (dq[2:] - dq[:-2]) / (2 * self.time_step)
+        time = self.start + self.time_step * np.arange(len(self))
+        return Motion(time, self.q[2:-2], dq[1:-1], ddq, self.torque)
+
+
+def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[Motion]:
+    """The motions of `filtered_positions`; raises `FlexcalError` as that does."""
+    return (part.motion() for part in filtered_positions(recordings, cutoff_hz))
+
+
+def filtered_positions(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[FilteredPositions]:
+    """Positions through a zero-phase low-pass; the torque as measured.
+
+    `recordings` follow each other without a seam, as blocks of one log; so do the parts, and they do not depend on where the blocks
     are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
     the samples are too few for it.
     """
@@ -83,15 +113,13 @@ def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterat
         q = low_pass.apply(held[:, :n])
         if len(q) < 5:
             continue
-        dq = (q[2:] - q[:-2]) / (2 * step)
-        ddq = (dq[2:] - dq[:-2]) / (2 * step)
-        torque = held[low_pass.support + 2 :, n:][: len(ddq)]
-        time = first.start + step * np.arange(number, number + len(ddq))
-        block = Motion(time, q[2:-2], dq[1:-1], ddq, torque)
-        ended = own == 0
-        yield block.part(max(0, border - number), samples - border - number if ended else len(block))
-        number += len(block)
-        held = held[len(block) :]
+        torque = held[low_pass.support + 2 :, n:][: len(q) - 4]
+        found = FilteredPositions(first.start + step * number, step, q, torque)
+        last = samples - border - number if own == 0 else len(found)
+        begin = min(max(0, border - number), len(found))
+        yield found.part(begin, max(begin, last))
+        number += len(found)
+        held = held[len(found) :]
 
 
 def _peeked(recordings: Iterable[Recording]) -> tuple[Recording, Iterator[Recording]]:
