@@ -19,7 +19,7 @@ from flexcal.dynamics import (
     weighted_least_squares,
 )
 from flexcal.dynamics.rows import rows
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.progress import silent
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.treatment import Treatment
@@ -103,3 +103,8 @@ def test_a_gap_is_refused(swing: Motion, observation: Observation, tmp_path: Pat
     path.write_text("".join(lines[:800] + lines[900:]))
     with pytest.raises(InputError, match=r"log\.csv: a gap of 0\.505 s precedes the sample at 4\.495 s"):
         JointLog.read(path, observation.model, 10.0, tmp_path)
+
+
+def test_no_room_for_the_filtered_log(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
+    with pytest.raises(FlexcalError, match=r"cannot take the filtered log \(No such file.*set TMPDIR"):
+        JointLog.read(logs[0], observation.model, 10.0, tmp_path / "nowhere")

@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.data import Recording, read_recording_blocks
 from flexcal.dynamics.log_faults import LogFaults
 from flexcal.dynamics.motion import FilteredPositions, Motion, filtered_positions
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 
 _ROWS = 20_000
@@ -39,7 +39,7 @@ class JointLog:
     def read(cls, path: Path, model: RobotModel, cutoff_hz: float, scratch: Path) -> JointLog:
         """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints.
 
-        Raises `InputError` as `log_blocks` does, and `FlexcalError` as `filtered_positions` does.
+        Raises `InputError` as `log_blocks` does, and `FlexcalError` as `filtered_positions` does and where the folder cannot take it.
         """
         read: list[tuple[float, float, float]] = []
 
@@ -49,15 +49,21 @@ class JointLog:
                 yield recording
 
         starts, samples, top_speed = [], 0, np.zeros(model.n)
-        with NamedTemporaryFile(dir=scratch, suffix=".npy", delete=False) as stream:
-            for part in filtered_positions(watched(), cutoff_hz):
-                if not len(part):
-                    continue
-                np.save(stream, part.q.T)
-                np.save(stream, part.torque.T)
-                starts.append(part.start)
-                samples += len(part)
-                top_speed = np.maximum(top_speed, part.motion().top_speed)
+        try:
+            with NamedTemporaryFile(dir=scratch, suffix=".npy", delete=False) as stream:
+                for part in filtered_positions(watched(), cutoff_hz):
+                    if not len(part):
+                        continue
+                    np.save(stream, part.q.T)
+                    np.save(stream, part.torque.T)
+                    starts.append(part.start)
+                    samples += len(part)
+                    top_speed = np.maximum(top_speed, part.motion().top_speed)
+        except OSError as problem:
+            raise FlexcalError(
+                f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
+                "set TMPDIR to a folder with room for 96 bytes a sample."
+            ) from problem
         span = (read[0][0], read[-1][1])
         return cls(path, Path(stream.name), tuple(starts), samples, read[0][2], top_speed, span)
 
