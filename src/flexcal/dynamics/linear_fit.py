@@ -22,8 +22,6 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
     is that of `batch_covariance`, in place of (WᵀW)⁻¹ σ̂² (Eq. 2.30), which takes the errors for independent from row to row.
     Raises `FlexcalError` with no more rows than parameters.
     """
-    from scipy.linalg import solve_triangular
-
     names = data.names
     system = weighted_system(data, noise)
     base = data.base.found
@@ -36,14 +34,14 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
     factor = Triangle.of(system.matrix[:, kept] * scale, right).factor
     triangle, target = factor[:-1, :-1], factor[:-1, -1]
     found = start.copy()
-    found[kept] += scale * solve_triangular(triangle, target)
+    found[kept] += scale * np.linalg.solve(triangle, target)
     freedom = system.rows - len(kept)
     if freedom <= 0:
         raise FlexcalError(
             f"{system.rows} equations do not determine {len(kept)} parameters; record for longer."
         )
     cost = float(factor[-1, -1] ** 2)
-    root = scale[:, None] * solve_triangular(triangle, np.eye(len(kept)))
+    root = scale[:, None] * np.linalg.solve(triangle, np.eye(len(kept)))
     spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
     covariance = np.zeros((len(names), len(names)))
     covariance[np.ix_(kept, kept)] = spread.covariance

@@ -66,10 +66,38 @@ class Motion:
         return cls.joined(filtered_motion([recording], cutoff_hz))
 
 
-def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[Motion]:
-    """Positions through a zero-phase low-pass, differentiated by central differences; the torque as measured.
+@dataclass(frozen=True, eq=False)
+class FilteredPositions:
+    """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before."""
 
-    `recordings` follow each other without a seam, as blocks of one log; so do the motions, and they do not depend on where the blocks
+    start: float
+    time_step: float
+    q: np.ndarray
+    torque: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.torque)
+
+    def part(self, start: int, stop: int) -> FilteredPositions:
+        """Samples from `start` to before `stop`."""
+        time = self.start + start * self.time_step
+        return FilteredPositions(time, self.time_step, self.q[start : stop + 4], self.torque[start:stop])
+
+    def motion(self) -> Motion:
+        """With velocities and accelerations by central differences."""
+        time = self.start + self.time_step * np.arange(len(self))
+        return Motion(time, *differences(self.q, self.time_step), self.torque)
+
+
+def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[Motion]:
+    """The motions of `filtered_positions`; raises `FlexcalError` as that does."""
+    return (part.motion() for part in filtered_positions(recordings, cutoff_hz))
+
+
+def filtered_positions(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[FilteredPositions]:
+    """Positions through a zero-phase low-pass; the torque as measured.
+
+    `recordings` follow each other without a seam, as blocks of one log; so do the parts, and they do not depend on where the blocks
     are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
     the samples are too few for it.
     """
@@ -79,24 +107,24 @@ def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterat
     border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
     columns = ((recording.q, recording.torque) for recording in chain([first], iterator))
     number, held = 0, None
-    for q, dq, ddq, torque in smoothed(columns, LowPass(step, cutoff_hz)):
-        time = first.start + step * np.arange(number, number + len(q))
-        block = Motion(time, q, dq, ddq, torque).part(max(0, border - number), len(q))
-        number += len(q)
-        held = block if held is None else Motion.joined([held, block])
-        if len(held) > border:
-            yield held.part(0, len(held) - border)
-            held = held.part(len(held) - border, len(held))
+    for q, torque in smoothed(columns, LowPass(step, cutoff_hz)):
+        if held is not None:
+            yield held
+        found = FilteredPositions(first.start + step * number, step, q, torque)
+        held = found.part(min(max(0, border - number), len(found)), len(found))
+        number += len(found)
+    if held is not None:
+        yield held.part(0, len(held) - border)
 
 
 def smoothed(
     blocks: Iterable[tuple[np.ndarray, np.ndarray]], low_pass: LowPass
-) -> Iterator[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-    """Filtered values, their first and second central differences, and what goes with them as it was, for every sample of all blocks.
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Filtered values (M + 4, k) that begin two samples before and end two after what goes with them as it was (M, m), for all samples.
 
-    A block is values (N, k) and what goes with them (N, m). Raises `FlexcalError` as `LowPass.before` does.
+    A block is values (N, k) and what goes with them (N, m). The last part is longer than the support of the filter. Raises
+    `FlexcalError` as `LowPass.before` does.
     """
-    step = low_pass.time_step
     waiting: list[np.ndarray] = []
 
     def watched() -> Iterator[np.ndarray]:
@@ -111,12 +139,16 @@ def smoothed(
         count = len(x) - 2 * _BESIDE
         if count <= 0:
             continue
-        dx = (x[2:] - x[:-2]) / (2 * step)
-        ddx = (dx[2:] - dx[:-2]) / (2 * step)
         beside = np.concatenate(waiting)
         waiting[:] = [beside[count:]]
-        yield x[_BESIDE:-_BESIDE], dx[1:-1], ddx, beside[:count]
+        yield x, beside[:count]
         held = held[count:]
+
+
+def differences(x: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Of values (N + 4, k) every `step` (s) the inner ones, and their first and second central differences, (N, k) each."""
+    dx = (x[2:] - x[:-2]) / (2 * step)
+    return x[_BESIDE:-_BESIDE], dx[1:-1], (dx[2:] - dx[:-2]) / (2 * step)
 
 
 def _extended(blocks: Iterable[np.ndarray], low_pass: LowPass) -> Iterator[np.ndarray]:

@@ -15,8 +15,8 @@ from flexcal.dynamics.regression import RegressionData, batches_each
 from flexcal.dynamics.rows import Experiment, Rows, Window, rows
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 
-_Join = Callable[[np.ndarray, np.ndarray], np.ndarray]
-"""Of the columns and torques (·, M) of a joint as recorded and as simulated."""
+_Join = Callable[[Rows, Rows], Rows]
+"""Of the same rows as recorded and as simulated."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +68,9 @@ class RecordedRows:
 
         Raises `FlexcalError` as `SimulatedExperiment` does.
         """
-        systems = self._simulated(parameters, lambda measured, simulated: simulated)
+        systems = self._simulated(
+            parameters, lambda measured, simulated: replace(simulated, still=measured.still)
+        )
         return RegressionData.of(self.observation, self.base, systems)
 
     def instrumented(self, parameters: np.ndarray) -> list[ExperimentSystem]:
@@ -77,7 +79,7 @@ class RecordedRows:
         Z is the observation matrix of the simulated closed loop with `parameters` (p,), through the filters of W, at the same rows.
         Raises `FlexcalError` as `SimulatedExperiment` does.
         """
-        return self._simulated(parameters, lambda measured, simulated: np.vstack([simulated[:-1], measured]))
+        return self._simulated(parameters, _beside)
 
     def _simulated(self, parameters: np.ndarray, join: _Join) -> list[ExperimentSystem]:
         batches = batches_each(len(self.experiments))
@@ -98,9 +100,18 @@ class RecordedRows:
         parameters: np.ndarray,
         join: _Join,
     ) -> Iterator[Rows]:
-        """Rows whose systems are joined of the measured and the simulated ones, still where the recorded robot is."""
+        """Rows that are joined of the measured and the simulated ones."""
         simulated = SimulatedExperiment(self.observation, parameters, experiment, self.decimation)
         pairs = (rows(self.observation, e, self.decimation, window) for e in (experiment, simulated))
         for measured, model in zip(*pairs, strict=True):
-            systems = [join(w, z) for w, z in zip(measured.systems, model.systems, strict=True)]
-            yield replace(measured, systems=systems)
+            yield join(measured, model)
+
+
+def _beside(measured: Rows, simulated: Rows) -> Rows:
+    """The measured rows, with the simulated columns before theirs."""
+    pairs = zip(measured.reduced, simulated.reduced, strict=True)
+    return replace(
+        measured,
+        reduced=[np.vstack([instruments[:-1], own]) for own, instruments in pairs],
+        spread=tuple(np.kron(np.eye(2), own) for own in measured.spread),
+    )

@@ -14,8 +14,8 @@ from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 
-_BLOCK = 512
-"""Samples, about, whose columns are in memory at once; they fit a processor's cache."""
+_BLOCK = 1000
+"""Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
 _STANDSTILL = 0.01
 """A joint stands still below this share of its largest speed in the recording."""
 _AT_REST = 1e-3
@@ -57,15 +57,16 @@ class Window:
 class Rows:
     """M equations of every joint that follow each other.
 
-    `systems` has for every joint W and, last, Y transposed (members + 1, M). `number` (M,) counts the rows of the experiment, whatever
-    is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth
-    of its top speed.
+    `reduced` has for every joint the reduced columns of W and, last, Y transposed (·, M), and `spread` what gives W back, as an
+    `Observation` has them. `number` (M,) counts the rows of the experiment, whatever is left out; `time` (M,) is s, and `still` (M,)
+    tells where the robot stands still within a row: no joint is faster than a hundredth of its top speed.
     """
 
     number: np.ndarray
     time: np.ndarray
     still: np.ndarray
-    systems: list[np.ndarray]
+    reduced: list[np.ndarray]
+    spread: tuple[np.ndarray, ...]
 
     def __len__(self) -> int:
         return len(self.number)
@@ -73,29 +74,29 @@ class Rows:
     @property
     def columns(self) -> list[np.ndarray]:
         """For every joint W transposed (members, M)."""
-        return [system[:-1] for system in self.systems]
+        return [spread.T @ own[:-1] for spread, own in zip(self.spread, self.reduced, strict=True)]
 
     @property
     def torque(self) -> np.ndarray:
         """Y of all joints (n, M)."""
-        return np.array([system[-1] for system in self.systems])
+        return np.array([own[-1] for own in self.reduced])
 
     def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
         """W χ of all joints (n, M) for `parameters` (p,), of which `members` are the numbers of every joint's own."""
-        return np.array([parameters[own] @ w for own, w in zip(members, self.columns, strict=True)])
+        each = zip(members, self.spread, self.reduced, strict=True)
+        return np.array([(spread @ parameters[felt]) @ own[:-1] for felt, spread, own in each])
 
     def where(self, keep: np.ndarray) -> Rows:
         """The rows that `keep` (M,) marks."""
         if keep.all():
             return self
-        systems = [system[:, keep] for system in self.systems]
-        return Rows(self.number[keep], self.time[keep], self.still[keep], systems)
+        reduced = [own[:, keep] for own in self.reduced]
+        return Rows(self.number[keep], self.time[keep], self.still[keep], reduced, self.spread)
 
     def weighted(self, weights: np.ndarray) -> Rows:
         """Every joint's rows times the root of their `weights` (n, M)."""
-        roots = np.sqrt(weights)
-        systems = [system * root for system, root in zip(self.systems, roots, strict=True)]
-        return Rows(self.number, self.time, self.still, systems)
+        reduced = [own * root for own, root in zip(self.reduced, np.sqrt(weights), strict=True)]
+        return Rows(self.number, self.time, self.still, reduced, self.spread)
 
 
 def rows(
@@ -121,9 +122,9 @@ def rows(
             return
         still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
         centres.push(start, piece.time, still)
-        systems = stream.push(observation.systems(piece, memory))
-        number, time, still = centres.pop(systems.shape[1])
-        found = Rows(number, time, still, np.split(systems, ends[:-1]))
+        reduced = stream.push(observation.reduced(piece, memory))
+        number, time, still = centres.pop(reduced.shape[1])
+        found = Rows(number, time, still, np.split(reduced, ends[:-1]), observation.spread)
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)

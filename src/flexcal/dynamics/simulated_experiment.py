@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.data.filtering import Decimation
 from flexcal.data.low_pass import LowPass
 from flexcal.dynamics.closed_loop import ClosedLoop, Target
-from flexcal.dynamics.motion import Motion, smoothed
+from flexcal.dynamics.motion import Motion, differences, smoothed
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment
 from flexcal.dynamics.simulated_robot import SimulatedRobot
@@ -65,7 +65,8 @@ class SimulatedExperiment:
             for motion in (first, *motions):
                 yield np.hstack([motion.q, motion.torque]), np.column_stack([motion.time, motion.torque])
 
-        for x, dx, ddx, beside in smoothed(columns(), LowPass(step, _PATH * rows_hz)):
+        for values, beside in smoothed(columns(), LowPass(step, _PATH * rows_hz)):
+            x, dx, ddx = differences(values, step)
             time, torque = beside[:, 0], beside[:, 1:]
             targets = map(Target, time, x[:, :n], dx[:, :n], ddx[:, :n], x[:, n:])
             states = np.array([loop.reach(target) for target in targets])

@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from flexcal.data import provenance, read_estimates
@@ -29,12 +30,12 @@ from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
-from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.log_payloads import require_unloaded
 from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
+from flexcal.workflow.log_torques import require_joint_torques
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
@@ -159,11 +160,12 @@ def identify_robot_dynamics(
 ) -> RobotDynamics:
     """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
 
-    Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
-    of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
-    and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
-    not fit the robot, and for a log with a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
-    proposed. `irls`, `iv` and `didim` go through the logs again and again, in this process alone.
+    Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
+    six joints. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what the filters would carry
+    over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks. With `out`, estimates,
+    results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and for a log with a
+    payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed. `irls`, `iv` and `didim` go through the
+    logs again and again, in this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -172,63 +174,70 @@ def identify_robot_dynamics(
     model = with_blocks(bare, blocks, source)
     treatment = treatment_of(model, logs)
 
-    read = read_logs(logs, model, treatment, jobs=jobs)
-    windows = [split(log, treatment, hold_out) for log in read]
-    fitted = [LogPart(log, early) for log, (early, _) in zip(read, windows, strict=True)]
-    unseen = [LogPart(log, late) for log, (_, late) in zip(read, windows, strict=True) if late is not None]
-    others = read_logs(validate, model, treatment, jobs=jobs)
-    require_unloaded([*read, *others])
-    unseen += [LogPart(log, Window()) for log in others]
+    with TemporaryDirectory(prefix="flexcal_") as folder:
+        scratch = Path(folder)
+        read = read_logs(logs, model, treatment, scratch, jobs=jobs)
+        windows = [split(log, treatment, hold_out) for log in read]
+        fitted = [LogPart(log, early) for log, (early, _) in zip(read, windows, strict=True)]
+        unseen = [
+            LogPart(log, late) for log, (_, late) in zip(read, windows, strict=True) if late is not None
+        ]
+        others = read_logs(validate, model, treatment, scratch, jobs=jobs)
+        require_unloaded([*read, *others], model)
+        require_joint_torques([*read, *others], model)
+        unseen += [LogPart(log, Window()) for log in others]
 
-    def systems(parts: list[LogPart], observation: Observation, batches: int) -> list[ExperimentSystem]:
-        return log_systems(parts, observation, treatment, batches=batches, jobs=jobs, progress=progress)
+        def systems(parts: list[LogPart], observation: Observation, batches: int) -> list[ExperimentSystem]:
+            return log_systems(parts, observation, treatment, batches=batches, jobs=jobs, progress=progress)
 
-    def equations(observation: Observation) -> list[ExperimentSystem]:
-        return systems(fitted, observation, batches_each(len(logs)))
+        def equations(observation: Observation) -> list[ExperimentSystem]:
+            return systems(fitted, observation, batches_each(len(logs)))
 
-    declared = model.config.dynamics.friction
-    friction = select_friction(model, declared, equations, treatment.decimation)
-    observation = Observation(model, friction.terms)
-    base = BaseParameters.of(observation)
-    train = RegressionData.of(observation, base, equations(observation))
-    held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
-    estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
-    options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
-    origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
-    estimate = replace(estimate, provenance=origin)
-    target = source if out is None else out / ESTIMATES
-    essential = essential_parameters(train, estimate)
-    seconds = time.perf_counter() - begun
-    classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
-    result = RobotDynamics(
-        estimate,
-        estimator,
-        classic.rank,
-        train,
-        held_out,
-        hold_out,
-        tuple(validate),
-        essential,
-        friction,
-        treatment,
-        seconds,
-        target,
-    )
-    store_block(source, target, blocks, "dynamics", estimate)
-    if out is not None:
-        document = result.document()
-        write_results(out, document)
-        borders = [math.inf if late is None else late.start for _, late in windows]
-        borders += [-math.inf] * len(others)
-        predictions = log_predictions(
-            [*read, *others], borders, observation, estimate, treatment, progress=progress
+        declared = model.config.dynamics.friction
+        friction = select_friction(model, declared, equations, treatment.decimation)
+        observation = Observation(model, friction.terms)
+        base = BaseParameters.of(observation)
+        train = RegressionData.of(observation, base, equations(observation))
+        held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
+        estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
+        options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
+        origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
+        estimate = replace(estimate, provenance=origin)
+        target = source if out is None else out / ESTIMATES
+        essential = essential_parameters(train, estimate)
+        seconds = time.perf_counter() - begun
+        classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
+        result = RobotDynamics(
+            estimate,
+            estimator,
+            classic.rank,
+            train,
+            held_out,
+            hold_out,
+            tuple(validate),
+            essential,
+            friction,
+            treatment,
+            seconds,
+            target,
         )
-        if validate:
-            files = [robot, bare.urdf, *logs, *validate]
-            origin = provenance(files, options, source if blocks else None, tuple(blocks))
-        study = DynamicsStudy(model.name, document, estimate, predictions, origin)
-        write_dynamics_report(out / "report.html", study)
-    return result
+        store_block(source, target, blocks, "dynamics", estimate)
+        if out is not None:
+            from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
+
+            document = result.document()
+            write_results(out, document)
+            borders = [math.inf if late is None else late.start for _, late in windows]
+            borders += [-math.inf] * len(others)
+            predictions = log_predictions(
+                [*read, *others], borders, observation, estimate, treatment, progress=progress
+            )
+            if validate:
+                files = [robot, bare.urdf, *logs, *validate]
+                origin = provenance(files, options, source if blocks else None, tuple(blocks))
+            study = DynamicsStudy(model.name, document, estimate, predictions, origin)
+            write_dynamics_report(out / "report.html", study)
+        return result
 
 
 def _recorded(fitted: Sequence[LogPart], train: RegressionData, treatment: Treatment) -> RecordedRows:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -68,13 +69,14 @@ def identify_gains(
     """
     model = RobotModel.from_yaml(robot, estimates=False)
     treatment = treatment_of(model, logs)
-    read = read_logs(logs, model, treatment, jobs=jobs)
-    payloads = log_payloads(read)
     observation = Observation(model, CLASSIC)
-    parts = [LogPart(log, Window()) for log in read]
-    systems = log_systems(
-        parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
-    )
+    with TemporaryDirectory(prefix="flexcal_") as folder:
+        read = read_logs(logs, model, treatment, Path(folder), jobs=jobs)
+        payloads = log_payloads(read, model)
+        parts = [LogPart(log, Window()) for log in read]
+        systems = log_systems(
+            parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
+        )
     data = RegressionData.of(observation, BaseParameters.of(observation), systems)
     signal = model.config.signals.get("tau")
     declared = np.ones(model.n) if signal is None or signal.gain is None else np.array(signal.gain)

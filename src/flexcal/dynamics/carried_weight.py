@@ -1,0 +1,64 @@
+"""How much of the links' weight the torques of a log carry: next to nothing where they are those of the motors before their gears."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import Recording
+from flexcal.model import RobotModel, gravity_torque
+
+_POSES = 200
+"""Samples of a block whose weight is looked at."""
+_TOO_WEAK = 1 / 20
+"""Torques that follow less than this share of the weight are of the motors' side: gears begin beyond, currents in A do not reach it."""
+_SMALL = 1 / 8
+"""Of the weight's; friction may add that to torques of motors."""
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedWeight:
+    """Sums over samples `of_weight` (n,) and `of_torque` (n,) of the squares, (N m)², and `of_both` (n,) of the products.
+
+    The weight is that of the links, and of what a log says that they hold.
+    """
+
+    of_weight: np.ndarray
+    of_torque: np.ndarray
+    of_both: np.ndarray
+
+    @classmethod
+    def empty(cls, joints: int) -> CarriedWeight:
+        """Of no samples."""
+        return cls(*np.zeros((3, joints)))
+
+    @classmethod
+    def of(cls, recording: Recording, model: RobotModel) -> CarriedWeight:
+        """Of some samples, evenly spread."""
+        some = slice(None, None, max(1, len(recording) // _POSES))
+        held = None if recording.payload is None else recording.payload[some]
+        weight, torque = gravity_torque(model, recording.q[some], held), recording.torque[some]
+        return cls(*(np.sum(x, axis=0) for x in (weight**2, torque**2, weight * torque)))
+
+    def __add__(self, other: CarriedWeight) -> CarriedWeight:
+        return CarriedWeight(
+            self.of_weight + other.of_weight, self.of_torque + other.of_torque, self.of_both + other.of_both
+        )
+
+    @property
+    def heaviest(self) -> int:
+        """The joint whose weight is largest."""
+        return int(np.argmax(self.of_weight))
+
+    @property
+    def share(self) -> float:
+        """Of its weight that the torques of the heaviest joint follow; 1 where nothing weighs."""
+        k = self.heaviest
+        return float(abs(self.of_both[k]) / self.of_weight[k]) if self.of_weight[k] > 0 else 1.0
+
+    @property
+    def by_motors(self) -> bool:
+        """Whether the torques are too weak for joints, and too small for friction to be the reason."""
+        k = self.heaviest
+        return self.share < _TOO_WEAK and bool(self.of_torque[k] < _SMALL**2 * self.of_weight[k])

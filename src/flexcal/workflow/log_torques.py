@@ -1,0 +1,19 @@
+"""Whether the torques of logs can be those of the joints."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flexcal.dynamics import JointLog
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+
+
+def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
+    """Raises `InputError` for a log of torques that are the motors' own."""
+    for log in logs:
+        if log.weight.by_motors:
+            raise InputError(
+                f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} follows only {log.weight.share:.2%} of what its "
+                "weight asks for; these look like torques of the motors: declare gear ratios as `tau: {gain: […]}` under `signals:`."
+            )

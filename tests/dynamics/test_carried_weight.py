@@ -1,0 +1,41 @@
+"""Torques of motors are told from those of joints by the weight that they carry; currents in A are not taken for them."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.data import Recording, write_recording
+from flexcal.dynamics import JointLog, Motion, Observation
+from flexcal.errors import InputError
+from flexcal.model import RobotModel, torque_regressor
+from flexcal.workflow.log_torques import require_joint_torques
+
+STEP = 1 / 200
+
+
+@pytest.fixture(scope="module")
+def recording(swing: Motion, tx40: RobotModel) -> Recording:
+    """Ten seconds of motion with the torques that CAD's inertias take, and noise."""
+    torque = torque_regressor(tx40, swing.q, swing.dq, swing.ddq) @ Observation(tx40, ()).values()
+    return Recording(STEP, swing.q, torque + 0.2 * np.random.default_rng(4).normal(size=swing.q.shape))
+
+
+def log_of(recording: Recording, model: RobotModel, folder: Path) -> JointLog:
+    write_recording(folder / "log.parquet", recording)
+    return JointLog.read(folder / "log.parquet", model, 10.0, folder)
+
+
+def test_torques_before_the_gears(recording: Recording, tx40: RobotModel, tmp_path: Path) -> None:
+    log = log_of(replace(recording, torque=recording.torque / 45), tx40, tmp_path)
+    sentence = r"log\.parquet: the torque of joint_2 follows only 2\.\d+% of what its weight asks for; .* of the motors"
+    with pytest.raises(InputError, match=sentence):
+        require_joint_torques([log], tx40)
+
+
+@pytest.mark.parametrize("gain", [1.0, 10.0])
+def test_torques_and_currents(gain: float, recording: Recording, tx40: RobotModel, tmp_path: Path) -> None:
+    log = log_of(replace(recording, torque=recording.torque / gain), tx40, tmp_path)
+    require_joint_torques([log], tx40)
+    assert log.weight.share == pytest.approx(1 / gain, rel=0.1)
