@@ -61,6 +61,16 @@ def test_gains_come_back_and_can_be_pasted(arm: Path, capsys: pytest.CaptureFixt
     )
 
 
+def test_currents_of_any_scale(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """At gains of 1 they look like torques of motors, which the robot's own dynamics refuse; here the gains are what is sought."""
+    robot = arm / "robot.yaml"
+    robot.write_text(robot.read_text().replace("gain: [50, 20]", "gain: [1, 1]"))
+    assert "torques of the motors" in refusal("dynamics", arguments(arm, "free"), capsys)
+    assert main(["identify", "gains", *arguments(arm, "free", "loaded"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["gains"] == pytest.approx(list(DECLARED * GAINS), rel=0.01)
+
+
 def test_the_robots_own_dynamics_take_the_free_logs(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["identify", "dynamics", *arguments(arm, "free"), "--out", str(arm / "out")]) == 0
     message = refusal("dynamics", arguments(arm, "free", "loaded"), capsys)
