@@ -11,6 +11,7 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.energy_model import energy_least_squares
 from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
 from flexcal.dynamics.feasible import feasible_least_squares
@@ -31,6 +32,7 @@ from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.power_model import power_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
@@ -74,6 +76,7 @@ __all__ = [
     "WarmUp",
     "Window",
     "batches_each",
+    "energy_least_squares",
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
@@ -83,6 +86,7 @@ __all__ = [
     "motion_bandwidth",
     "observe",
     "ordinary_least_squares",
+    "power_least_squares",
     "predict_torques",
     "select_friction",
     "weighted_least_squares",

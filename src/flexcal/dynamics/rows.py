@@ -11,8 +11,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.observation import Observation
 
 _BLOCK = 512
 """Samples, about, whose columns are in memory at once; they fit a processor's cache."""
@@ -99,7 +99,7 @@ class Rows:
 
 
 def rows(
-    observation: Observation, experiment: Experiment, decimation: Decimation, window: Window
+    observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
 ) -> Iterator[Rows]:
     """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 

@@ -8,14 +8,16 @@ from typing import Literal
 from flexcal.dynamics import (
     RecordedRows,
     RegressionData,
+    energy_least_squares,
     feasible_least_squares,
     huber_least_squares,
     ordinary_least_squares,
+    power_least_squares,
     weighted_least_squares,
 )
 from flexcal.estimation import Estimate
 
-EstimatorName = Literal["wls", "ols", "sdp", "irls"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "energy", "power"]
 
 Estimator = Callable[[RegressionData, RecordedRows], Estimate]
 """Of the equations, and of the rows that they came from, for those that need to see them again."""
@@ -25,4 +27,6 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "ols": lambda data, _: ordinary_least_squares(data),
     "sdp": lambda data, _: feasible_least_squares(data),
     "irls": huber_least_squares,
+    "energy": lambda _, recorded: energy_least_squares(recorded),
+    "power": lambda _, recorded: power_least_squares(recorded),
 }
