@@ -1,6 +1,7 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.column_errors import column_errors, noisy_logs
 from flexcal.dynamics.drive_terms import (
     CLASSIC,
     Column,
@@ -37,6 +38,7 @@ from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.tls import total_least_squares
 from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
@@ -76,6 +78,7 @@ __all__ = [
     "WarmUp",
     "Window",
     "batches_each",
+    "column_errors",
     "energy_least_squares",
     "essential_parameters",
     "experiment_system",
@@ -84,10 +87,12 @@ __all__ = [
     "identify_with_prior",
     "log_blocks",
     "motion_bandwidth",
+    "noisy_logs",
     "observe",
     "ordinary_least_squares",
     "power_least_squares",
     "predict_torques",
     "select_friction",
+    "total_least_squares",
     "weighted_least_squares",
 ]
