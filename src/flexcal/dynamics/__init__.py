@@ -29,6 +29,7 @@ from flexcal.dynamics.friction_selection import FrictionSelection, select_fricti
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
 from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
+from flexcal.dynamics.maximum_likelihood import maximum_likelihood
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
@@ -86,6 +87,7 @@ __all__ = [
     "huber_least_squares",
     "identify_with_prior",
     "log_blocks",
+    "maximum_likelihood",
     "motion_bandwidth",
     "noisy_logs",
     "observe",

@@ -12,6 +12,7 @@ from flexcal.dynamics import (
     energy_least_squares,
     feasible_least_squares,
     huber_least_squares,
+    maximum_likelihood,
     noisy_logs,
     ordinary_least_squares,
     power_least_squares,
@@ -20,7 +21,7 @@ from flexcal.dynamics import (
 )
 from flexcal.estimation import Estimate
 
-EstimatorName = Literal["wls", "ols", "sdp", "irls", "energy", "power", "tls"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "energy", "power", "tls", "ml"]
 
 Estimator = Callable[[RegressionData, RecordedRows], Estimate]
 """Of the equations, and of the rows that they came from, for those that need to see them again."""
@@ -35,4 +36,5 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "tls": lambda data, recorded: total_least_squares(
         data, column_errors(recorded, noisy_logs(recorded.experiments))
     ),
+    "ml": maximum_likelihood,
 }
