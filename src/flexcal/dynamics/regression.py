@@ -87,7 +87,7 @@ class RegressionData:
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all joints stacked, and of each (n,)."""
-        n = self.observation.model.n
+        n = len(self.observation.members)
         missed, size = np.zeros(n), np.zeros(n)
         for s in self.subsystems:
             missed[s.joint] += s.triangle.residual(parameters[s.members]) ** 2
