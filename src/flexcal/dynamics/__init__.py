@@ -12,6 +12,7 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.ekf import kalman_filter
 from flexcal.dynamics.energy_model import energy_least_squares
 from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
@@ -86,6 +87,7 @@ __all__ = [
     "feasible_least_squares",
     "huber_least_squares",
     "identify_with_prior",
+    "kalman_filter",
     "log_blocks",
     "maximum_likelihood",
     "motion_bandwidth",

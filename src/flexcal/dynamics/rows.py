@@ -106,7 +106,7 @@ def rows(
     Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
     """
     ends = np.cumsum(observation.widths)
-    slowest = np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
+    slowest = slowest_speeds(experiment)
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
     memory: Memory = {}
@@ -127,6 +127,11 @@ def rows(
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)
+
+
+def slowest_speeds(experiment: Experiment) -> np.ndarray:
+    """Speed (n,) up to which each joint stands still."""
+    return np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
 
 
 class _Centres:

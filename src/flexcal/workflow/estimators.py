@@ -12,6 +12,7 @@ from flexcal.dynamics import (
     energy_least_squares,
     feasible_least_squares,
     huber_least_squares,
+    kalman_filter,
     maximum_likelihood,
     noisy_logs,
     ordinary_least_squares,
@@ -21,7 +22,7 @@ from flexcal.dynamics import (
 )
 from flexcal.estimation import Estimate
 
-EstimatorName = Literal["wls", "ols", "sdp", "irls", "energy", "power", "tls", "ml"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "energy", "power", "tls", "ml", "ekf"]
 
 Estimator = Callable[[RegressionData, RecordedRows], Estimate]
 """Of the equations, and of the rows that they came from, for those that need to see them again."""
@@ -37,4 +38,5 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
         data, column_errors(recorded, noisy_logs(recorded.experiments))
     ),
     "ml": maximum_likelihood,
+    "ekf": kalman_filter,
 }
