@@ -5,14 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recovery import covered, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     BaseParameters,
     Motion,
     Observation,
-    RecordedRows,
-    Window,
     kalman_filter,
     observe,
     weighted_least_squares,
@@ -42,27 +41,13 @@ def clean(
     observation: Observation, truth: np.ndarray, sines: Callable[[int, float], Motion]
 ) -> Callable[[int, float], Motion]:
     """clean(samples, rate_hz): with the torques of the truth."""
-
-    def make(samples: int, rate_hz: float) -> Motion:
-        motion = sines(samples, rate_hz)
-        parts = zip(observation.members, observation.columns(motion), strict=True)
-        return replace(motion, torque=np.stack([truth[m] @ c for m, c in parts], axis=1))
-
-    return make
+    return lambda samples, rate_hz: driven(observation, sines(samples, rate_hz), truth)
 
 
 def filtered(observation: Observation, base: BaseParameters, motion: Motion) -> tuple[Estimate, Estimate]:
     """And weighted least squares."""
     data = observe(observation, base, [motion], Decimation(1))
-    recorded = RecordedRows(observation, base, [motion], [Window()], Decimation(1))
-    return kalman_filter(data, recorded), weighted_least_squares(data)
-
-
-def errors(estimate: Estimate, observation: Observation, truth: np.ndarray) -> dict[str, float]:
-    """Of the base parameters."""
-    hidden = {entry.name for entry in estimate.dropped}
-    expected = estimate.regrouped(dict(zip(observation.names, truth, strict=True)))
-    return {name: estimate.values[name] - v for name, v in expected.items() if name not in hidden}
+    return kalman_filter(data, recorded(observation, base, motion)), weighted_least_squares(data)
 
 
 def test_without_noise_it_comes_near_the_truth(
@@ -85,7 +70,7 @@ def test_intervals_cover_and_innovations_are_white(
     truth: np.ndarray,
     rng: np.random.Generator,
 ) -> None:
-    inside, ratio, innovations = scatter(observation, base, clean(1000, 200.0), truth, 3, rng)
+    inside, ratio, innovations = scatter(observation, base, clean(1000, 200.0), truth, 2, rng)
     assert 0.88 < inside < 0.99
     assert ratio < 1.1
     assert all(0.8 < square < 1.2 for square in innovations)
@@ -121,8 +106,7 @@ def scatter(
         )
         found, other = filtered(observation, base, noisy)
         missed, plain = errors(found, observation, truth), errors(other, observation, truth)
-        ends = np.array([found.interval(name) for name in missed])
-        inside.append(np.abs(list(missed.values())) <= np.ptp(ends, axis=1) / 2)
+        inside.append(covered(found, missed))
         ratios.append([abs(missed[name] / plain[name]) for name in missed])
         innovations.append(float(found.message.split("squared ")[1].split(",")[0]))
     return float(np.mean(inside)), float(np.median(ratios)), innovations

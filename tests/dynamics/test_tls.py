@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from recovery import covered, driven, errors, recorded
 
 from flexcal.data import Recording, write_recording
 from flexcal.data.filtering import Decimation
@@ -13,9 +14,7 @@ from flexcal.dynamics import (
     JointLog,
     Motion,
     Observation,
-    RecordedRows,
     RegressionData,
-    Window,
     column_errors,
     noisy_logs,
     observe,
@@ -40,8 +39,7 @@ def truth(observation: Observation) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def clean(observation: Observation, truth: np.ndarray, swing: Motion) -> Motion:
-    torques = [truth[m] @ c for m, c in zip(observation.members, observation.columns(swing), strict=True)]
-    return replace(swing, torque=np.stack(torques, axis=1))
+    return driven(observation, swing, truth)
 
 
 def spoilt(motion: Motion, rng: np.random.Generator) -> Motion:
@@ -55,15 +53,9 @@ def fitted(
 ) -> tuple[Estimate, Estimate]:
     """Total and plain."""
     data = observe(observation, base, [motion], Decimation(1))
-    recorded = RecordedRows(observation, base, [motion], [Window()], Decimation(1))
-    return total_least_squares(data, column_errors(recorded, [noisy])), weighted_least_squares(data)
-
-
-def errors(estimate: Estimate, observation: Observation, truth: np.ndarray) -> dict[str, float]:
-    """Of the base parameters."""
-    hidden = {entry.name for entry in estimate.dropped}
-    expected = estimate.regrouped(dict(zip(observation.names, truth, strict=True)))
-    return {name: estimate.values[name] - v for name, v in expected.items() if name not in hidden}
+    return total_least_squares(
+        data, column_errors(recorded(observation, base, motion), [noisy])
+    ), weighted_least_squares(data)
 
 
 def test_without_noise_the_truth_comes_back(
@@ -93,8 +85,7 @@ def test_noisy_columns_bend_least_squares_and_not_this(
         for estimate, kept, counted in zip(both, (total, plain), (inside, plain_inside), strict=True):
             missed = errors(estimate, observation, truth)
             kept.append(np.array(list(missed.values())))
-            ends = np.array([estimate.interval(name) for name in missed])
-            counted.append(np.abs(kept[-1]) <= np.ptp(ends, axis=1) / 2)
+            counted.append(covered(estimate, missed))
         blind.append(
             errors(unwhitened(observe(observation, base, [noisy], Decimation(1))), observation, truth)
         )
@@ -125,8 +116,7 @@ def unwhitened(data: RegressionData) -> Estimate:
 def test_signs_and_constants_are_exact(
     observation: Observation, base: BaseParameters, clean: Motion, rng: np.random.Generator
 ) -> None:
-    recorded = RecordedRows(observation, base, [clean], [Window()], Decimation(1))
-    wrong = column_errors(recorded, [spoilt(clean, rng)])
+    wrong = column_errors(recorded(observation, base, clean), [spoilt(clean, rng)])
     for s in wrong.subsystems:
         size = np.linalg.norm(s.triangle.matrix, axis=0)
         names = [observation.names[m] for m in s.members]

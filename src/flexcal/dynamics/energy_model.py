@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from functools import cached_property
 
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Column, Coupling, Memory, RotorInertia
 from flexcal.dynamics.linear_fit import linear_fit
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.recorded_rows import RecordedRows
+from flexcal.dynamics.scalar_equations import ScalarEquations
 from flexcal.dynamics.wls import noise_levels
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel, energy_regressor
+from flexcal.model import energy_regressor
 from flexcal.model.regressor import INERTIAL
 
 _WINDOW = 0.1
@@ -34,34 +33,14 @@ def energy_least_squares(recorded: RecordedRows) -> Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class EnergyModel:
+class EnergyModel(ScalarEquations):
     """One equation, J: the energy that an `observation` takes in during the 0.1 s before a sample, or since the experiment began.
 
     Of its terms, those with inertia count by their energy and the others by their work; a term that is itself made from
     accelerations, as a friction by load, keeps them.
     """
 
-    observation: Observation
-
-    @property
-    def model(self) -> RobotModel:
-        return self.observation.model
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        return self.observation.names
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return ("the energy of all joints",)
-
-    @cached_property
-    def members(self) -> tuple[np.ndarray, ...]:
-        return (np.arange(len(self.names)),)
-
-    @property
-    def widths(self) -> list[int]:
-        return [len(self.names) + 1]
+    label = "the energy of all joints"
 
     def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
         own = {} if memory is None else memory
@@ -76,12 +55,6 @@ class EnergyModel:
         kept = slice(begins[-1], None)
         own["energy"] = _Account(time[-1], power[:, -1], work[:, -1], time[kept], energy[:, kept])
         return energy[:, -len(motion) :] - energy[:, begins]
-
-    def follow(self, motion: Motion, memory: Memory) -> None:
-        self.observation.follow(motion, memory)
-
-    def values(self) -> np.ndarray:
-        return self.observation.values()
 
     def _stored(self, motion: Motion) -> np.ndarray:
         """Energy of links and rotors by parameter (p + 1, N), the last row zero."""

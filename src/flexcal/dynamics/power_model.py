@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.linear_fit import linear_fit
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.recorded_rows import RecordedRows
+from flexcal.dynamics.scalar_equations import ScalarEquations
 from flexcal.dynamics.wls import noise_levels
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
 
 
 def power_least_squares(recorded: RecordedRows) -> Estimate:
@@ -28,30 +26,10 @@ def power_least_squares(recorded: RecordedRows) -> Estimate:
 
 
 @dataclass(frozen=True, eq=False)
-class PowerModel:
+class PowerModel(ScalarEquations):
     """One equation, W: q̇ᵀ times the torques of an `observation` and times the columns of them."""
 
-    observation: Observation
-
-    @property
-    def model(self) -> RobotModel:
-        return self.observation.model
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        return self.observation.names
-
-    @property
-    def labels(self) -> tuple[str, ...]:
-        return ("the power of all joints",)
-
-    @cached_property
-    def members(self) -> tuple[np.ndarray, ...]:
-        return (np.arange(len(self.names)),)
-
-    @property
-    def widths(self) -> list[int]:
-        return [len(self.names) + 1]
+    label = "the power of all joints"
 
     def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
         torques = self.observation.systems(motion, memory)
@@ -63,9 +41,3 @@ class PowerModel:
             power[-1] += speed * torques[stop]
             start = stop + 1
         return power
-
-    def follow(self, motion: Motion, memory: Memory) -> None:
-        self.observation.follow(motion, memory)
-
-    def values(self) -> np.ndarray:
-        return self.observation.values()
