@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.filtering import Decimation
-from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.rows import Experiment, Rows, Window, rows
 from flexcal.dynamics.triangle import triangular
 from flexcal.errors import FlexcalError
@@ -44,7 +44,7 @@ class ExperimentSystem:
 
 
 def experiment_system(
-    observation: Observation,
+    observation: Equations,
     experiment: Experiment,
     decimation: Decimation,
     window: Window,

@@ -32,6 +32,11 @@ class Observation:
         drives = [column.name for column in self._at_rest]
         return (*inertial_names(self.model), *dict.fromkeys(drives))
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The joints."""
+        return self.model.joint_names
+
     @cached_property
     def members(self) -> tuple[np.ndarray, ...]:
         """For every joint the numbers of the columns that it can feel, ascending."""

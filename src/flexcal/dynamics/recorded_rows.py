@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.experiment_system import experiment_system
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData, batches_each
@@ -44,10 +45,17 @@ class RecordedRows:
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
         """The equations, each multiplied by the root of its weight: (n, rows) an experiment, as `residuals` are."""
+        return self._data(self.observation, weights)
+
+    def observed_as(self, equations: Equations) -> RegressionData:
+        """Other equations for the same samples."""
+        return self._data(equations, [None] * len(self.experiments))
+
+    def _data(self, equations: Equations, weights: Sequence[np.ndarray | None]) -> RegressionData:
         batches = batches_each(len(self.experiments))
         systems = [
             experiment_system(
-                self.observation,
+                equations,
                 experiment,
                 self.decimation,
                 window,
@@ -57,4 +65,4 @@ class RecordedRows:
             )
             for experiment, window, own in zip(self.experiments, self.windows, weights, strict=True)
         ]
-        return RegressionData.of(self.observation, self.base, systems)
+        return RegressionData.of(equations, self.base, systems)

@@ -10,8 +10,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.experiment_system import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
-from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model.regressor import INERTIAL
@@ -44,7 +44,7 @@ class RegressionData:
     `batches` are the same equations once more, experiment by experiment in parts that follow each other in time.
     """
 
-    observation: Observation
+    observation: Equations
     base: BaseParameters
     subsystems: tuple[Subsystem, ...]
     masked: int
@@ -87,7 +87,7 @@ class RegressionData:
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all joints stacked, and of each (n,)."""
-        n = self.observation.model.n
+        n = len(self.observation.members)
         missed, size = np.zeros(n), np.zeros(n)
         for s in self.subsystems:
             missed[s.joint] += s.triangle.residual(parameters[s.members]) ** 2
@@ -96,7 +96,7 @@ class RegressionData:
 
     @classmethod
     def of(
-        cls, observation: Observation, base: BaseParameters, systems: Sequence[ExperimentSystem]
+        cls, observation: Equations, base: BaseParameters, systems: Sequence[ExperimentSystem]
     ) -> RegressionData:
         """The systems of several experiments together."""
         subsystems = [
@@ -109,7 +109,7 @@ class RegressionData:
 
 
 def observe(
-    observation: Observation,
+    observation: Equations,
     base: BaseParameters,
     experiments: Sequence[Experiment],
     decimation: Decimation,

@@ -11,8 +11,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.observation import Observation
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
@@ -100,14 +100,14 @@ class Rows:
 
 
 def rows(
-    observation: Observation, experiment: Experiment, decimation: Decimation, window: Window
+    observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
 ) -> Iterator[Rows]:
     """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 
     Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
     """
     ends = np.cumsum(observation.widths)
-    slowest = np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
+    slowest = slowest_speeds(experiment)
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
     memory: Memory = {}
@@ -128,6 +128,11 @@ def rows(
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)
+
+
+def slowest_speeds(experiment: Experiment) -> np.ndarray:
+    """Speed (n,) up to which each joint stands still."""
+    return np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
 
 
 class _Centres:

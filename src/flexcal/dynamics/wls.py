@@ -24,9 +24,9 @@ def noise_levels(data: RegressionData) -> list[float]:
     noise = []
     for s, (sigma, rank) in zip(data.subsystems, data.noise(), strict=True):
         if np.isnan(sigma):
-            joint = data.observation.model.joint_names[s.joint]
+            label = data.observation.labels[s.joint]
             raise FlexcalError(
-                f"{s.triangle.rows} equations of {joint} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
+                f"{s.triangle.rows} equations of {label} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
                 "record for longer, or decimate less."
             )
         noise.append(s.floored(sigma))

@@ -199,7 +199,7 @@ def identify_robot_dynamics(
         base = BaseParameters.of(observation)
         train = RegressionData.of(observation, base, equations(observation))
         held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
-        estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
+        estimate = ESTIMATORS[estimator](train, _recorded(fitted, observation, base, treatment))
         options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
         origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
         estimate = replace(estimate, provenance=origin)
@@ -239,9 +239,9 @@ def identify_robot_dynamics(
         return result
 
 
-def _recorded(fitted: Sequence[LogPart], train: RegressionData, treatment: Treatment) -> RecordedRows:
+def _recorded(
+    fitted: Sequence[LogPart], observation: Observation, base: BaseParameters, treatment: Treatment
+) -> RecordedRows:
     """The rows of the fit once more, log after log in this process."""
     logs, windows = [part.log for part in fitted], [part.window for part in fitted]
-    return RecordedRows(
-        train.observation, train.base, logs, windows, treatment.decimation, treatment.mask_standstill
-    )
+    return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)
