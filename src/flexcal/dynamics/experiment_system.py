@@ -92,7 +92,7 @@ def experiment_system(
 class _Growing:
     """A batch to which rows come; it holds none of them."""
 
-    def __init__(self, number: int, observation: Observation) -> None:
+    def __init__(self, number: int, observation: Equations) -> None:
         self.number = number
         self._rows = 0
         self._spread = observation.spread
