@@ -22,7 +22,7 @@ def energy_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray) -> np.nda
     geometry, still = np.ascontiguousarray(model.geometry), np.zeros((*q.shape, 3))
     rest = np.zeros_like(q)
     momentum = torque_regressor(model, q, rest, dq) - torque_regressor(model, q, rest, rest)  # M q̇
-    energy = 0.5 * np.einsum("sj,jks->sk", dq, momentum)
+    energy = 0.5 * np.einsum("sj,sjk->sk", dq, momentum)
     for joint in range(model.n):
         origin = -geometry[joint, 3:]  # the length errors of a joint lie beyond its link's frame
         position, orientation, _, _ = model.tree.point(
