@@ -17,6 +17,8 @@ from flexcal.model import RobotModel
 
 _ROWS = 20_000
 """Rows of the file that are in memory at once."""
+_MOVES = 1e-3
+"""rad or m from end to end, at least, of a joint that moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +27,8 @@ class JointLog:
     `starts`, s.
 
     The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `span` are the
-    times of the first and the last sample of the log itself, s.
+    times of the first and the last sample of the log itself, s. A joint that never moves has no velocity and no acceleration: what its
+    encoder shows of them is noise, of which friction would take the sign.
     """
 
     path: Path
@@ -51,6 +54,7 @@ class JointLog:
                 yield recording
 
         starts, samples, top_speed = [], 0, np.zeros(model.n)
+        lowest, highest = np.full(model.n, np.inf), np.full(model.n, -np.inf)
         try:
             with NamedTemporaryFile(dir=scratch, suffix=".npy", delete=False) as stream:
                 for part in filtered_positions(watched(), cutoff_hz):
@@ -61,11 +65,14 @@ class JointLog:
                     starts.append(part.start)
                     samples += len(part)
                     top_speed = np.maximum(top_speed, part.motion().top_speed)
+                    lowest = np.minimum(lowest, part.q.min(axis=0))
+                    highest = np.maximum(highest, part.q.max(axis=0))
         except OSError as problem:
             raise FlexcalError(
                 f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
                 "set TMPDIR to a folder with room for 96 bytes a sample."
             ) from problem
+        top_speed[highest - lowest < _MOVES] = 0.0
         span = (read[0][0], read[-1][1])
         return cls(path, cutoff_hz, Path(stream.name), tuple(starts), samples, read[0][2], top_speed, span)
 
@@ -79,7 +86,10 @@ class JointLog:
         with self.filtered.open("rb") as stream:
             for start in self.starts:
                 q, torque = np.load(stream).T, np.load(stream).T
-                yield FilteredPositions(start, self.time_step, q, torque).motion()
+                motion = FilteredPositions(start, self.time_step, q, torque).motion()
+                motion.dq[:, self.top_speed == 0] = 0.0
+                motion.ddq[:, self.top_speed == 0] = 0.0
+                yield motion
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
