@@ -1,6 +1,9 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
+from flexcal.dynamics.arm_side import ArmSide
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.drive_play import with_play
+from flexcal.dynamics.drive_spring import DriveSpring, Play
 from flexcal.dynamics.drive_terms import (
     CLASSIC,
     Column,
@@ -42,6 +45,7 @@ from flexcal.dynamics.wls import weighted_least_squares
 __all__ = [
     "CLASSIC",
     "FRICTION_TERMS",
+    "ArmSide",
     "AsymmetricCoulomb",
     "BaseParameters",
     "Batch",
@@ -49,6 +53,7 @@ __all__ = [
     "Column",
     "Coulomb",
     "Coupling",
+    "DriveSpring",
     "DriveTerm",
     "EssentialParameters",
     "Experiment",
@@ -59,6 +64,7 @@ __all__ = [
     "Motion",
     "MotionBandwidth",
     "Observation",
+    "Play",
     "Presliding",
     "RecordedRows",
     "RegressionData",
@@ -86,4 +92,5 @@ __all__ = [
     "predict_torques",
     "select_friction",
     "weighted_least_squares",
+    "with_play",
 ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.dynamics.arm_side import ArmSide
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.estimation import Identifiability, analyse
@@ -47,10 +48,11 @@ class BaseParameters:
         samples = _SAMPLES_PER_PARAMETER * len(names)
         q = rng.uniform(-np.pi, np.pi, (samples, model.n))
         dq, ddq = rng.uniform(-2.0, 2.0, (2, samples, model.n))
-        columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q)))
-        matrix = np.zeros((model.n * samples, len(names)))
-        for joint, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
-            matrix[joint * samples : (joint + 1) * samples, members] = block.T
+        arm = ArmSide(rng.uniform(-np.pi, np.pi, q.shape), *rng.uniform(-2.0, 2.0, (2, samples, model.n)))
+        columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q), arm))
+        matrix = np.zeros((len(columns) * samples, len(names)))
+        for k, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
+            matrix[k * samples : (k + 1) * samples, members] = block.T
         prefer = [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
         prefer += [name for name in names if name not in set(prefer)]
         return cls(analyse(matrix, names, scale=_scale(matrix, names), prefer=prefer))

@@ -21,7 +21,7 @@ _TOGETHER = 1024
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Rows that follow each other: `factors` has for every joint R of [W, Y], or the rows themselves where they are fewer.
+    """Rows that follow each other: `factors` has for every equation of the observation R of [W, Y], or the rows where they are fewer.
 
     `number` counts the batches of the experiment, whatever is left out; a batch without rows does not exist.
     """
@@ -56,7 +56,7 @@ def experiment_system(
 ) -> ExperimentSystem:
     """One pass over an experiment, in at most about so many `batches` of equal length.
 
-    `weights` (n, rows) are those of every joint's rows by their numbers; without, all count alike.
+    `weights` (equations, rows) are those of every equation's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
     """
     total = max(0, experiment.samples - 2 * decimation.support - 1) // decimation.factor + 1
@@ -93,10 +93,10 @@ def experiment_system(
 class _Growing:
     """A batch to which rows come; it holds few of them."""
 
-    def __init__(self, number: int, joints: int) -> None:
+    def __init__(self, number: int, equations: int) -> None:
         self.number = number
         self._rows = 0
-        self._held: list[list[np.ndarray]] = [[] for _ in range(joints)]
+        self._held: list[list[np.ndarray]] = [[] for _ in range(equations)]
         self._waiting = 0
 
     def add(self, part: Rows) -> None:

@@ -61,7 +61,10 @@ class JointLog:
 
     def blocks(self) -> Iterator[Motion]:
         """The filtered motion in parts that follow each other."""
-        return filtered_motion(log_blocks(self.path, self.model), self.cutoff_hz)
+        return self._filtered(log_blocks(self.path, self.model))
+
+    def _filtered(self, recordings: Iterator[Recording]) -> Iterator[Motion]:
+        return filtered_motion(recordings, self.cutoff_hz, self.model.config.dynamics.torque)
 
     @cached_property
     def _summary(self) -> tuple[int, np.ndarray, tuple[float, float], float]:
@@ -73,7 +76,7 @@ class JointLog:
                 yield recording
 
         samples, top_speed = 0, np.zeros(self.model.n)
-        for motion in filtered_motion(watched(), self.cutoff_hz):
+        for motion in self._filtered(watched()):
             samples += len(motion)
             top_speed = np.maximum(top_speed, np.abs(motion.dq).max(axis=0, initial=0.0))
         return samples, top_speed, (read[0][0], read[-1][1]), read[0][2]

@@ -30,12 +30,11 @@ class RecordedRows:
     mask_standstill: bool = True
 
     def residuals(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Y − W χ (n, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
+        """Y − W χ (equations, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
         found = []
         for experiment, window in zip(self.experiments, self.windows, strict=True):
-            missed = np.full(
-                (self.observation.model.n, experiment.samples // self.decimation.factor + 1), np.nan
-            )
+            count = experiment.samples // self.decimation.factor + 1
+            missed = np.full((len(self.observation.equations), count), np.nan)
             for block in rows(self.observation, experiment, self.decimation, window):
                 part = block.where(~block.still) if self.mask_standstill else block
                 missed[:, part.number] = part.torque - part.predicted(self.observation.members, parameters)
@@ -43,7 +42,7 @@ class RecordedRows:
         return found
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
-        """The equations, each multiplied by the root of its weight: (n, rows) an experiment, as `residuals` are."""
+        """The equations, each multiplied by the root of its weight: (equations, rows) an experiment, as `residuals` are."""
         batches = batches_each(len(self.experiments))
         systems = [
             experiment_system(

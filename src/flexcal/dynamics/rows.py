@@ -55,9 +55,9 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """M equations of every joint that follow each other.
+    """M equations of every kind (of each joint, and of motors alone) that follow each other.
 
-    `systems` has for every joint W and, last, Y transposed (members + 1, M). `number` (M,) counts the rows of the experiment, whatever
+    `systems` has for every kind W and, last, Y transposed (members + 1, M). `number` (M,) counts the rows of the experiment, whatever
     is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth
     of its top speed.
     """
@@ -72,16 +72,16 @@ class Rows:
 
     @property
     def columns(self) -> list[np.ndarray]:
-        """For every joint W transposed (members, M)."""
+        """For every kind W transposed (members, M)."""
         return [system[:-1] for system in self.systems]
 
     @property
     def torque(self) -> np.ndarray:
-        """Y of all joints (n, M)."""
+        """Y of all kinds (·, M)."""
         return np.array([system[-1] for system in self.systems])
 
     def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
-        """W χ of all joints (n, M) for `parameters` (p,), of which `members` are the numbers of every joint's own."""
+        """W χ of all kinds (·, M) for `parameters` (p,), of which `members` are the numbers of each kind's own."""
         return np.array([parameters[own] @ w for own, w in zip(members, self.columns, strict=True)])
 
     def where(self, keep: np.ndarray) -> Rows:
@@ -92,7 +92,7 @@ class Rows:
         return Rows(self.number[keep], self.time[keep], self.still[keep], systems)
 
     def weighted(self, weights: np.ndarray) -> Rows:
-        """Every joint's rows times the root of their `weights` (n, M)."""
+        """The rows of every kind times the root of their `weights` (·, M)."""
         roots = np.sqrt(weights)
         systems = [system * root for system, root in zip(self.systems, roots, strict=True)]
         return Rows(self.number, self.time, self.still, systems)

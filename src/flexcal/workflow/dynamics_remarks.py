@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from flexcal.dynamics import RegressionData
 from flexcal.estimation import Estimate
+from flexcal.model.regressor import INERTIAL
 
 _SHOWN = 3
+_REGROUPED = ("rotor_inertia", "arm_inertia")
+"""What the inertias of links take up as a matter of course."""
 
 
 def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
@@ -14,12 +17,12 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...
     structural = {base.names[i] for i in base.kept}
     absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
     silent = set(data.silent)
-    drives = [name for name in data.names if name.rpartition(".")[0] in data.observation.model.joint_names]
+    drives = data.names[len(INERTIAL) * data.observation.model.n :]
     remarks = []
     for name in drives:
         if name in silent:
             remarks.append(f"{name} stays as it was: these recordings leave its column at zero")
-        elif name in absorbed and (name in structural or not name.endswith("rotor_inertia")):
+        elif name in absorbed and (name in structural or not name.endswith(_REGROUPED)):
             heirs = ", ".join(heir for heir, _ in absorbed[name][:_SHOWN]) or "nothing"
             where = "no recording tells" if name not in structural else "these recordings do not tell"
             remarks.append(f"{where} {name} from {heirs}")

@@ -23,6 +23,7 @@ from flexcal.dynamics import (
     batches_each,
     essential_parameters,
     select_friction,
+    with_play,
 )
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
@@ -31,6 +32,7 @@ from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
+from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.log_predictions import log_predictions
@@ -69,12 +71,13 @@ class RobotDynamics:
         """The content of results.json."""
         x = self.estimate.parameters.coordinates()
         error, per_joint = self.train.errors(x)
-        joints = self.train.observation.model.joint_names
         percent: dict[str, Any] = {"train": 100 * error, "held_out": None}
         if self.held_out is not None:
             error, per_joint = self.held_out.errors(x)
             percent["held_out"] = 100 * error
-        percent["per_joint"] = dict(zip(joints, 100 * per_joint, strict=True))
+        each = dict(zip(self.train.observation.equations, 100 * per_joint, strict=True))
+        percent["per_joint"] = {name: each.pop(name) for name in self.train.observation.model.joint_names}
+        percent |= {"per_motor": each} if each else {}
         return {
             "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
@@ -152,6 +155,7 @@ def identify_robot_dynamics(
     hold_out: float = 0.0,
     validate: Sequence[Path] = (),
     estimator: EstimatorName = "wls",
+    flexible: bool = False,
     out: Path | None = None,
     jobs: int = 1,
     progress: Progress = silent,
@@ -162,7 +166,9 @@ def identify_robot_dynamics(
     of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
     and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
     not fit the robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
-    proposed. `irls` goes through the logs again and again, in this process alone.
+    proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the
+    drives' springs; friction terms are chosen before that, as if the robot were rigid. `irls` goes through the logs again and again, in
+    this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -173,6 +179,7 @@ def identify_robot_dynamics(
         raise InputError(
             f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
         )
+    springs = drive_springs(model, [*logs, *validate]) if flexible else ()
     treatment = treatment_of(model, logs)
 
     read = read_logs(logs, model, treatment, jobs=jobs)
@@ -190,12 +197,17 @@ def identify_robot_dynamics(
 
     declared = model.config.dynamics.friction
     friction = select_friction(model, declared, equations, treatment.decimation)
-    observation = Observation(model, friction.terms)
+    observation = with_play(Observation(model, friction.terms, springs), equations)
     base = BaseParameters.of(observation)
     train = RegressionData.of(observation, base, equations(observation))
     held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
     estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
-    options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
+    options = {
+        "estimator": estimator,
+        "hold_out": hold_out,
+        "friction": ", ".join(friction.labels),
+        "flexible": flexible,
+    }
     origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
     estimate = replace(estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
