@@ -1,6 +1,7 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
 from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.attenuation import attenuation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.drive_play import with_play
 from flexcal.dynamics.drive_spring import DriveSpring, Play
@@ -79,6 +80,7 @@ __all__ = [
     "Viscous",
     "WarmUp",
     "Window",
+    "attenuation",
     "batches_each",
     "essential_parameters",
     "experiment_system",

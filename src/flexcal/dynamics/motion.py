@@ -107,9 +107,9 @@ def filtered_motion(
         if torque != "instantaneous":
             acted = 0.5 * (acted + held[at - 1 : at - 1 + len(ddq), positions:])
         time = first.start + step * np.arange(number, number + len(ddq))
-        states = q[2:-2], dq[1:-1], ddq
-        arm = ArmSide(*(values[:, n:] for values in states)) if positions > n else None
-        block = Motion(time, *(values[:, :n] for values in states), acted, arm)
+        q, dq = q[2:-2], dq[1:-1]
+        arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if positions > n else None
+        block = Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], acted, arm)
         ended = own == 0
         yield block.part(max(0, border - number), samples - border - number if ended else len(block))
         number += len(block)
@@ -123,7 +123,10 @@ def _peeked(recordings: Iterable[Recording]) -> tuple[Recording, Iterator[Record
 
 
 def _extended(recordings: Iterable[Recording], low_pass: LowPass) -> Iterator[tuple[np.ndarray, int]]:
-    """Positions (motor side, then arm side where measured) and torques side by side, with what the filter needs before and after them, and how many samples are measured ones."""
+    """Positions (motor side, then arm side where measured) and torques side by side, and how many samples are measured ones.
+
+    The others are what the filter needs before and after them.
+    """
     begun = False
     end = np.zeros((0, 0))
     for recording in recordings:

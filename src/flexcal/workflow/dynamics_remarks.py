@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from flexcal.dynamics import RegressionData
+from collections.abc import Iterator
+
+from flexcal.dynamics import RegressionData, attenuation
 from flexcal.estimation import Estimate
 from flexcal.model.regressor import INERTIAL
 
 _SHOWN = 3
 _REGROUPED = ("rotor_inertia", "arm_inertia")
 """What the inertias of links take up as a matter of course."""
+_LARGEST_ATTENUATION = 0.5
+"""Of a stiffness, in its standard deviations, that is not worth a remark."""
 
 
 def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
@@ -26,4 +30,13 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...
             heirs = ", ".join(heir for heir, _ in absorbed[name][:_SHOWN]) or "nothing"
             where = "no recording tells" if name not in structural else "these recordings do not tell"
             remarks.append(f"{where} {name} from {heirs}")
-    return tuple(remarks)
+    return (*remarks, *_attenuated(data, estimate))
+
+
+def _attenuated(data: RegressionData, estimate: Estimate) -> Iterator[str]:
+    for name, share in attenuation(data, estimate).items():
+        if share * estimate.values[name] > _LARGEST_ATTENUATION * (estimate.std(name) or 0.0):
+            yield (
+                f"noise of the positions on either side of the drive may have lowered {name} by up to {100 * share:.2g} %, "
+                "which its interval does not hold; larger torques or finer encoders help"
+            )
