@@ -58,7 +58,7 @@ def test_drives_of_the_virtual_robot(recorded, truth: dict[str, float], tmp_path
         half_gap = values[f"{joint}.drive.gap_torque"] / values[f"{joint}.drive.stiffness"]
         assert half_gap == pytest.approx(truth[f"{joint}.backlash"], rel=0.02)
     percent = found.document()["error_percent"]
-    assert set(percent["per_motor"]) == {f"joint_{i}, motor" for i in (1, 2, 3)}
+    assert set(percent["per_motor"]) == {f"joint_{i}" for i in (1, 2, 3)}
     assert max(percent["per_motor"].values()) < 2
     assert (tmp_path / "report.html").exists()
     identified = RobotModel.from_yaml(robot, estimates=False).with_estimate(found.estimate)
@@ -66,7 +66,7 @@ def test_drives_of_the_virtual_robot(recorded, truth: dict[str, float], tmp_path
 
 
 def test_what_is_not_looked_for_shows_elsewhere(recorded, truth: dict[str, float]) -> None:
-    """A gap makes a drive soft; half a sample of hold counts as damping, K T/2 with T = 1/4000 s, where the log is taken for instantaneous."""
+    """A gap makes a drive soft; half a sample of hold counts as damping, K T/2 with T = 1/4000 s."""
     robot, logs = recorded
     blind, late = robot.with_name("blind.yaml"), robot.with_name("late.yaml")
     blind.write_text(robot.read_text().replace("backlash: [joint_2, joint_3]", "backlash: []"))

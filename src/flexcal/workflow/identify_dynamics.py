@@ -70,14 +70,16 @@ class RobotDynamics:
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         x = self.estimate.parameters.coordinates()
-        error, per_joint = self.train.errors(x)
+        error, each = self.train.errors(x)
         percent: dict[str, Any] = {"train": 100 * error, "held_out": None}
         if self.held_out is not None:
-            error, per_joint = self.held_out.errors(x)
+            error, each = self.held_out.errors(x)
             percent["held_out"] = 100 * error
-        each = dict(zip(self.train.observation.equations, 100 * per_joint, strict=True))
-        percent["per_joint"] = {name: each.pop(name) for name in self.train.observation.model.joint_names}
-        percent |= {"per_motor": each} if each else {}
+        joints, springs = self.train.observation.model.joint_names, self.train.observation.springs
+        percent["per_joint"] = dict(zip(joints, 100 * each[: len(joints)], strict=True))
+        if springs:
+            motors = [joints[spring.joint] for spring in springs]
+            percent["per_motor"] = dict(zip(motors, 100 * each[len(joints) :], strict=True))
         return {
             "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
