@@ -13,6 +13,7 @@ from flexcal.dynamics import (
     DriveSpring,
     Motion,
     Observation,
+    Play,
     RegressionData,
     RotorInertia,
     Viscous,
@@ -113,6 +114,17 @@ def test_noise_on_the_arm_side_lowers_the_stiffness_by_what_is_said(
     error = np.std(low) / np.sqrt(len(low))
     assert np.mean(low) > 10 * error, (np.mean(low), error)
     assert np.mean(said) == pytest.approx(np.mean(low), abs=3 * error + 0.1 * np.mean(low))
+
+
+def test_a_gap_seen_from_one_side_is_told_from_nothing(observation: Observation, swing: Motion) -> None:
+    """The offset takes it up by name, the stiffness loses nothing, and no gap is assumed for a next pass."""
+    (spring,) = observation.springs
+    onesided = replace(observation, springs=(replace(spring, play=Play(-1.0, 0.0)),))
+    found = weighted_least_squares(equations(onesided, swing))
+    (hidden,) = (entry for entry in found.dropped if entry.name == "hinge.drive.gap_torque")
+    assert hidden.absorbed_by == (("hinge.drive.torque_offset", pytest.approx(1.0)),)
+    assert found.values["hinge.drive.stiffness"] == pytest.approx(K, rel=1e-8)
+    assert spring.with_play(observation.model, found.values).play == Play(pytest.approx(OFFSET / K), 0.0)
 
 
 def test_a_motion_without_arm_side_is_refused(observation: Observation, swing: Motion) -> None:

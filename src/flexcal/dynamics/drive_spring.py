@@ -52,11 +52,11 @@ class DriveSpring:
         yield Column(f"{name}.arm_inertia", self.joint, arm.ddq[at])
         yield Column(f"{name}.arm_viscous", self.joint, arm.dq[at])
         yield Column(f"{name}.arm_coulomb", self.joint, np.sign(arm.dq[at]))
-        touches = np.ones(len(twist))
-        if self.play is not None:
-            stretch = twist - self.play.centre
-            touches = (np.abs(stretch) >= self.play.half_gap).astype(float)
-            yield Column(f"{name}.drive.gap_torque", motor, touches * np.sign(stretch))
+        stretch = twist if self.play is None else twist - self.play.centre
+        gap = 0.0 if self.play is None else self.play.half_gap
+        touches = (np.abs(stretch) >= gap).astype(float)
         yield Column(f"{name}.drive.stiffness", motor, -touches * twist)
         yield Column(f"{name}.drive.damping", motor, -touches * rate)
         yield Column(f"{name}.drive.torque_offset", motor, touches)
+        if self.play is not None:  # last, so that recordings of one flank tell the offset and not the gap
+            yield Column(f"{name}.drive.gap_torque", motor, touches * np.sign(stretch))
