@@ -1,7 +1,13 @@
 #include "bindings.hpp"
 
-NB_MODULE(_kernels, m) {
+NB_MODULE(KERNELS, m) {
     m.doc() = "flexcal's C++ kernels";
+#if defined(__x86_64__)
+    m.attr("avx2") = static_cast<bool>(__builtin_cpu_supports("avx2"));
+#else
+    m.attr("avx2") = false;
+#endif
     bind_closed_loop(m);
     bind_tree(m);
+    bind_triangle(m);
 }

@@ -4,3 +4,4 @@
 
 void bind_closed_loop(nanobind::module_& m);
 void bind_tree(nanobind::module_& m);
+void bind_triangle(nanobind::module_& m);

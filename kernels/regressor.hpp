@@ -5,6 +5,8 @@
 // velocity v and angular velocity u, feels v·f + u·moment: m gets v·a, m c gets Aᵀ v + a × u, and I gets u·I α + (u × ω)·I ω.
 #pragma once
 #include <array>
+#include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "lanes.hpp"
@@ -115,9 +117,10 @@ class Regressor {
     std::vector<Motion> motions_;
 };
 
-// q, dq, ddq: (samples, n). out: (n, 10 n, samples), the entries that are zero by structure untouched.
+// q, dq, ddq: (samples, n). places: (n, 10 n), for every entry of the regressor the row of out that takes it over the samples, or -1.
+// out: (·, samples); entries that are zero by structure are not written.
 inline void torque_regressor(const Tree& tree, const double* geometry, Vector3 gravity, const double* q, const double* dq, const double* ddq,
-                             std::ptrdiff_t samples, double* out) {
+                             const std::int64_t* places, std::ptrdiff_t samples, double* out) {
     const int n = tree.size();
     Regressor<Lanes> regressor(tree, geometry, gravity);
     std::vector<Lanes> states(3 * static_cast<std::size_t>(n));
@@ -128,8 +131,13 @@ inline void torque_regressor(const Tree& tree, const double* geometry, Vector3 g
             for (int i = 0; i < n; ++i)
                 for (int lane = 0; lane < present; ++lane) states[part * n + i][lane] = sources[part][(s + lane) * n + i];
         regressor.evaluate(states.data(), states.data() + n, states.data() + 2 * n, [&](int joint, int column, const Lanes& torque) {
-            double* p = out + (static_cast<std::ptrdiff_t>(joint) * inertial_size * n + column) * samples + s;
-            for (int lane = 0; lane < present; ++lane) p[lane] = torque[lane];
+            const std::ptrdiff_t place = places[joint * inertial_size * n + column];
+            if (place < 0) return;
+            double* p = out + place * samples + s;
+            if (present == lane_count)
+                std::memcpy(p, &torque, sizeof torque);
+            else
+                for (int lane = 0; lane < present; ++lane) p[lane] = torque[lane];
         });
     }
 }

@@ -17,6 +17,8 @@ using namespace flexcal;
 namespace {
 
 using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
+using Places = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Result = nb::ndarray<nb::numpy, double>;
 
 void expect(const Array& array, std::initializer_list<std::size_t> shape, const char* name) {
@@ -111,20 +113,20 @@ nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& 
     return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
 }
 
-Result torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq) {
+void torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq, Places places, Rows out) {
     const std::size_t n = tree.size(), samples = q.shape(0);
     expect(geometry, {n, 6}, "geometry must be (n, 6)");
     expect(gravity, {3}, "gravity must be (3,)");
     expect(q, {samples, n}, "q must be (samples, n)");
     expect(dq, {samples, n}, "dq must be (samples, n)");
     expect(ddq, {samples, n}, "ddq must be (samples, n)");
-    Buffer regressor({n, inertial_size * n, samples});
-    {
-        nb::gil_scoped_release release;
-        torque_regressor(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(),
-                         static_cast<std::ptrdiff_t>(samples), regressor.data.get());
-    }
-    return regressor.release();
+    if (places.shape(0) != n || places.shape(1) != inertial_size * n) throw nb::value_error("places must be (n, 10 n)");
+    if (out.shape(1) != samples) throw nb::value_error("out must be (rows, samples)");
+    for (std::size_t i = 0; i < places.size(); ++i)
+        if (places.data()[i] >= static_cast<std::int64_t>(out.shape(0))) throw nb::value_error("a place is no row of out");
+    nb::gil_scoped_release release;
+    torque_regressor(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(), places.data(),
+                     static_cast<std::ptrdiff_t>(samples), out.data());
 }
 
 }  // namespace
@@ -141,5 +143,7 @@ void bind_tree(nb::module_& m) {
              "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), its coupling with geometry "
              "(samples, d, 6 n), largest last Newton step (rad).")
         .def("torque_regressor", &torques, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),
-             "Joint torques by mass, first moment and inertia of every link, (n, 10 n, samples).");
+             nb::arg("places"), nb::arg("out").noconvert(),
+             "Joint torques by mass, first moment and inertia of every link, into the rows of out (·, samples) that places (n, 10 n) names; "
+             "-1 leaves an entry out, and those that are zero by structure are not written.");
 }

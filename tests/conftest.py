@@ -16,6 +16,18 @@ settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
 
 ROOT = Path(__file__).parent.parent
+LINK = """<link name="{0}"><inertial><origin xyz="0.1 -0.2 0.05"/><mass value="{1}"/>
+  <inertia ixx="0.4" ixy="0.05" ixz="-0.03" iyy="0.5" iyz="0.02" izz="0.3"/></inertial></link>"""
+JOINT = """<joint name="to_{1}" type="{2}"><parent link="{0}"/><child link="{1}"/><origin xyz="0.3 -0.1 0.2" rpy="0.3 -0.5 0.9"/>
+  <axis xyz="{3}"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>"""
+BRANCHES = [
+    ("base", "trunk", "revolute", "0 0 1"),
+    ("trunk", "left", "revolute", "0 1 0"),
+    ("left", "slider", "prismatic", "1 2 -1"),
+    ("slider", "hand", "revolute", "1 -1 3"),
+    ("trunk", "right", "prismatic", "0 0 1"),
+    ("right", "finger", "revolute", "-1 0 0"),
+]
 
 
 @pytest.fixture(scope="session")
@@ -44,6 +56,19 @@ def ur5(examples: Path) -> RobotModel:
     from flexcal.model import RobotModel
 
     return RobotModel.from_yaml(examples / "ur5_tracker" / "robot.yaml", estimates=False)
+
+
+@pytest.fixture(scope="session")
+def tree(tmp_path_factory: pytest.TempPathFactory) -> RobotModel:
+    """Two branches on a trunk, with slides and skew axes, under tilted gravity."""
+    from flexcal.model import RobotModel
+
+    folder = tmp_path_factory.mktemp("tree")
+    links = [LINK.format(child, 1.5 + i) for i, (_, child, *_) in enumerate(BRANCHES)]
+    parts = ['<link name="base"/>', *links, *(JOINT.format(*branch) for branch in BRANCHES)]
+    (folder / "tree.urdf").write_text(f'<robot name="tree">{"".join(parts)}</robot>')
+    (folder / "robot.yaml").write_text("robot: tree.urdf\ngravity: [1.0, -2.0, -9.0]\n")
+    return RobotModel.from_yaml(folder / "robot.yaml")
 
 
 @pytest.fixture

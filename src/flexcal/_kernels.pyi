@@ -1,5 +1,7 @@
 import numpy as np
 
+avx2: bool
+
 class Tree:
     @staticmethod
     def build(
@@ -43,8 +45,11 @@ class Tree:
         q: np.ndarray,
         dq: np.ndarray,
         ddq: np.ndarray,
-    ) -> np.ndarray: ...
+        places: np.ndarray,
+        out: np.ndarray,
+    ) -> None: ...
 
+def append(triangle: np.ndarray, rows: np.ndarray) -> None: ...
 def closed_loop(
     step: int,
     model: int,

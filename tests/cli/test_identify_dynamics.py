@@ -1,6 +1,10 @@
 """`flexcal identify dynamics` on the TX40's recording: the published values, the torques it predicts, and what it refuses."""
 
 import json
+from collections.abc import Callable
+from contextlib import redirect_stdout
+from functools import cache
+from io import StringIO
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +22,24 @@ def tx40(examples: Path, tmp_path: Path) -> Path:
     return copied(examples / "tx40", tmp_path / "tx40")
 
 
+Results = Callable[..., dict]
+
+
+@pytest.fixture(scope="module")
+def results(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Results:
+    """results(friction, …options): what the verb finds in the recording, each once for all tests, in a folder of its own."""
+
+    @cache
+    def call(friction: str, *options: str) -> dict:
+        folder = with_friction(copied(examples / "tx40", tmp_path_factory.mktemp("tx40") / "robot"), friction)
+        arguments = [str(folder / "robot.yaml"), str(folder / "exciting.parquet"), *options, "--json"]
+        with redirect_stdout(StringIO()) as out:
+            assert main(["identify", "dynamics", *arguments]) == 0
+        return json.loads(out.getvalue())
+
+    return call
+
+
 def identified(folder: Path, capsys: pytest.CaptureFixture[str], *options: str) -> dict:
     arguments = [str(folder / "robot.yaml"), str(folder / "exciting.parquet"), *options, "--json"]
     assert main(["identify", "dynamics", *arguments]) == 0
@@ -32,13 +54,13 @@ def with_friction(folder: Path, friction: str) -> Path:
     return folder
 
 
-def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_published_values(results: Results) -> None:
     """All sixty near what is published, in its standard deviations, but for Coulomb and viscous friction.
 
     Filter and rows near standstill were others there, and the rotor inertia of joint 6 was left out (tests/dynamics has both as they
     were). The published standard deviations take the errors for independent from row to row, which makes them too small.
     """
-    found = identified(with_friction(tx40, "classic"), capsys)
+    found = results("classic")
     assert (found["structural_rank"], found["rank"]) == (61, 61)
     assert found["error_percent"]["held_out"] is None
     base = {row["name"].split()[0]: row for row in found["base_parameters"]}
@@ -54,17 +76,12 @@ def test_the_published_values(tx40: Path, capsys: pytest.CaptureFixture[str]) ->
     assert min(ratio) > 0.85 and 1.4 < np.median(ratio) < 2.2
 
 
-def test_rotor_inertia_of_the_motor_that_two_joints_feel(
-    tx40: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+@pytest.mark.parametrize("friction", ["classic", "auto"])
+def test_rotor_inertia_of_the_motor_that_two_joints_feel(friction: str, results: Results) -> None:
     """Within 5 % of what its maker's file says, 0.00964 seen across and 0.0105 at joint 6 itself (figaroh-examples, TX40_config.yaml)."""
-    for friction in ("classic", "auto"):
-        found = identified(with_friction(tx40, friction), capsys)["parameters"]
-        assert found["joint_6.rotor_inertia_at_joint_5"]["estimate"] == pytest.approx(0.00964, rel=0.05)
-        assert found["joint_6.rotor_inertia"]["estimate"] == pytest.approx(0.0105, rel=0.05)
-        (tx40 / "robot.yaml").write_text(
-            (tx40 / "robot.yaml").read_text().replace(f", friction: {friction}", "")
-        )
+    found = results(friction)["parameters"]
+    assert found["joint_6.rotor_inertia_at_joint_5"]["estimate"] == pytest.approx(0.00964, rel=0.05)
+    assert found["joint_6.rotor_inertia"]["estimate"] == pytest.approx(0.0105, rel=0.05)
 
 
 def test_torques_that_the_fit_never_saw(
@@ -90,10 +107,10 @@ def test_torques_that_the_fit_never_saw(
 
 
 def test_friction_chosen_inside_the_training_part_predicts_the_rest(
-    tx40: Path, capsys: pytest.CaptureFixture[str]
+    tx40: Path, capsys: pytest.CaptureFixture[str], results: Results
 ) -> None:
     """No row of the last 30 % is looked at by the choice: with other torques there it chooses the same, after the same trials."""
-    found = identified(tx40, capsys, "--hold-out", "last:0.3")
+    found = results("auto", "--hold-out", "last:0.3")
     assert found["error_percent"]["held_out"] < 5.2
     assert found["structural_rank"] == 61 < found["rank"]
     tried = {tuple(row["terms"]): row["cross_validation_percent"] for row in found["friction_tried"]}
@@ -133,22 +150,26 @@ def test_every_declared_term_is_in_the_estimate(tx40: Path, capsys: pytest.Captu
     assert set(found["friction_shapes"]) == {"stribeck", "presliding", "warm_up"}
 
 
-def test_the_robot_takes_the_estimate_and_a_second_run_gives_it_again(
-    tx40: Path, capsys: pytest.CaptureFixture[str]
+def test_the_robot_takes_the_estimate_which_changes_no_later_one(
+    tx40: Path, capsys: pytest.CaptureFixture[str], results: Results
 ) -> None:
-    first = identified(tx40, capsys)
+    plain = (tx40 / "robot.yaml").read_text()
+    first = identified(with_friction(tx40, "classic"), capsys)
     robot = RobotModel.from_yaml(tx40 / "robot.yaml")
     assert robot.value("joint_1.viscous") == pytest.approx(first["parameters"]["joint_1.viscous"]["estimate"])
     assert robot.value("link_3.mc_y") == pytest.approx(first["parameters"]["link_3.mc_y"]["estimate"])
-    assert identified(tx40, capsys)["parameters"] == first["parameters"]
+    (tx40 / "robot.yaml").write_text(plain)
+    assert identified(with_friction(tx40, "auto"), capsys)["parameters"] == results("auto")["parameters"]
 
 
-def test_what_robot_yaml_lacks_is_proposed(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_robot_yaml_lacks_is_proposed(
+    tx40: Path, capsys: pytest.CaptureFixture[str], results: Results
+) -> None:
     """The TX40's velocities reach 3 Hz; the proposal explains unseen torques about as well as what was chosen by hand."""
     robot = with_friction(tx40, "classic") / "robot.yaml"
     line = "dynamics: {cutoff_hz: 100, decimation: 100, friction: classic}"
     declared = robot.read_text()
-    assert identified(tx40, capsys)["signals"] == {"cutoff_hz": 100, "decimation": 100, "proposed": []}
+    assert results("classic")["signals"] == {"cutoff_hz": 100, "decimation": 100, "proposed": []}
     robot.write_text(declared.replace(line, "dynamics: {decimation: 100, friction: classic}"))
     found = identified(tx40, capsys, "--hold-out", "last:0.3")
     assert found["signals"]["proposed"] == ["cutoff_hz"]
@@ -212,19 +233,15 @@ def test_two_ways_to_validate_exclude_each_other(tx40: Path, capsys: pytest.Capt
     assert "exclude each other" in refusal(arguments, capsys)
 
 
-def test_rows_that_are_grossly_wrong(tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_rows_that_are_grossly_wrong(
+    tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, results: Results
+) -> None:
     """A sensor that drops to zero now and then: irls predicts the intact torques nearly as wls does without, wls does not."""
     log = with_friction(tx40, "classic") / "exciting.parquet"
     table = pl.read_parquet(log)
-    arguments = [
-        "--validate",
-        str(tmp_path / "intact.parquet"),
-        "--out",
-        str(tmp_path / "out"),
-        "--estimator",
-    ]
     table.write_parquet(tmp_path / "intact.parquet")
-    intact = identified(tx40, capsys, *arguments, "wls")["error_percent"]["held_out"]
+    arguments = ["--validate", str(tmp_path / "intact.parquet"), "--estimator"]
+    intact = results("classic")["error_percent"]["train"]
     lost = np.arange(len(table)) % 2000 < 100
     torques = [
         pl.when(pl.Series(lost)).then(0.0).otherwise(pl.col(f"torque_{i}")).alias(f"torque_{i}")
@@ -238,13 +255,14 @@ def test_rows_that_are_grossly_wrong(tx40: Path, capsys: pytest.CaptureFixture[s
     assert linear > intact + 2.0
 
 
-def test_bodies_that_could_be_built(tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_bodies_that_could_be_built(
+    tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, results: Results
+) -> None:
     """sdp finds them, wls says that it has not; the URDF gets them."""
-    robot = tx40 / "robot.yaml"
-    classic = "dynamics: {friction: [viscous, coulomb, torque_offset], "
-    robot.write_text(robot.read_text().replace("dynamics: {", classic))
-    held = ("--hold-out", "last:0.3", "--out", str(tmp_path / "out"))
-    linear, found = (identified(tx40, capsys, *held, "--estimator", name) for name in ("wls", "sdp"))
+    linear, found = (
+        results("classic", "--hold-out", "last:0.3", "--estimator", name) for name in ("wls", "sdp")
+    )
+    with_friction(tx40, "classic")
     assert linear["bodiless_links"] and found["bodiless_links"] == []
     assert found["error_percent"]["held_out"] < linear["error_percent"]["held_out"] + 0.05
     arguments = [str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")]
@@ -270,4 +288,12 @@ def test_a_robot_that_stands_still_is_refused(tx40: Path, capsys: pytest.Capture
     assert main(["identify", "dynamics", str(tx40 / "robot.yaml"), str(log)]) == 2
     error = capsys.readouterr().err
     assert "exciting.parquet" in error and "the robot stands still" in error
+    assert not (tx40 / "estimates.yaml").exists()
+
+
+def test_torques_of_motors_without_their_gears(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = tx40 / "robot.yaml"
+    robot.write_text(robot.read_text().replace("    matrix: joint_from_motor_torque.csv\n", ""))
+    message = refusal([str(robot), str(tx40 / "exciting.parquet")], capsys)
+    assert "exciting.parquet: the torque of joint_2 follows only" in message and "gear ratios" in message
     assert not (tx40 / "estimates.yaml").exists()

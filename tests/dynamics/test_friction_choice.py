@@ -94,7 +94,7 @@ def test_the_error_is_that_of_predicting_each_block_from_rows_apart_from_it(
     number = np.concatenate([p.number for p in parts]) // system.batch_rows
     matrices, torques = [], []
     for joint, members in enumerate(observation.members):
-        stack = np.hstack([p.systems[joint] for p in parts]).T
+        stack = np.hstack([np.vstack([p.columns[joint], p.torque[joint]]) for p in parts]).T
         wide = np.zeros((len(stack), width))
         wide[:, members] = stack[:, :-1]
         matrices.append(wide)

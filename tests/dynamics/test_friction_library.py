@@ -125,7 +125,7 @@ def test_terms_that_remember_do_not_see_the_blocks(
 
     def all_rows(window: Window) -> np.ndarray:
         parts = list(rows.rows(observation, swing, decimation, window))
-        return np.hstack([np.vstack(part.systems) for part in parts])
+        return np.hstack([np.vstack(part.reduced) for part in parts])
 
     monkeypatch.setattr(rows, "_BLOCK", 10**6)
     whole = all_rows(Window())

@@ -19,7 +19,7 @@ from flexcal.dynamics import (
     weighted_least_squares,
 )
 from flexcal.dynamics.rows import rows
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.progress import silent
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.treatment import Treatment
@@ -32,17 +32,18 @@ def logs(swing: Motion, tmp_path: Path) -> list[Path]:
     rng = np.random.default_rng(9)
     paths = [tmp_path / "one.parquet", tmp_path / "two.csv"]
     for path in paths:
-        torque = np.cos(swing.q) + 0.1 * rng.normal(size=swing.q.shape)
+        torque = 20.0 * np.cos(swing.q) + 0.1 * rng.normal(size=swing.q.shape)
         write_recording(path, Recording(STEP, swing.q, torque, start=1.0))
     return paths
 
 
 def test_blocks_give_the_whole(
-    logs: list[Path], observation: Observation, monkeypatch: pytest.MonkeyPatch
+    logs: list[Path], observation: Observation, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(joint_log, "_ROWS", 333)
     for path in logs:
-        log, whole = JointLog(path, observation.model, 10.0), read_recording(path, observation.model)
+        log = JointLog.read(path, observation.model, 10.0, tmp_path)
+        whole = read_recording(path, observation.model)
         motion = Motion.of(whole, 10.0)
         assert (log.samples, log.span) == (len(motion), (1.0, pytest.approx(1.0 + whole.duration)))
         np.testing.assert_allclose(log.top_speed, motion.top_speed, rtol=1e-12)
@@ -61,12 +62,12 @@ def test_blocks_give_the_whole(
         np.testing.assert_allclose(estimates[0].covariance, estimates[1].covariance, rtol=1e-8, atol=1e-18)
 
 
-def test_processes_change_nothing(logs: list[Path], observation: Observation) -> None:
+def test_processes_change_nothing(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
     treatment = Treatment(10.0, Decimation(4), True)
 
     def systems(jobs: int) -> list[ExperimentSystem]:
         parts = []
-        for log in read_logs(logs, observation.model, treatment, jobs=jobs):
+        for log in read_logs(logs, observation.model, treatment, tmp_path, jobs=jobs):
             early, late = split(log, treatment, 0.3)
             assert late is not None
             parts += [LogPart(log, early), LogPart(log, late)]
@@ -101,4 +102,9 @@ def test_a_gap_is_refused(swing: Motion, observation: Observation, tmp_path: Pat
     lines = path.read_text().splitlines(keepends=True)
     path.write_text("".join(lines[:800] + lines[900:]))
     with pytest.raises(InputError, match=r"log\.csv: a gap of 0\.505 s precedes the sample at 4\.495 s"):
-        _ = JointLog(path, observation.model, 10.0).samples
+        JointLog.read(path, observation.model, 10.0, tmp_path)
+
+
+def test_no_room_for_the_filtered_log(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
+    with pytest.raises(FlexcalError, match=r"cannot take the filtered log \(No such file.*set TMPDIR"):
+        JointLog.read(logs[0], observation.model, 10.0, tmp_path / "nowhere")

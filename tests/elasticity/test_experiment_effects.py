@@ -9,7 +9,7 @@ import pytest
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity import ReferenceMotion, Tolerances, reference_shift
-from flexcal.elasticity.gap import multisine_torque, open_share
+from flexcal.elasticity.gap import gap_compliance, multisine_torque
 from flexcal.elasticity.model_error import LowRank, over_frequency
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
@@ -56,15 +56,19 @@ def test_shift_is_quadratic_in_the_amplitude_and_vanishes_at_rest(tx90l, poses):
     np.testing.assert_allclose(shifts[2], 4 * shifts[1], atol=0.02 * np.abs(shifts[2]).max())
 
 
-def test_share_of_time_a_gap_is_open(tx90l, poses):
-    """Without gravity on the drive it is 2 b k / (√2π σ); a drive held far from zero torque never opens its gap."""
+def test_compliance_of_a_gap(tx90l, poses, rng):
+    """That of the twist against a Gaussian torque through zero; a drive held far from zero torque never opens its gap."""
     q, plan = poses["default"][0], plan_of(tx90l, poses["default"][:1])
-    share = open_share(tx90l, q, None, plan).mean(axis=0)
-    size = multisine_torque(tx90l, q, None, plan)
-    assert share[0] == pytest.approx(2 * tx90l.stiffness[0, 2] / (np.sqrt(2 * np.pi) * size[0]), rel=1e-6)
-    assert 1e-5 * share[1] < 1e-6
-    moving = open_share(tx90l, q, None, replace(plan, reference_amplitude=np.deg2rad(3.0)))
-    assert moving.mean(axis=0)[1] > share[1]
+    added = gap_compliance(tx90l, q, None, plan).mean(axis=0)
+    torque = multisine_torque(tx90l, q, None, plan)[0] * rng.standard_normal(400_000)
+    stiffness, half_gap = tx90l.stiffness[0, 2], 5e-5
+    twist = torque / stiffness + half_gap * np.sign(torque)
+    compliance = (twist @ torque) / (torque @ torque)
+    assert half_gap * added[0] > 0.2
+    assert 1 / stiffness * (1 + half_gap * added[0]) == pytest.approx(compliance, rel=2e-3)
+    assert 1e-5 * added[1] < 1e-6
+    moving = gap_compliance(tx90l, q, None, replace(plan, reference_amplitude=np.deg2rad(3.0)))
+    assert moving.mean(axis=0)[1] > added[1]
 
 
 def test_low_rank_whitening(rng):

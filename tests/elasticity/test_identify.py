@@ -20,7 +20,7 @@ from flexcal.elasticity import (
     reference_shift,
     spring_names,
 )
-from flexcal.elasticity.gap import open_share
+from flexcal.elasticity.gap import gap_compliance
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
 from flexcal.estimation import Parameters
@@ -235,9 +235,9 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
     half_gap, responses = {1: 4e-5, 2: 6e-5}, []
     dragging = replace(tx90l, viscous=tx90l.viscous * np.append(VISCOUS, np.ones(3)))
     for q in poses["default"]:
-        share = open_share(dragging, q, None, plan).mean(axis=0)
+        added = gap_compliance(dragging, q, None, plan)[0]
         soft = {
-            f"joint_{axis + 1}.drive.{key}": np.exp(-size * share[axis])
+            f"joint_{axis + 1}.drive.{key}": 1 / (1 + size * added[axis])
             for axis, size in half_gap.items()
             for key in ("stiffness", "damping")
         }

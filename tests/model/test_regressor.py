@@ -10,29 +10,6 @@ from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, inertial_names, inertial_parameters, torque_regressor
 
 PINOCCHIO_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # its Iyy comes before Ixz
-LINK = """<link name="{0}"><inertial><origin xyz="0.1 -0.2 0.05"/><mass value="{1}"/>
-  <inertia ixx="0.4" ixy="0.05" ixz="-0.03" iyy="0.5" iyz="0.02" izz="0.3"/></inertial></link>"""
-JOINT = """<joint name="to_{1}" type="{2}"><parent link="{0}"/><child link="{1}"/><origin xyz="0.3 -0.1 0.2" rpy="0.3 -0.5 0.9"/>
-  <axis xyz="{3}"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>"""
-BRANCHES = [
-    ("base", "trunk", "revolute", "0 0 1"),
-    ("trunk", "left", "revolute", "0 1 0"),
-    ("left", "slider", "prismatic", "1 2 -1"),
-    ("slider", "hand", "revolute", "1 -1 3"),
-    ("trunk", "right", "prismatic", "0 0 1"),
-    ("right", "finger", "revolute", "-1 0 0"),
-]
-
-
-@pytest.fixture(scope="module")
-def tree(tmp_path_factory: pytest.TempPathFactory) -> RobotModel:
-    """Two branches on a trunk, with slides and skew axes, under tilted gravity."""
-    folder = tmp_path_factory.mktemp("tree")
-    links = [LINK.format(child, 1.5 + i) for i, (_, child, *_) in enumerate(BRANCHES)]
-    parts = ['<link name="base"/>', *links, *(JOINT.format(*branch) for branch in BRANCHES)]
-    (folder / "tree.urdf").write_text(f'<robot name="tree">{"".join(parts)}</robot>')
-    (folder / "robot.yaml").write_text("robot: tree.urdf\ngravity: [1.0, -2.0, -9.0]\n")
-    return RobotModel.from_yaml(folder / "robot.yaml")
 
 
 @pytest.fixture(params=["tx90l", "ur5", "tree"])

@@ -112,6 +112,8 @@ def test_what_the_flexible_model_needs(recorded, tmp_path: Path) -> None:
         with pytest.raises(InputError, match=sentence) as refusal:
             identify_robot_dynamics(file, [measured], flexible=True, out=tmp_path / "out")
         assert "\n" not in str(refusal.value)
+    with pytest.raises(InputError, match="--estimator energy is for rigid robots; take one of wls"):
+        identify_robot_dynamics(robot, logs, flexible=True, estimator="energy", out=tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal import _kernels
 from flexcal.cell.plant import Plant
 from flexcal.errors import FlexcalError
+from flexcal.kernels import closed_loop
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +70,7 @@ def run_loop(
     data.qvel[:] = start_rate
     shape = command.torque.shape
     log = LoopLog(np.empty(shape), np.empty(shape), np.empty(shape))
-    done = _kernels.closed_loop(
+    done = closed_loop(
         step=_step_address(),
         model=model._address,
         data=data._address,

@@ -33,9 +33,11 @@ class IdentifyDynamics:
     """Keep the last share of every log's time out of the fit, and predict its torques."""
     validate: Annotated[tuple[Path, ...], arg(metavar="LOG", help_behavior_hint="")] = ()
     """Logs that the fit does not see, whose torques it predicts."""
-    estimator: Literal["wls", "ols", "sdp", "irls"] = "wls"
+    estimator: Literal["wls", "ols", "sdp", "irls", "energy", "power", "tls", "ml", "ekf"] = "wls"
     """wls: every joint and log by its own noise; ols: every equation alike; sdp: as wls, among robots that can be built;
-    irls: as wls, with single rows that miss by far held back."""
+    irls: as wls, with single rows that miss by far held back; energy, power: all joints together in one equation a row;
+    tls: as wls, knowing the noise of the positions; ml: from the scatter between four or more periods of one motion;
+    ekf: in one go with positions and velocities, as a Kalman filter."""
     flexible: bool = False
     """Tell motors and arm of elastic joints apart, by logs that have the arm side (qa1…), and find the stiffness of the drives."""
     jobs: Annotated[int, arg(metavar="N")] = 1

@@ -3,6 +3,7 @@
 from flexcal.dynamics.arm_side import ArmSide
 from flexcal.dynamics.attenuation import attenuation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.column_errors import column_errors, noisy_logs
 from flexcal.dynamics.drive_play import with_play
 from flexcal.dynamics.drive_spring import DriveSpring, Play
 from flexcal.dynamics.drive_terms import (
@@ -15,6 +16,8 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.ekf import kalman_filter
+from flexcal.dynamics.energy_model import energy_least_squares
 from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
 from flexcal.dynamics.feasible import feasible_least_squares
@@ -31,14 +34,17 @@ from flexcal.dynamics.friction_selection import FrictionSelection, select_fricti
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
 from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
+from flexcal.dynamics.maximum_likelihood import maximum_likelihood
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.power_model import power_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.tls import total_least_squares
 from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
@@ -82,17 +88,24 @@ __all__ = [
     "Window",
     "attenuation",
     "batches_each",
+    "column_errors",
+    "energy_least_squares",
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
     "huber_least_squares",
     "identify_with_prior",
+    "kalman_filter",
     "log_blocks",
+    "maximum_likelihood",
     "motion_bandwidth",
+    "noisy_logs",
     "observe",
     "ordinary_least_squares",
+    "power_least_squares",
     "predict_torques",
     "select_friction",
+    "total_least_squares",
     "weighted_least_squares",
     "with_play",
 ]

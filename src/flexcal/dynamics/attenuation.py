@@ -17,21 +17,21 @@ def attenuation(data: RegressionData, estimate: Estimate) -> dict[str, float]:
     residual of its equation, K σ_e ≤ σ, so that the share is at most N (σ / (K ‖t‖))²: no size of the noise need be known.
     Raises `FlexcalError` as `noise_levels` does.
     """
-    if not data.observation.springs:
+    names = data.names
+    stiffnesses = [name for name in names if name.endswith(".drive.stiffness")]
+    if not stiffnesses:
         return {}
-    names, model = data.names, data.observation.model
     matrix = weighted_system(data, noise_levels(data)).matrix
     seen = [i for i, known in enumerate(estimate.identifiable) if known]
     norms = np.linalg.norm(matrix, axis=0)
     found: dict[str, float] = {}
-    for motor, spring in enumerate(data.observation.springs, start=model.n):
-        name = f"{model.joint_names[spring.joint]}.drive.stiffness"
+    for name in stiffnesses:
         own = names.index(name)
         if own not in seen:
             continue
         others = [i for i in seen if i != own]
         basis = np.linalg.qr(matrix[:, others] / norms[others])[0]
         left = matrix[:, own] - basis @ (basis.T @ matrix[:, own])
-        rows = sum(s.triangle.rows for s in data.subsystems if s.equation == motor)
+        rows = sum(s.triangle.rows for s in data.subsystems if own in s.members)
         found[name] = rows / float(estimate.values[name] ** 2 * (left @ left))
     return found

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.link_columns import random_states, scale_by_kind
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.estimation import Identifiability, analyse
 
 _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z", "mass")
 """Of a link, in the order in which a person keeps them: the mass and what lies along the axis are regrouped first."""
-_SEED = 1991
 _SAMPLES_PER_PARAMETER = 3
 
 
@@ -44,26 +44,16 @@ class BaseParameters:
         before first moment before mass, then rotor inertias, then the other terms.
         """
         model, names = observation.model, observation.names
-        rng = np.random.default_rng(_SEED)
         samples = _SAMPLES_PER_PARAMETER * len(names)
-        q = rng.uniform(-np.pi, np.pi, (samples, model.n))
-        dq, ddq = rng.uniform(-2.0, 2.0, (2, samples, model.n))
-        arm = ArmSide(rng.uniform(-np.pi, np.pi, q.shape), *rng.uniform(-2.0, 2.0, (2, samples, model.n)))
+        q, dq, ddq = random_states(model, samples)
+        arm = ArmSide(*np.roll((q, dq, ddq), 1, axis=1))
         columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q), arm))
         matrix = np.zeros((len(columns) * samples, len(names)))
         for k, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
             matrix[k * samples : (k + 1) * samples, members] = block.T
         prefer = [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
         prefer += [name for name in names if name not in set(prefer)]
-        return cls(analyse(matrix, names, scale=_scale(matrix, names), prefer=prefer))
-
-
-def _scale(matrix: np.ndarray, names: tuple[str, ...]) -> np.ndarray:
-    """One scale for all parameters of a kind: a column that is only the URDF's rounding stays as small as it is."""
-    kinds = [name.rpartition(".")[2].rstrip("xyz") for name in names]
-    norms = np.linalg.norm(matrix, axis=0)
-    largest = {kind: max(n for k, n in zip(kinds, norms, strict=True) if k == kind) for kind in set(kinds)}
-    return np.array([1.0 / (largest[kind] or 1.0) for kind in kinds])
+        return cls(analyse(matrix, names, scale=scale_by_kind(matrix, names), prefer=prefer))
 
 
 def _written(kept: str, row: np.ndarray, names: tuple[str, ...]) -> str:

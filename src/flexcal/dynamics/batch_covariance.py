@@ -77,7 +77,7 @@ def _scores(
     root: np.ndarray,
 ) -> list[_Scores]:
     place = {number: i for i, number in enumerate(kept)}
-    equations = len(data.observation.equations)
+    equations = len(data.observation.members)
     columns = [
         np.array([i for i, m in enumerate(members) if m in place]) for members in data.observation.members
     ]

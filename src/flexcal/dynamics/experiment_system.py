@@ -8,20 +8,20 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.filtering import Decimation
-from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.rows import Experiment, Rows, Window, rows
 from flexcal.dynamics.triangle import triangular
 from flexcal.errors import FlexcalError
+from flexcal.kernels import append
 
 BATCHES = 128
 """Batches of an experiment, at most: enough to see how its errors hang together in time, however long it is."""
-_TOGETHER = 1024
-"""Rows that are brought into triangular form at once."""
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Rows that follow each other: `factors` has for every equation of the observation R of [W, Y], or the rows where they are fewer.
+    """Rows that follow each other: `factors` has for every equation of the observation a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by
+    reflections of its rows.
 
     `number` counts the batches of the experiment, whatever is left out; a batch without rows does not exist.
     """
@@ -45,7 +45,7 @@ class ExperimentSystem:
 
 
 def experiment_system(
-    observation: Observation,
+    observation: Equations,
     experiment: Experiment,
     decimation: Decimation,
     window: Window,
@@ -74,15 +74,15 @@ def experiment_system(
         if len(block):
             first = min(first, float(block.time[0]))
             last = float(block.time[-1])
-        if not all(np.isfinite(system).all() for system in block.systems):
-            raise FlexcalError(f"the equations of {experiment.name} are not finite.")
         for part in _split(block, length):
             number = int(part.number[0]) // length
             if current is None or current.number != number:
                 found += [] if current is None else [current.batch()]
-                current = _Growing(number, len(part.systems))
+                current = _Growing(number, observation)
             current.add(part)
     found += [] if current is None else [current.batch()]
+    if not all(np.isfinite(factor).all() for batch in found for factor in batch.factors):
+        raise FlexcalError(f"the equations of {experiment.name} are not finite.")
     if not found:
         raise FlexcalError(
             f"no equation is left of {experiment.name}: it is too short for its filters, or the robot stands still in it."
@@ -91,29 +91,26 @@ def experiment_system(
 
 
 class _Growing:
-    """A batch to which rows come; it holds few of them."""
+    """A batch to which rows come; it holds none of them."""
 
-    def __init__(self, number: int, equations: int) -> None:
+    def __init__(self, number: int, observation: Equations) -> None:
         self.number = number
         self._rows = 0
-        self._held: list[list[np.ndarray]] = [[] for _ in range(equations)]
-        self._waiting = 0
+        self._spread = observation.spread
+        self._factors = [np.zeros((width, width)) for width in observation.widths]
 
     def add(self, part: Rows) -> None:
-        for held, system in zip(self._held, part.systems, strict=True):
-            held.append(system.T)
+        """Spends the rows: what they are in is overwritten."""
         self._rows += len(part)
-        self._waiting += len(part)
-        if self._waiting >= _TOGETHER:
-            self._reduce()
+        for factor, system in zip(self._factors, part.reduced, strict=True):
+            append(factor, np.ascontiguousarray(system))
 
     def batch(self) -> Batch:
-        self._reduce()
-        return Batch(self.number, self._rows, tuple(held[0] for held in self._held))
-
-    def _reduce(self) -> None:
-        self._held = [[reduced(held)] for held in self._held]
-        self._waiting = 0
+        whole = [
+            np.column_stack([factor[:, :-1] @ spread, factor[:, -1]])
+            for factor, spread in zip(self._factors, self._spread, strict=True)
+        ]
+        return Batch(self.number, self._rows, tuple(whole))
 
 
 def reduced(systems: list[np.ndarray]) -> np.ndarray:

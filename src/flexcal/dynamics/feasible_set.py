@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flexcal.dynamics.cone import Cone
-from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model import Inertia, RobotModel
 from flexcal.model.pseudo_inertia import PSEUDO_INERTIA, pseudo_inertia
@@ -31,7 +31,7 @@ _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.05
 """kg and m, of a link of which neither URDF nor the other links tell anything."""
 
 
-def feasible_set(observation: Observation, system: Triangle) -> tuple[Cone, ...]:
+def feasible_set(observation: Equations, system: Triangle) -> tuple[Cone, ...]:
     """The cones of all links and drives of an observation, whose weighted equations are `system`.
 
     A link's pseudo-inertia is positive definite (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018), with CAD as its reference and the
@@ -73,7 +73,7 @@ def _guessed(model: RobotModel, link: int) -> Inertia:
     return Inertia(mass, np.zeros(3), 0.4 * mass * radius**2 * np.eye(3))
 
 
-def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
+def _drives(observation: Equations, system: Triangle) -> Iterator[Cone]:
     model, names = observation.model, observation.names
     torque, sizes = float(np.linalg.norm(system.right)) or 1.0, np.linalg.norm(system.matrix, axis=0)
     largest: dict[str, float] = {}

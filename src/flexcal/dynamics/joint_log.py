@@ -1,17 +1,18 @@
-"""A joint log on disk as an experiment: read anew in blocks at every pass, so that it may be of any length."""
+"""A joint log on disk as an experiment: filtered once, then gone through again and again in blocks, so that it may be of any length."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from pathlib import Path
+from tempfile import NamedTemporaryFile
 
 import numpy as np
 
 from flexcal.data import Recording, read_recording_blocks
-from flexcal.dynamics.motion import Motion, filtered_motion
-from flexcal.errors import InputError
+from flexcal.dynamics.log_faults import LogFaults
+from flexcal.dynamics.motion import FilteredPositions, Motion, filtered_positions
+from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 
 _ROWS = 20_000
@@ -20,70 +21,72 @@ _ROWS = 20_000
 
 @dataclass(frozen=True, eq=False)
 class JointLog:
-    """The log at `path` of a robot, its positions low-pass filtered at `cutoff_hz`.
+    """The log at `path`, its positions low-pass filtered: with the torques in the file `filtered`, in parts that begin at `starts`, s.
 
-    Reading raises `InputError` as `log_blocks` does; filtering raises `FlexcalError` as `filtered_motion` does.
+    The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `span` are the
+    times of the first and the last sample of the log itself, s.
     """
 
     path: Path
-    model: RobotModel
-    cutoff_hz: float
+    filtered: Path
+    starts: tuple[float, ...]
+    samples: int
+    time_step: float
+    top_speed: np.ndarray
+    span: tuple[float, float]
 
-    @property
-    def name(self) -> str:
-        """The path."""
-        return str(self.path)
+    @classmethod
+    def read(cls, path: Path, model: RobotModel, cutoff_hz: float, scratch: Path) -> JointLog:
+        """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints,
+        and 48 for their arm sides.
 
-    @property
-    def samples(self) -> int:
-        """Samples of the filtered motion."""
-        return self._summary[0]
-
-    @property
-    def top_speed(self) -> np.ndarray:
-        """The largest |q̇| of every joint (n,)."""
-        return self._summary[1]
-
-    @property
-    def span(self) -> tuple[float, float]:
-        """Times of the first and the last sample of the file, s."""
-        return self._summary[2]
-
-    @property
-    def time_step(self) -> float:
-        """s."""
-        return self._summary[3]
-
-    def surveyed(self) -> JointLog:
-        """The same, gone through once, so that what it says of itself is known."""
-        _ = self._summary
-        return self
-
-    def blocks(self) -> Iterator[Motion]:
-        """The filtered motion in parts that follow each other."""
-        return self._filtered(log_blocks(self.path, self.model))
-
-    def _filtered(self, recordings: Iterator[Recording]) -> Iterator[Motion]:
-        return filtered_motion(recordings, self.cutoff_hz, self.model.config.dynamics.torque)
-
-    @cached_property
-    def _summary(self) -> tuple[int, np.ndarray, tuple[float, float], float]:
+        Raises `InputError` as `log_blocks` does, and `FlexcalError` as `filtered_positions` does and where the folder cannot take it.
+        """
         read: list[tuple[float, float, float]] = []
 
         def watched() -> Iterator[Recording]:
-            for recording in log_blocks(self.path, self.model):
+            for recording in log_blocks(path, model):
                 read.append((recording.start, recording.start + recording.duration, recording.time_step))
                 yield recording
 
-        samples, top_speed = 0, np.zeros(self.model.n)
-        for motion in self._filtered(watched()):
-            samples += len(motion)
-            top_speed = np.maximum(top_speed, np.abs(motion.dq).max(axis=0, initial=0.0))
-        return samples, top_speed, (read[0][0], read[-1][1]), read[0][2]
+        starts, samples, top_speed = [], 0, np.zeros(model.n)
+        try:
+            with NamedTemporaryFile(dir=scratch, suffix=".npy", delete=False) as stream:
+                for part in filtered_positions(watched(), cutoff_hz, model.config.dynamics.torque):
+                    if not len(part):
+                        continue
+                    np.save(stream, part.q.T)
+                    np.save(stream, part.torque.T)
+                    starts.append(part.start)
+                    samples += len(part)
+                    top_speed = np.maximum(top_speed, part.motion().top_speed)
+        except OSError as problem:
+            raise FlexcalError(
+                f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
+                "set TMPDIR to a folder with room for 144 bytes a sample."
+            ) from problem
+        span = (read[0][0], read[-1][1])
+        return cls(path, Path(stream.name), tuple(starts), samples, read[0][2], top_speed, span)
+
+    @property
+    def name(self) -> str:
+        """The path of the log."""
+        return str(self.path)
+
+    def blocks(self) -> Iterator[Motion]:
+        """The filtered motion in parts that follow each other."""
+        with self.filtered.open("rb") as stream:
+            for start in self.starts:
+                q, torque = np.load(stream).T, np.load(stream).T
+                yield FilteredPositions(start, self.time_step, q, torque).motion()
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
-    """The recording of a log in parts that follow each other; raises `InputError` as `read_recording` does, and for a gap."""
+    """The recording of a log in parts that follow each other.
+
+    Raises `InputError` as `read_recording` does, for a gap, and at the end for what `LogFaults` finds.
+    """
+    faults = LogFaults(path, model)
     for recording in read_recording_blocks(path, model, rows=_ROWS):
         base = recording.time_base
         if base is not None and base.gap > 0:
@@ -91,4 +94,6 @@ def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
                 f"{path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
                 f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
             )
+        faults.add(recording)
         yield recording
+    faults.check()

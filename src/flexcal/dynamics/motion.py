@@ -75,15 +75,53 @@ class Motion:
         return cls.joined(filtered_motion([recording], cutoff_hz, torque))
 
 
+@dataclass(frozen=True, eq=False)
+class FilteredPositions:
+    """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before.
+
+    Where the arm side was measured too, its positions follow those of the motors: `q` (N + 4, 2 n).
+    """
+
+    start: float
+    time_step: float
+    q: np.ndarray
+    torque: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.torque)
+
+    def part(self, start: int, stop: int) -> FilteredPositions:
+        """Samples from `start` to before `stop`."""
+        time = self.start + start * self.time_step
+        return FilteredPositions(time, self.time_step, self.q[start : stop + 4], self.torque[start:stop])
+
+    def motion(self) -> Motion:
+        """With velocities and accelerations by central differences."""
+        dq = (self.q[2:] - self.q[:-2]) / (2 * self.time_step)
+        ddq = (dq[2:] - dq[:-2]) / (2 * self.time_step)
+        time = self.start + self.time_step * np.arange(len(self))
+        n = self.torque.shape[1]
+        q, dq = self.q[2:-2], dq[1:-1]
+        arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if q.shape[1] > n else None
+        return Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], self.torque, arm)
+
+
 def filtered_motion(
     recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog = "instantaneous"
 ) -> Iterator[Motion]:
-    """Positions through a zero-phase low-pass, differentiated by central differences; the torque at the same instants.
+    """The motions of `filtered_positions`; raises `FlexcalError` as that does."""
+    return (part.motion() for part in filtered_positions(recordings, cutoff_hz, torque))
+
+
+def filtered_positions(
+    recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog = "instantaneous"
+) -> Iterator[FilteredPositions]:
+    """Positions through a zero-phase low-pass; the torque at the same instants.
 
     A logged `torque` that is held until the next sample, or is the mean until then, belongs to the middle of that step: the torque at a
     sample is the mean of its own and the one before. Half a sample of delay between torque and twist would count as K T/2 of damping.
 
-    `recordings` follow each other without a seam, as blocks of one log; so do the motions, and they do not depend on where the blocks
+    `recordings` follow each other without a seam, as blocks of one log; so do the parts, and they do not depend on where the blocks
     are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
     the samples are too few for it.
     """
@@ -100,20 +138,16 @@ def filtered_motion(
         q = low_pass.apply(held[:, :positions])
         if len(q) < 5:
             continue
-        dq = (q[2:] - q[:-2]) / (2 * step)
-        ddq = (dq[2:] - dq[:-2]) / (2 * step)
-        at = low_pass.support + 2
-        acted = held[at : at + len(ddq), positions:]
+        at, count = low_pass.support + 2, len(q) - 4
+        acted = held[at : at + count, positions:]
         if torque != "instantaneous":
-            acted = 0.5 * (acted + held[at - 1 : at - 1 + len(ddq), positions:])
-        time = first.start + step * np.arange(number, number + len(ddq))
-        q, dq = q[2:-2], dq[1:-1]
-        arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if positions > n else None
-        block = Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], acted, arm)
-        ended = own == 0
-        yield block.part(max(0, border - number), samples - border - number if ended else len(block))
-        number += len(block)
-        held = held[len(block) :]
+            acted = 0.5 * (acted + held[at - 1 : at - 1 + count, positions:])
+        found = FilteredPositions(first.start + step * number, step, q, acted)
+        last = samples - border - number if own == 0 else len(found)
+        begin = min(max(0, border - number), len(found))
+        yield found.part(begin, max(begin, last))
+        number += len(found)
+        held = held[len(found) :]
 
 
 def _peeked(recordings: Iterable[Recording]) -> tuple[Recording, Iterator[Recording]]:

@@ -11,9 +11,10 @@ import numpy as np
 from flexcal.dynamics.arm_side import ArmSide
 from flexcal.dynamics.drive_spring import DriveSpring
 from flexcal.dynamics.drive_terms import Column, DriveTerm, Memory
+from flexcal.dynamics.link_columns import LinkColumns, link_columns
 from flexcal.dynamics.motion import Motion
 from flexcal.model import RobotModel, inertial_names, torque_regressor
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.regressor import INERTIAL, write_torque_regressor
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +23,9 @@ class Observation:
 
     There is one equation a joint, and after them one a motor that is connected by one of the `springs`: that of the motor alone. The
     joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor.
+
+    Of the columns of a joint that the links bring, some always are combinations of others, whatever the motion is. `reduced` leaves them
+    out, and `spread` (one an equation) says how the others give them back: W = W_reduced · spread.
     """
 
     model: RobotModel
@@ -29,10 +33,20 @@ class Observation:
     springs: tuple[DriveSpring, ...] = ()
 
     @cached_property
-    def equations(self) -> tuple[str, ...]:
-        """What each equation is of: the joints' names, then those of the motors alone."""
-        joints = self.model.joint_names
-        return (*joints, *(f"{joints[spring.joint]}, motor" for spring in self.springs))
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns: the links' inertials in chain order, then the terms'."""
+        drives = [column.name for column in self._at_rest]
+        return (*inertial_names(self.model), *dict.fromkeys(drives))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The joints' names, then those of the motors alone."""
+        return (*self.model.joint_names, *(f"{motor}, motor" for motor in self.motors))
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The joints whose motors have equations of their own, in the order of these."""
+        return tuple(self.model.joint_names[spring.joint] for spring in self.springs)
 
     @cached_property
     def _torques(self) -> list[int]:
@@ -40,72 +54,78 @@ class Observation:
         return [*range(self.model.n), *(spring.joint for spring in self.springs)]
 
     @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Names of all columns: the links' inertials in chain order, then the terms'."""
-        drives = [column.name for column in self._at_rest]
-        return (*inertial_names(self.model), *dict.fromkeys(drives))
-
-    @cached_property
     def members(self) -> tuple[np.ndarray, ...]:
         """For every equation the numbers of the columns that it can feel, ascending."""
-        felt: list[set[int]] = [set() for _ in self.equations]
-        for i in range(self.model.n):
-            at = i
-            while at >= 0:
-                felt[at].update(range(len(INERTIAL) * i, len(INERTIAL) * (i + 1)))
-                at = self.model.joints[at].parent
-        for column in self._at_rest:
-            felt[column.joint].add(self.names.index(column.name))
-        return tuple(np.array(sorted(numbers)) for numbers in felt)
+        return tuple(
+            np.concatenate([links.felt, own]) for links, own in zip(self._links, self._drives, strict=True)
+        )
 
-    @property
+    @cached_property
+    def spread(self) -> tuple[np.ndarray, ...]:
+        """For every equation (reduced, members): its columns from its reduced ones."""
+        found = []
+        for links, own in zip(self._links, self._drives, strict=True):
+            kept, felt = links.spread.shape
+            spread = np.eye(kept + len(own), felt + len(own), k=felt - kept)
+            spread[:kept, :felt] = links.spread
+            found.append(spread)
+        return tuple(found)
+
+    @cached_property
+    def _links(self) -> tuple[LinkColumns, ...]:
+        """For every equation; a motor alone feels no link."""
+        nothing = LinkColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
+        return (*link_columns(self.model), *(nothing for _ in self.springs))
+
+    @cached_property
     def _at_rest(self) -> list[Column]:
         state = np.zeros((1, self.model.n))
         still = Motion(np.zeros(1), state, state, state, state, ArmSide(state, state, state))
         return list(self._drive_columns(still, {}))
 
     @cached_property
-    def _links(self) -> list[slice | np.ndarray]:
-        """For every joint which inertial columns it can feel."""
-        found: list[slice | np.ndarray] = []
-        for members in self.members[: self.model.n]:
-            numbers = members[members < len(INERTIAL) * self.model.n]
-            joined = numbers[-1] - numbers[0] + 1 == len(numbers)
-            found.append(slice(numbers[0], numbers[-1] + 1) if joined else numbers)
-        return found
+    def _drives(self) -> list[np.ndarray]:
+        """For every equation the numbers of the drive columns that it feels, ascending."""
+        number = {name: i for i, name in enumerate(self.names)}
+        felt: list[set[int]] = [set() for _ in self.labels]
+        for column in self._at_rest:
+            felt[column.joint].add(number[column.name])
+        return [np.array(sorted(numbers), dtype=int) for numbers in felt]
 
     @cached_property
-    def _drives(self) -> np.ndarray:
-        """Row among `systems` of every drive column, in the order in which the terms give them."""
-        number = {name: i for i, name in enumerate(self.names)}
-        starts = np.cumsum([0, *self.widths])
-        rows = [
-            starts[column.joint] + np.searchsorted(self.members[column.joint], number[column.name])
-            for column in self._at_rest
-        ]
-        return np.array(rows, dtype=int)
-
-    @property
     def widths(self) -> list[int]:
-        """For every equation the number of its columns, and one for its torque."""
-        return [len(members) + 1 for members in self.members]
+        """For every equation the number of its reduced columns, and one for its torque."""
+        return [len(spread) + 1 for spread in self.spread]
 
-    def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """For every equation its columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of `reduced`: of the links' entries (n, 10 n), -1 for those left out, and of every drive column in the terms' order."""
+        starts = np.cumsum([0, *self.widths])
+        links = np.full((self.model.n, len(INERTIAL) * self.model.n), -1)
+        for joint, own in enumerate(self._links[: self.model.n]):
+            links[joint, own.kept] = starts[joint] + np.arange(len(own.kept))
+        number = {name: i for i, name in enumerate(self.names)}
+        drives = [
+            starts[c.joint]
+            + len(self._links[c.joint].kept)
+            + np.searchsorted(self._drives[c.joint], number[c.name])
+            for c in self._at_rest
+        ]
+        return links, np.array(drives, dtype=int)
+
+    def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        """For every equation its reduced columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
 
         The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without. Raises `FlexcalError`
         where there are springs and the motion has no arm side.
         """
-        links = torque_regressor(self.model, *self._link_states(motion)).transpose(1, 2, 0)
+        links, drives = self._places
         found = np.empty((sum(self.widths), len(motion)))
-        starts = np.cumsum([0, *self.widths])
-        for joint, (felt, start) in enumerate(zip(self._links, starts, strict=False)):
-            part = links[joint, felt]
-            found[start : start + len(part)] = part
-        found[starts[1:] - 1] = motion.torque[:, self._torques].T
-        values = (column.values for column in self._drive_columns(motion, {} if memory is None else memory))
-        for place, column in zip(self._drives, values, strict=True):
-            found[place] = column
+        write_torque_regressor(self.model, *self._link_states(motion), links, found)
+        found[np.cumsum(self.widths) - 1] = motion.torque[:, self._torques].T
+        columns = self._drive_columns(motion, {} if memory is None else memory)
+        for place, column in zip(drives, columns, strict=True):
+            found[place] = column.values
         return found
 
     def follow(self, motion: Motion, memory: Memory) -> None:
@@ -134,9 +154,16 @@ class Observation:
         return q, dq, ddq
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
-        """For every equation its columns (members, N) at every sample of the motion."""
-        systems = np.split(self.systems(motion), np.cumsum(self.widths)[:-1])
-        return [system[:-1] for system in systems]
+        """For every equation all its columns (members, N) at every sample of the motion, none left out."""
+        links = torque_regressor(self.model, *self._link_states(motion))
+        found = [np.zeros((len(members), len(motion))) for members in self.members]
+        for joint, own in enumerate(self._links[: self.model.n]):
+            found[joint][: len(own.felt)] = links[:, joint, own.felt].T
+        number = {name: i for i, name in enumerate(self.names)}
+        for column in self._drive_columns(motion, {}):
+            members = self.members[column.joint]
+            found[column.joint][np.searchsorted(members, number[column.name])] = column.values
+        return found
 
     def values(self) -> np.ndarray:
         """The model's values of all columns (p,), zero where it knows none."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.experiment_system import experiment_system
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData, batches_each
@@ -19,7 +20,7 @@ from flexcal.dynamics.rows import Experiment, Window, rows
 class RecordedRows:
     """Where the equations of a fit come from; every method is one pass over all `experiments`, of which each has a window.
 
-    Of the rows that are kept between passes only one number a row and joint stays in memory.
+    Of the rows that are kept between passes only one number a row and equation stays in memory.
     """
 
     observation: Observation
@@ -34,7 +35,7 @@ class RecordedRows:
         found = []
         for experiment, window in zip(self.experiments, self.windows, strict=True):
             count = experiment.samples // self.decimation.factor + 1
-            missed = np.full((len(self.observation.equations), count), np.nan)
+            missed = np.full((len(self.observation.labels), count), np.nan)
             for block in rows(self.observation, experiment, self.decimation, window):
                 part = block.where(~block.still) if self.mask_standstill else block
                 missed[:, part.number] = part.torque - part.predicted(self.observation.members, parameters)
@@ -43,10 +44,17 @@ class RecordedRows:
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
         """The equations, each multiplied by the root of its weight: (equations, rows) an experiment, as `residuals` are."""
+        return self._data(self.observation, weights)
+
+    def observed_as(self, equations: Equations) -> RegressionData:
+        """Other equations for the same samples."""
+        return self._data(equations, [None] * len(self.experiments))
+
+    def _data(self, equations: Equations, weights: Sequence[np.ndarray | None]) -> RegressionData:
         batches = batches_each(len(self.experiments))
         systems = [
             experiment_system(
-                self.observation,
+                equations,
                 experiment,
                 self.decimation,
                 window,
@@ -56,4 +64,4 @@ class RecordedRows:
             )
             for experiment, window, own in zip(self.experiments, self.windows, weights, strict=True)
         ]
-        return RegressionData.of(self.observation, self.base, systems)
+        return RegressionData.of(equations, self.base, systems)

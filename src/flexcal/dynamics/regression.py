@@ -10,8 +10,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.experiment_system import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
-from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model.regressor import INERTIAL
@@ -44,7 +44,7 @@ class RegressionData:
     `batches` are the same equations once more, experiment by experiment in parts that follow each other in time.
     """
 
-    observation: Observation
+    observation: Equations
     base: BaseParameters
     subsystems: tuple[Subsystem, ...]
     masked: int
@@ -87,7 +87,7 @@ class RegressionData:
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
         """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all equations stacked, and of each of the observation's."""
-        missed, size = np.zeros((2, len(self.observation.equations)))
+        missed, size = np.zeros((2, len(self.observation.labels)))
         for s in self.subsystems:
             missed[s.equation] += s.triangle.residual(parameters[s.members]) ** 2
             size[s.equation] += np.sum(s.triangle.right**2)
@@ -95,7 +95,7 @@ class RegressionData:
 
     @classmethod
     def of(
-        cls, observation: Observation, base: BaseParameters, systems: Sequence[ExperimentSystem]
+        cls, observation: Equations, base: BaseParameters, systems: Sequence[ExperimentSystem]
     ) -> RegressionData:
         """The systems of several experiments together."""
         subsystems = [
@@ -108,7 +108,7 @@ class RegressionData:
 
 
 def observe(
-    observation: Observation,
+    observation: Equations,
     base: BaseParameters,
     experiments: Sequence[Experiment],
     decimation: Decimation,

@@ -11,11 +11,11 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.observation import Observation
 
-_BLOCK = 512
-"""Samples, about, whose columns are in memory at once; they fit a processor's cache."""
+_BLOCK = 1000
+"""Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
 _STANDSTILL = 0.01
 """A joint stands still below this share of its largest speed in the recording."""
 _AT_REST = 1e-3
@@ -57,15 +57,16 @@ class Window:
 class Rows:
     """M equations of every kind (of each joint, and of motors alone) that follow each other.
 
-    `systems` has for every kind W and, last, Y transposed (members + 1, M). `number` (M,) counts the rows of the experiment, whatever
-    is left out; `time` (M,) is s, and `still` (M,) tells where the robot stands still within a row: no joint is faster than a hundredth
-    of its top speed.
+    `reduced` has for every kind the reduced columns of W and, last, Y transposed (·, M), and `spread` what gives W back, as an
+    `Observation` has them. `number` (M,) counts the rows of the experiment, whatever is left out; `time` (M,) is s, and `still` (M,)
+    tells where the robot stands still within a row: no joint is faster than a hundredth of its top speed.
     """
 
     number: np.ndarray
     time: np.ndarray
     still: np.ndarray
-    systems: list[np.ndarray]
+    reduced: list[np.ndarray]
+    spread: tuple[np.ndarray, ...]
 
     def __len__(self) -> int:
         return len(self.number)
@@ -73,40 +74,40 @@ class Rows:
     @property
     def columns(self) -> list[np.ndarray]:
         """For every kind W transposed (members, M)."""
-        return [system[:-1] for system in self.systems]
+        return [spread.T @ own[:-1] for spread, own in zip(self.spread, self.reduced, strict=True)]
 
     @property
     def torque(self) -> np.ndarray:
         """Y of all kinds (·, M)."""
-        return np.array([system[-1] for system in self.systems])
+        return np.array([own[-1] for own in self.reduced])
 
     def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
         """W χ of all kinds (·, M) for `parameters` (p,), of which `members` are the numbers of each kind's own."""
-        return np.array([parameters[own] @ w for own, w in zip(members, self.columns, strict=True)])
+        each = zip(members, self.spread, self.reduced, strict=True)
+        return np.array([(spread @ parameters[felt]) @ own[:-1] for felt, spread, own in each])
 
     def where(self, keep: np.ndarray) -> Rows:
         """The rows that `keep` (M,) marks."""
         if keep.all():
             return self
-        systems = [system[:, keep] for system in self.systems]
-        return Rows(self.number[keep], self.time[keep], self.still[keep], systems)
+        reduced = [own[:, keep] for own in self.reduced]
+        return Rows(self.number[keep], self.time[keep], self.still[keep], reduced, self.spread)
 
     def weighted(self, weights: np.ndarray) -> Rows:
         """The rows of every kind times the root of their `weights` (·, M)."""
-        roots = np.sqrt(weights)
-        systems = [system * root for system, root in zip(self.systems, roots, strict=True)]
-        return Rows(self.number, self.time, self.still, systems)
+        reduced = [own * root for own, root in zip(self.reduced, np.sqrt(weights), strict=True)]
+        return Rows(self.number, self.time, self.still, reduced, self.spread)
 
 
 def rows(
-    observation: Observation, experiment: Experiment, decimation: Decimation, window: Window
+    observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
 ) -> Iterator[Rows]:
     """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 
     Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
     """
     ends = np.cumsum(observation.widths)
-    slowest = np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
+    slowest = slowest_speeds(experiment)
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
     memory: Memory = {}
@@ -121,12 +122,17 @@ def rows(
             return
         still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
         centres.push(start, piece.time, still)
-        systems = stream.push(observation.systems(piece, memory))
-        number, time, still = centres.pop(systems.shape[1])
-        found = Rows(number, time, still, np.split(systems, ends[:-1]))
+        reduced = stream.push(observation.reduced(piece, memory))
+        number, time, still = centres.pop(reduced.shape[1])
+        found = Rows(number, time, still, np.split(reduced, ends[:-1]), observation.spread)
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)
+
+
+def slowest_speeds(experiment: Experiment) -> np.ndarray:
+    """Speed (n,) up to which each joint stands still."""
+    return np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
 
 
 class _Centres:

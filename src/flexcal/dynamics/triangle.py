@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.kernels import append
+
 _TOLERANCE = 1e-9
 """A singular value of comparable columns below this is taken as zero."""
 
@@ -91,16 +93,8 @@ def widened(system: np.ndarray, members: np.ndarray, columns: int) -> np.ndarray
 
 
 def triangular(matrix: np.ndarray) -> np.ndarray:
-    """R (k, k) of the QR of a matrix (·, k), with rows of zeros where that has fewer rows.
-
-    By recursive panels (dgeqrt), which take half of dgeqrf's time on tall matrices.
-    """
-    from scipy.linalg.lapack import dgeqrt  # pyright: ignore[reportAttributeAccessIssue]
-
-    table = np.array(matrix, dtype=float, order="F")
-    rows, size = table.shape
-    factor = np.zeros((size, size))
-    if table.size:
-        found = dgeqrt(min(16, rows, size), table, overwrite_a=1)[0]
-        factor[: min(rows, size)] = np.triu(found[:size])
+    """R (k, k) of the QR of a matrix (·, k), by Householder reflections; the last rows are zero, to rounding, where it has fewer."""
+    columns = np.array(matrix.T, dtype=float, order="C")
+    factor = np.zeros((len(columns), len(columns)))
+    append(factor, columns)
     return factor

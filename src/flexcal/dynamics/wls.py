@@ -24,10 +24,10 @@ def noise_levels(data: RegressionData) -> list[float]:
     noise = []
     for s, (sigma, rank) in zip(data.subsystems, data.noise(), strict=True):
         if np.isnan(sigma):
-            equation = data.observation.equations[s.equation]
+            label = data.observation.labels[s.equation]
             raise FlexcalError(
-                f"{s.triangle.rows} equations of {equation} in experiment {s.experiment + 1} do not tell its noise beside {rank} "
-                "parameters; record for longer, or decimate less."
+                f"{s.triangle.rows} equations of {label} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
+                "record for longer, or decimate less."
             )
         noise.append(s.floored(sigma))
     return noise

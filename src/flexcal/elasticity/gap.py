@@ -1,4 +1,4 @@
-"""Backlash in a frequency experiment: how long a gap stands open, from the torque that its spring carries, and what that does."""
+"""Backlash in a frequency experiment: how much softer a gap makes a drive, from the torque that its spring carries, and what that does."""
 
 from __future__ import annotations
 
@@ -19,13 +19,14 @@ PHASES = 64
 """Instants of the reference motion at which gaps are looked at."""
 
 
-def open_share(robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan) -> np.ndarray:
-    """How likely a gap in each elastic drive is open along the reference motion, per rad of half gap, (phases, E).
+def gap_compliance(
+    robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan
+) -> np.ndarray:
+    """What a gap adds to the compliance of each elastic drive along the reference motion, relative, per rad of half gap, (phases, E).
 
     `q` (n,) rad is the mean motor position, `payload` in kg. The torque of a drive is gravity's and the reference motion's, plus the
-    multisine's, close to Gaussian: a gap ± b in series with a spring k is open while the torque passes zero, 2 b k times the density
-    of the torque there. By this share it lowers the drive's apparent stiffness and damping, to first order (the Gaussian equivalent
-    gain of a dead band).
+    multisine's, close to Gaussian. A gap ± b twists by b sgn(torque), whose equivalent gain for a Gaussian torque is 2 b times the
+    density of the torque at zero (Bussgang 1952), in series with the spring's 1/k.
     """
     import pinocchio as pin
 
@@ -49,7 +50,8 @@ def gap_shift(
 ) -> np.ndarray:
     """G with gaps that open at their phase of the motion less G with their mean softening, (L, E, E) rad/s² per N m.
 
-    `share` (phases, E) says how likely every drive of `robot` stands open; `system` is the softened robot.
+    `share` (phases, E) of the stiffness and damping of every drive of `robot` is missing at that phase, with their mean put back; `system`
+    is that robot, whose drives have their mean softness.
     """
     count, size = system.inputs, len(system.mass)
     gaps = np.flatnonzero(share.any(axis=0))

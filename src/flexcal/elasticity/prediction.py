@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.elasticity.gap import open_share
+from flexcal.elasticity.gap import gap_compliance
 from flexcal.elasticity.naming import half_gap_name, pose_labels, viscous_name
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
@@ -31,7 +31,7 @@ class PoseModel:
     """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
 
     `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
-    half gaps; `open_share` (phases, E) is how likely each stands open along the reference motion, per rad of half gap. `delays` (E,)
+    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `delays` (E,)
     are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
     """
 
@@ -40,24 +40,36 @@ class PoseModel:
     payload: float | None
     robot_names: dict[str, int]
     gaps: dict[int, int]
-    open_share: np.ndarray
+    gap_compliance: np.ndarray
     delays: np.ndarray
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
         """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
         known = {name: float(natural[number]) for name, number in self.robot_names.items()}
-        for axis, softening in zip(self.gaps, self.softening(natural), strict=True):
+        kept = 1.0 - self.open_share(natural).mean(axis=0)
+        for axis in self.gaps:
             for name in _drive(robot, axis):
-                known[name] = known.get(name, robot.value(name)) * float(np.exp(-softening))
+                known[name] = known.get(name, robot.value(name)) * float(kept[axis])
         payload = self.payload
         if payload is not None and payload > 0 and "payload.mass" in known:
             payload *= known["payload.mass"] / float(robot.payload_mass[0])
             known["payload.mass"] = payload
         return known, payload
 
-    def softening(self, natural: np.ndarray) -> np.ndarray:
-        """Share (gaps,) by which open gaps lower stiffness and damping of their drives."""
-        return self.open_share.mean(axis=0)[list(self.gaps)] * natural[list(self.gaps.values())]
+    def open_share(self, natural: np.ndarray) -> np.ndarray:
+        """Share (phases, E) of stiffness and damping that every drive lacks along the reference motion."""
+        softer = self._softer(natural)
+        return softer / (1.0 + softer)
+
+    def softening_slope(self, natural: np.ndarray) -> np.ndarray:
+        """Derivative (E,) of the logarithm of each drive's mean stiffness and damping by its half gap, 1/rad."""
+        lost = np.mean(self.gap_compliance / (1.0 + self._softer(natural)) ** 2, axis=0)
+        return -lost / (1.0 - self.open_share(natural).mean(axis=0))
+
+    def _softer(self, natural: np.ndarray) -> np.ndarray:
+        half_gap = np.zeros(self.gap_compliance.shape[1])
+        half_gap[list(self.gaps)] = natural[list(self.gaps.values())]
+        return self.gap_compliance * half_gap
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,8 +130,10 @@ class ResponseModel:
         poses = []
         for pose in self.poses:
             known, payload = pose.values(self.robot, natural)
-            share = open_share(self.robot.with_values(known), pose.q, payload, plan)
-            poses.append(replace(pose, open_share=share))
+            softened = self.robot.with_values(known)
+            kept = 1.0 - pose.open_share(natural).mean(axis=0)
+            compliance = gap_compliance(softened, pose.q, payload, plan) / kept  # beside the spring's own
+            poses.append(replace(pose, gap_compliance=compliance))
         return replace(self, poses=tuple(poses))
 
     def predict(self, x: np.ndarray) -> list[Prediction]:
@@ -149,7 +163,7 @@ class ResponseModel:
         if not derivatives:
             return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
         change = change * phase[..., None]
-        share = pose.open_share.mean(axis=0)
+        lost = pose.softening_slope(values)
         gap_changes = {axis: np.zeros_like(response) for axis in pose.gaps}
         numbers, blocks = [], []
         for k, name in enumerate(names):
@@ -159,7 +173,7 @@ class ResponseModel:
                 log = self.parameters[numbers[-1]].scale == "log"
                 blocks.append(change[..., k] * (slope if log else 1.0))
             if name in softened:
-                gap_changes[softened[name]] -= change[..., k] * slope * share[softened[name]]
+                gap_changes[softened[name]] += change[..., k] * slope * lost[softened[name]]
         for axis, gap_change in gap_changes.items():
             numbers.append(pose.gaps[axis])
             blocks.append(gap_change)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from flexcal.estimation.parameter import Parameters
+from flexcal.estimation.student import student_quantile
 
 NORMAL_QUANTILE = 1.959963984540054
 
@@ -136,6 +137,4 @@ class Estimate:
         freedom = self.degrees_of_freedom if self.covariance_freedom is None else self.covariance_freedom
         if not 0 < freedom < 100:
             return NORMAL_QUANTILE
-        from scipy.special import stdtrit
-
-        return float(stdtrit(freedom, 0.975))
+        return student_quantile(0.975, freedom)

@@ -151,46 +151,45 @@ def _scaled(
 def _select(
     scaled: np.ndarray, preferred: Sequence[int], tolerance: float
 ) -> tuple[list[int], list[int], np.ndarray]:
-    """Columns to keep and to drop, both ascending, and the |diagonal| of R with the kept first, each part descending."""
-    from scipy.linalg import qr
+    """Columns to keep and to drop, both ascending, and the |diagonal| of R with the kept first, each part descending.
 
-    size = scaled.shape[1]
-    limit = tolerance * np.max(np.linalg.norm(scaled, axis=0), initial=0.0)
+    Modified Gram-Schmidt, each direction projected out twice, which is as accurate as reflections.
+    """
     remainder = scaled.copy()
+    limit = tolerance * np.max(np.linalg.norm(scaled, axis=0), initial=0.0)
     kept: list[int] = []
     sizes: list[float] = []
 
-    def project_out(column: int) -> None:
-        direction = remainder[:, column] / np.linalg.norm(remainder[:, column])
+    def take(column: int) -> None:
+        sizes.append(float(np.linalg.norm(remainder[:, column])))
+        direction = remainder[:, column] / sizes[-1]
         for _ in range(2):
             remainder[:, :] -= np.outer(direction, direction @ remainder)
         remainder[:, column] = 0.0
 
     for column in preferred:
-        norm = float(np.linalg.norm(remainder[:, column]))
-        if column not in kept and norm > limit:
+        if column not in kept and np.linalg.norm(remainder[:, column]) > limit:
             kept.append(column)
-            sizes.append(norm)
-            project_out(column)
-    rest = [i for i in range(size) if i not in kept]
-    if rest:
-        factor, order = qr(remainder[:, rest], mode="r", pivoting=True)  # pyright: ignore[reportAssignmentType]
-        diagonal = np.abs(np.diag(factor))
-        found = int(np.sum(diagonal > limit))
-        kept += [rest[i] for i in order[:found]]
-        sizes += diagonal[:found].tolist()
-        left = diagonal[found:].tolist()
-    else:
-        left = []
-    dropped = [i for i in range(size) if i not in kept]
-    return sorted(kept), dropped, np.array(sorted(sizes, reverse=True) + sorted(left, reverse=True))
+            take(column)
+    rest = [i for i in range(scaled.shape[1]) if i not in kept]
+    found: list[int] = []
+    for _ in rest:
+        norms = np.linalg.norm(remainder, axis=0)
+        largest = int(np.argmax(norms))
+        if norms[largest] == 0.0:
+            break
+        if norms[largest] > limit:
+            found.append(largest)
+        take(largest)
+    kept += found
+    left = [*sizes[len(kept) :], *[0.0] * (scaled.shape[1] - len(sizes))]
+    dropped = [i for i in range(scaled.shape[1]) if i not in kept]
+    return sorted(kept), dropped, np.array(sorted(sizes[: len(kept)], reverse=True) + left)
 
 
 def _least_squares(kept: np.ndarray, dropped: np.ndarray) -> np.ndarray:
     """R₁₁⁻¹ R₁₂ for the columns `kept` (p, k) and `dropped` (p, d)."""
-    from scipy.linalg import solve_triangular
-
     if kept.shape[1] == 0:
         return np.zeros((0, dropped.shape[1]))
     basis, factor = np.linalg.qr(kept)
-    return solve_triangular(factor, basis.T @ dropped)
+    return np.linalg.solve(factor, basis.T @ dropped)

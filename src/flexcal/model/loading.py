@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal._kernels import Tree
+from flexcal.kernels import Tree
 from flexcal.model.config import ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
 from flexcal.model.names import COUPLED, FRICTION

@@ -28,13 +28,28 @@ def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.n
     what filters along time want. The model's geometric errors count; deflections and the payload do not.
     Raises `FlexcalError` where the shapes differ or do not fit the robot.
     """
+    q = joint_batch(model, q)
+    shape = (model.n, len(INERTIAL) * model.n)
+    found = np.zeros((shape[0] * shape[1], len(q)))
+    write_torque_regressor(model, q, dq, ddq, np.arange(len(found)).reshape(shape), found)
+    return found.reshape(*shape, len(q)).transpose(2, 0, 1)
+
+
+def write_torque_regressor(
+    model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray, places: np.ndarray, out: np.ndarray
+) -> None:
+    """Only the columns of `torque_regressor` that are needed, below each other: column c of joint j becomes row `places`[j, c] of `out`.
+
+    `places` (n, 10 n) is -1 for what is not needed; `out` is (rows, samples). Entries that are zero because link i is not beyond joint j
+    are not written. Raises `FlexcalError` as that does.
+    """
     q, dq, ddq = (joint_batch(model, values) for values in (q, dq, ddq))
     if not q.shape == dq.shape == ddq.shape:
         raise FlexcalError(
             f"q, dq and ddq have shapes {q.shape}, {dq.shape} and {ddq.shape}; give as many samples of each."
         )
-    by_joint = model.tree.torque_regressor(np.ascontiguousarray(model.geometry), model.gravity, q, dq, ddq)
-    return by_joint.transpose(2, 0, 1)
+    geometry = np.ascontiguousarray(model.geometry)
+    model.tree.torque_regressor(geometry, model.gravity, q, dq, ddq, places, out)
 
 
 def inertial_parameters(model: RobotModel) -> np.ndarray:

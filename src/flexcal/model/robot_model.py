@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from flexcal._kernels import Tree
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
+from flexcal.kernels import Tree
 from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
 from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis

@@ -8,14 +8,24 @@ from pathlib import Path
 from flexcal.dynamics import DriveSpring, log_blocks
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
+from flexcal.workflow.estimators import EstimatorName
+
+_KNOWING: tuple[EstimatorName, ...] = ("wls", "ols", "sdp", "irls")
+"""Estimators that take any equations, those of motors too; the others are of rigid robots."""
 
 
-def drive_springs(model: RobotModel, logs: Sequence[Path]) -> tuple[DriveSpring, ...]:
+def drive_springs(
+    model: RobotModel, logs: Sequence[Path], estimator: EstimatorName
+) -> tuple[DriveSpring, ...]:
     """The drives of the elastic joints; bearings are outside the flexible model.
 
-    Raises `InputError` for a robot without elastic joints, for one whose motors turn an elastic joint together, and for a log that lacks
-    the arm side.
+    Raises `InputError` for an `estimator` of rigid robots, for a robot without elastic joints, for one whose motors turn an elastic
+    joint together, and for a log that lacks the arm side.
     """
+    if estimator not in _KNOWING:
+        raise InputError(
+            f"--estimator {estimator} is for rigid robots; take one of {', '.join(_KNOWING)}, or leave --flexible out."
+        )
     if not model.elastic:
         raise InputError(
             f"{model.path} declares no elastic joint, which --flexible is about; add it under `elastic:`, or leave --flexible out."

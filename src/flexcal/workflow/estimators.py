@@ -8,14 +8,21 @@ from typing import Literal
 from flexcal.dynamics import (
     RecordedRows,
     RegressionData,
+    column_errors,
+    energy_least_squares,
     feasible_least_squares,
     huber_least_squares,
+    kalman_filter,
+    maximum_likelihood,
+    noisy_logs,
     ordinary_least_squares,
+    power_least_squares,
+    total_least_squares,
     weighted_least_squares,
 )
 from flexcal.estimation import Estimate
 
-EstimatorName = Literal["wls", "ols", "sdp", "irls"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "energy", "power", "tls", "ml", "ekf"]
 
 Estimator = Callable[[RegressionData, RecordedRows], Estimate]
 """Of the equations, and of the rows that they came from, for those that need to see them again."""
@@ -25,4 +32,11 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "ols": lambda data, _: ordinary_least_squares(data),
     "sdp": lambda data, _: feasible_least_squares(data),
     "irls": huber_least_squares,
+    "energy": lambda _, recorded: energy_least_squares(recorded),
+    "power": lambda _, recorded: power_least_squares(recorded),
+    "tls": lambda data, recorded: total_least_squares(
+        data, column_errors(recorded, noisy_logs(recorded.experiments))
+    ),
+    "ml": maximum_likelihood,
+    "ekf": kalman_filter,
 }

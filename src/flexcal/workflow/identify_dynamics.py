@@ -7,6 +7,7 @@ import time
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from flexcal.data import provenance, read_estimates
@@ -31,7 +32,6 @@ from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
-from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
@@ -46,7 +46,8 @@ from flexcal.workflow.treatment import Treatment, treatment_of
 class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
-    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were.
+    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
+    whose motors have equations of their own.
     """
 
     estimate: Estimate
@@ -57,6 +58,7 @@ class RobotDynamics:
     validated: tuple[Path, ...]
     essential: EssentialParameters
     friction: FrictionSelection
+    motors: tuple[str, ...]
     treatment: Treatment
     seconds: float
     estimates: Path
@@ -71,15 +73,14 @@ class RobotDynamics:
         """The content of results.json."""
         x = self.estimate.parameters.coordinates()
         error, each = self.train.errors(x)
+        joints = self.train.observation.model.joint_names
         percent: dict[str, Any] = {"train": 100 * error, "held_out": None}
         if self.held_out is not None:
             error, each = self.held_out.errors(x)
             percent["held_out"] = 100 * error
-        joints, springs = self.train.observation.model.joint_names, self.train.observation.springs
         percent["per_joint"] = dict(zip(joints, 100 * each[: len(joints)], strict=True))
-        if springs:
-            motors = [joints[spring.joint] for spring in springs]
-            percent["per_motor"] = dict(zip(motors, 100 * each[len(joints) :], strict=True))
+        if self.motors:
+            percent["per_motor"] = dict(zip(self.motors, 100 * each[len(joints) :], strict=True))
         return {
             "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
@@ -164,13 +165,13 @@ def identify_robot_dynamics(
 ) -> RobotDynamics:
     """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
 
-    Logs are read in blocks, in so many `jobs` (processes) at once. The last share `hold_out` (0 to 1) of the time of every log is kept out
-    of the fit, with what the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal
-    and the other blocks. With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do
-    not fit the robot, and where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is
-    proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the
-    drives' springs; friction terms are chosen before that, as if the robot were rigid. `irls` goes through the logs again and again, in
-    this process alone.
+    Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
+    six joints, and 48 for their arm sides. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what
+    the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks.
+    With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and
+    where robot.yaml declares a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed. `flexible`
+    tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the drives' springs;
+    friction terms are chosen before that, as if the robot were rigid. `irls` goes through the logs again and again, in this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -181,74 +182,83 @@ def identify_robot_dynamics(
         raise InputError(
             f"{model.path}: a payload is declared; the identification of dynamics knows none yet, so record without it and remove it."
         )
-    springs = drive_springs(model, [*logs, *validate]) if flexible else ()
+    springs = drive_springs(model, [*logs, *validate], estimator) if flexible else ()
     treatment = treatment_of(model, logs)
 
-    read = read_logs(logs, model, treatment, jobs=jobs)
-    windows = [split(log, treatment, hold_out) for log in read]
-    fitted = [LogPart(log, early) for log, (early, _) in zip(read, windows, strict=True)]
-    unseen = [LogPart(log, late) for log, (_, late) in zip(read, windows, strict=True) if late is not None]
-    others = read_logs(validate, model, treatment, jobs=jobs)
-    unseen += [LogPart(log, Window()) for log in others]
+    with TemporaryDirectory(prefix="flexcal_") as folder:
+        scratch = Path(folder)
+        read = read_logs(logs, model, treatment, scratch, jobs=jobs)
+        windows = [split(log, treatment, hold_out) for log in read]
+        fitted = [LogPart(log, early) for log, (early, _) in zip(read, windows, strict=True)]
+        unseen = [
+            LogPart(log, late) for log, (_, late) in zip(read, windows, strict=True) if late is not None
+        ]
+        others = read_logs(validate, model, treatment, scratch, jobs=jobs)
+        unseen += [LogPart(log, Window()) for log in others]
 
-    def systems(parts: list[LogPart], observation: Observation, batches: int) -> list[ExperimentSystem]:
-        return log_systems(parts, observation, treatment, batches=batches, jobs=jobs, progress=progress)
+        def systems(parts: list[LogPart], observation: Observation, batches: int) -> list[ExperimentSystem]:
+            return log_systems(parts, observation, treatment, batches=batches, jobs=jobs, progress=progress)
 
-    def equations(observation: Observation) -> list[ExperimentSystem]:
-        return systems(fitted, observation, batches_each(len(logs)))
+        def equations(observation: Observation) -> list[ExperimentSystem]:
+            return systems(fitted, observation, batches_each(len(logs)))
 
-    declared = model.config.dynamics.friction
-    friction = select_friction(model, declared, equations, treatment.decimation)
-    observation = with_play(Observation(model, friction.terms, springs), equations)
-    base = BaseParameters.of(observation)
-    train = RegressionData.of(observation, base, equations(observation))
-    held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
-    estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
-    options = {
-        "estimator": estimator,
-        "hold_out": hold_out,
-        "friction": ", ".join(friction.labels),
-        "flexible": flexible,
-    }
-    origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
-    estimate = replace(estimate, provenance=origin)
-    target = source if out is None else out / ESTIMATES
-    essential = essential_parameters(train, estimate)
-    seconds = time.perf_counter() - begun
-    classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
-    result = RobotDynamics(
-        estimate,
-        classic.rank,
-        train,
-        held_out,
-        hold_out,
-        tuple(validate),
-        essential,
-        friction,
-        treatment,
-        seconds,
-        target,
-    )
-    store_block(source, target, blocks, "dynamics", estimate)
-    if out is not None:
-        document = result.document()
-        write_results(out, document)
-        borders = [math.inf if late is None else late.start for _, late in windows]
-        borders += [-math.inf] * len(others)
-        predictions = log_predictions(
-            [*read, *others], borders, observation, estimate, treatment, progress=progress
+        declared = model.config.dynamics.friction
+        friction = select_friction(model, declared, equations, treatment.decimation)
+        observation = with_play(Observation(model, friction.terms, springs), equations)
+        base = BaseParameters.of(observation)
+        train = RegressionData.of(observation, base, equations(observation))
+        held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
+        estimate = ESTIMATORS[estimator](train, _recorded(fitted, observation, base, treatment))
+        options = {
+            "estimator": estimator,
+            "hold_out": hold_out,
+            "friction": ", ".join(friction.labels),
+            "flexible": flexible,
+        }
+        origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
+        estimate = replace(estimate, provenance=origin)
+        target = source if out is None else out / ESTIMATES
+        essential = essential_parameters(train, estimate)
+        seconds = time.perf_counter() - begun
+        classic = (
+            base if friction.terms == CLASSIC else BaseParameters.of(replace(observation, terms=CLASSIC))
         )
-        if validate:
-            files = [robot, bare.urdf, *logs, *validate]
-            origin = provenance(files, options, source if blocks else None, tuple(blocks))
-        study = DynamicsStudy(model.name, document, estimate, predictions, origin)
-        write_dynamics_report(out / "report.html", study)
-    return result
+        result = RobotDynamics(
+            estimate,
+            classic.rank,
+            train,
+            held_out,
+            hold_out,
+            tuple(validate),
+            essential,
+            friction,
+            observation.motors,
+            treatment,
+            seconds,
+            target,
+        )
+        store_block(source, target, blocks, "dynamics", estimate)
+        if out is not None:
+            from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
+
+            document = result.document()
+            write_results(out, document)
+            borders = [math.inf if late is None else late.start for _, late in windows]
+            borders += [-math.inf] * len(others)
+            predictions = log_predictions(
+                [*read, *others], borders, observation, estimate, treatment, progress=progress
+            )
+            if validate:
+                files = [robot, bare.urdf, *logs, *validate]
+                origin = provenance(files, options, source if blocks else None, tuple(blocks))
+            study = DynamicsStudy(model.name, document, estimate, predictions, origin)
+            write_dynamics_report(out / "report.html", study)
+        return result
 
 
-def _recorded(fitted: Sequence[LogPart], train: RegressionData, treatment: Treatment) -> RecordedRows:
+def _recorded(
+    fitted: Sequence[LogPart], observation: Observation, base: BaseParameters, treatment: Treatment
+) -> RecordedRows:
     """The rows of the fit once more, log after log in this process."""
     logs, windows = [part.log for part in fitted], [part.window for part in fitted]
-    return RecordedRows(
-        train.observation, train.base, logs, windows, treatment.decimation, treatment.mask_standstill
-    )
+    return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

@@ -24,15 +24,21 @@ class LogPart:
     window: Window
 
 
-def read_logs(paths: Sequence[Path], model: RobotModel, treatment: Treatment, *, jobs: int) -> list[JointLog]:
-    """The logs, to be gone through again and again; of those for several `jobs` (processes) the first pass is done there."""
-    logs = [JointLog(path, model, treatment.cutoff_hz) for path in paths]
+def read_logs(
+    paths: Sequence[Path], model: RobotModel, treatment: Treatment, scratch: Path, *, jobs: int
+) -> list[JointLog]:
+    """The logs, filtered into files of the folder `scratch`, so many at once as there are `jobs` (processes).
+
+    Raises `InputError` and `FlexcalError` as `JointLog.read` does.
+    """
     if jobs == 1:
-        return logs
+        return [JointLog.read(path, model, treatment.cutoff_hz, scratch) for path in paths]
     from joblib import Parallel, delayed
 
-    surveyed: Any = Parallel(n_jobs=jobs)(delayed(log.surveyed)() for log in logs)
-    return surveyed
+    read: Any = Parallel(n_jobs=jobs)(
+        delayed(JointLog.read)(path, model, treatment.cutoff_hz, scratch) for path in paths
+    )
+    return read
 
 
 def log_systems(
@@ -46,7 +52,7 @@ def log_systems(
 ) -> list[ExperimentSystem]:
     """The equations of every part, in their order, whatever the number of `jobs` (processes) is.
 
-    Each part has at most about so many `batches`. Raises `InputError` and `FlexcalError` as `JointLog` and `experiment_system` do.
+    Each part has at most about so many `batches`. Raises `FlexcalError` as `experiment_system` does.
     """
     if jobs == 1:
         return [
