@@ -66,10 +66,10 @@ def test_the_energy_model_has_no_accelerations_and_blocks_add_up(
     """Cut anywhere, with accelerations that are nonsense, the rows are those of the whole."""
     motion = clean(500, 200.0)
     model = EnergyModel(observation)
-    whole = model.systems(motion)
+    whole = model.reduced(motion)
     garbled = replace(motion, ddq=rng.normal(size=motion.ddq.shape))
     memory = {}
-    parts = [model.systems(garbled.part(a, b), memory) for a, b in ((0, 3), (3, 4), (4, 260), (260, 500))]
+    parts = [model.reduced(garbled.part(a, b), memory) for a, b in ((0, 3), (3, 4), (4, 260), (260, 500))]
     np.testing.assert_allclose(np.hstack(parts), whole, rtol=1e-9, atol=1e-9)
 
 
@@ -78,8 +78,8 @@ def test_a_row_of_energy_is_the_work_of_its_window(
 ) -> None:
     """Against the integral of the power model's rows, accelerations and all, over 100 steps; the first windows are shorter."""
     motion = clean(4000, 1000.0)
-    power = PowerModel(observation).systems(motion)
-    energy = EnergyModel(observation).systems(motion)
+    power = PowerModel(observation).reduced(motion)
+    energy = EnergyModel(observation).reduced(motion)
     work = np.cumsum(0.5 * (power[:, 1:] + power[:, :-1]), axis=1) / 1000.0
     work = np.hstack([np.zeros((len(work), 1)), work])
     size = np.abs(energy).max(axis=1, keepdims=True) + 1e-9

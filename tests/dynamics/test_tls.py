@@ -132,14 +132,15 @@ def test_the_noise_of_a_log_is_read_from_it(
 ) -> None:
     std = np.array([1e-4, 2e-4, 5e-5, 1e-4, 1e-3, 1e-4])
     path = tmp_path / "log.parquet"
-    write_recording(path, Recording(1 / 200, swing.q + std * rng.normal(size=swing.q.shape), swing.torque))
-    log = JointLog(path, observation.model, 10.0)
-    np.testing.assert_allclose(position_noise(log), std, rtol=0.1)
-    (noisy,) = noisy_logs([log])
+    torque = 20.0 * np.cos(swing.q)
+    write_recording(path, Recording(1 / 200, swing.q + std * rng.normal(size=swing.q.shape), torque))
+    log = JointLog.read(path, observation.model, 10.0, tmp_path)
+    np.testing.assert_allclose(position_noise(log, observation.model), std, rtol=0.1)
+    (noisy,) = noisy_logs(recorded(observation, base, log))
     added = Motion.joined(noisy.blocks()).q - Motion.joined(log.blocks()).q
     again = Motion.joined(noisy.blocks()).q - Motion.joined(log.blocks()).q
     np.testing.assert_array_equal(added, again)
     passed = np.std(added, axis=0) / std  # a low-pass at 10 of 100 Hz leaves about a tenth of the power
     assert np.all((passed > 0.2) & (passed < 0.4))
     with pytest.raises(FlexcalError, match="positions as they were logged"):
-        noisy_logs([swing])
+        noisy_logs(recorded(observation, base, swing))

@@ -14,6 +14,7 @@ from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.rows import Experiment, Rows, rows
 from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel
 
 _EXACT = ("coulomb", "load_coulomb", "stribeck", "presliding", "torque_offset")
 """What names of columns begin with that are constants or signs of a velocity: these have no errors but at a reversal."""
@@ -40,29 +41,34 @@ def column_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> Regres
             count += int(keep.sum())
             parts = _difference(block.where(keep), spoilt.where(keep))
             held = [reduced([h, part.T]) for h, part in zip(held, parts, strict=True)]
-        for table, members in zip(held, observation.members, strict=True):
-            table[:, :-1][:, exact[members]] = 0.0
-        systems.append(ExperimentSystem((Batch(0, count, tuple(held)),), count, 0.0, 0))
+        whole = []
+        for table, spread, members in zip(held, observation.spread, observation.members, strict=True):
+            whole.append(np.column_stack([table[:, :-1] @ spread, table[:, -1]]))
+            whole[-1][:, :-1][:, exact[members]] = 0.0
+        systems.append(ExperimentSystem((Batch(0, count, tuple(whole)),), count, 0.0, 0))
     return RegressionData.of(observation, recorded.base, systems)
 
 
 def _difference(block: Rows, spoilt: Rows) -> Iterable[np.ndarray]:
-    for own, other in zip(block.systems, spoilt.systems, strict=True):
+    for own, other in zip(block.reduced, spoilt.reduced, strict=True):
         yield np.vstack([other[:-1] - own[:-1], np.zeros_like(own[-1:])])
 
 
-def noisy_logs(experiments: Sequence[Experiment]) -> list[NoisyLog]:
-    """The logs with their own position noise added once more; raises `FlexcalError` for an experiment that is no log."""
-    logs = [experiment for experiment in experiments if isinstance(experiment, JointLog)]
-    if len(logs) < len(experiments):
+def noisy_logs(recorded: RecordedRows) -> list[NoisyLog]:
+    """The recorded logs with their own position noise added once more; raises `FlexcalError` for an experiment that is no log."""
+    model = recorded.observation.model
+    logs = [experiment for experiment in recorded.experiments if isinstance(experiment, JointLog)]
+    if len(logs) < len(recorded.experiments):
         raise FlexcalError("total least squares needs the positions as they were logged, with their noise.")
-    return [NoisyLog(log, position_noise(log), _SEED + number) for number, log in enumerate(logs)]
+    return [
+        NoisyLog(log, model, position_noise(log, model), _SEED + number) for number, log in enumerate(logs)
+    ]
 
 
-def position_noise(log: JointLog) -> np.ndarray:
+def position_noise(log: JointLog, model: RobotModel) -> np.ndarray:
     """Standard deviation (n,) of the logged positions, rad or m, for white noise: by fourth differences, which no motion has."""
-    squares, count = np.zeros(log.model.n), 0
-    for recording in log_blocks(log.path, log.model):
+    squares, count = np.zeros(model.n), 0
+    for recording in log_blocks(log.path, model):
         rest = np.diff(recording.q, _ORDER, axis=0)
         squares += np.sum(rest**2, axis=0)
         count += len(rest)
@@ -74,6 +80,7 @@ class NoisyLog:
     """A log whose positions have more white noise, of standard deviations `std` (n,), the same at every pass."""
 
     log: JointLog
+    model: RobotModel
     std: np.ndarray
     seed: int
 
@@ -91,7 +98,7 @@ class NoisyLog:
 
     def blocks(self) -> Iterator[Motion]:
         rng = np.random.default_rng(self.seed)
-        recordings = log_blocks(self.log.path, self.log.model)
+        recordings = log_blocks(self.log.path, self.model)
         return filtered_motion(
             (replace(r, q=r.q + self.std * rng.normal(size=r.q.shape)) for r in recordings),
             self.log.cutoff_hz,

@@ -42,7 +42,7 @@ class EnergyModel(ScalarEquations):
 
     label = "the energy of all joints"
 
-    def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+    def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
         own = {} if memory is None else memory
         power, stored = self._power(motion, own), self._stored(motion)
         before: _Account = own.get("energy") or _Account.opened(motion.time[0], power[:, 0])

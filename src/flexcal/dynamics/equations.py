@@ -35,13 +35,18 @@ class Equations(Protocol):
         """For every equation the numbers of the parameters that stand in it, ascending."""
         ...
 
-    @property
-    def widths(self) -> list[int]:
-        """For every equation the number of its columns, and one for its right-hand side."""
+    @cached_property
+    def spread(self) -> tuple[np.ndarray, ...]:
+        """For every equation (reduced, members): its columns from its reduced ones, W = W_reduced · spread."""
         ...
 
-    def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """For every equation its columns and, last, its right-hand side, below each other (Σ widths, N), at every sample.
+    @cached_property
+    def widths(self) -> list[int]:
+        """For every equation the number of its reduced columns, and one for its right-hand side."""
+        ...
+
+    def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        """For every equation its reduced columns and, last, its right-hand side, below each other (Σ widths, N), at every sample.
 
         The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without.
         """

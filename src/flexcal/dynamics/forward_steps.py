@@ -87,7 +87,7 @@ def forward_steps(
 def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndarray:
     """W (N, n, p) of all columns."""
     found = np.zeros((len(motion), observation.model.n, len(observation.names)))
-    systems = np.split(observation.systems(motion, memory), np.cumsum(observation.widths)[:-1])
+    systems = observation.systems(motion, memory)
     for joint, (system, members) in enumerate(zip(systems, observation.members, strict=True)):
         found[:, joint, members] = system[:-1].T
     return found

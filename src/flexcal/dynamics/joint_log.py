@@ -21,13 +21,15 @@ _ROWS = 20_000
 
 @dataclass(frozen=True, eq=False)
 class JointLog:
-    """The log at `path`, its positions low-pass filtered: with the torques in the file `filtered`, in parts that begin at `starts`, s.
+    """The log at `path`, its positions low-pass filtered at `cutoff_hz`: with the torques in the file `filtered`, in parts that begin at
+    `starts`, s.
 
     The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `span` are the
     times of the first and the last sample of the log itself, s.
     """
 
     path: Path
+    cutoff_hz: float
     filtered: Path
     starts: tuple[float, ...]
     samples: int
@@ -66,7 +68,7 @@ class JointLog:
                 "set TMPDIR to a folder with room for 144 bytes a sample."
             ) from problem
         span = (read[0][0], read[-1][1])
-        return cls(path, Path(stream.name), tuple(starts), samples, read[0][2], top_speed, span)
+        return cls(path, cutoff_hz, Path(stream.name), tuple(starts), samples, read[0][2], top_speed, span)
 
     @property
     def name(self) -> str:

@@ -71,13 +71,11 @@ def _mean_rows(observation: Observation, motion: RepeatedMotion, factor: int) ->
     """[W, Y] of the mean period (2 K + 1, n, p + 1); friction that remembers begins as the first period leaves it."""
     memory: Memory = {}
     observation.follow(motion.periods[0], memory)
-    systems = observation.systems(motion.mean, memory).T
-    coefficients = _rows(systems, factor)
-    found = np.zeros((len(coefficients), observation.model.n, len(observation.names) + 1))
-    ends = np.cumsum(observation.widths)
-    for joint, (end, members) in enumerate(zip(ends, observation.members, strict=True)):
-        found[:, joint, members] = coefficients[:, end - len(members) - 1 : end - 1]
-        found[:, joint, -1] = coefficients[:, end - 1]
+    systems = [_rows(system.T, factor) for system in observation.systems(motion.mean, memory)]
+    found = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
+    for joint, (system, members) in enumerate(zip(systems, observation.members, strict=True)):
+        found[:, joint, members] = system[:, :-1]
+        found[:, joint, -1] = system[:, -1]
     return found
 
 
@@ -108,7 +106,7 @@ def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, me
     found = []
     for start in range(0, len(motion), _BLOCK):
         part = motion.part(start, min(start + _BLOCK, len(motion)))
-        systems = np.split(observation.systems(part, memory), np.cumsum(observation.widths)[:-1])
+        systems = observation.systems(part, memory)
         found.append(
             [s[-1] - parameters[m] @ s[:-1] for s, m in zip(systems, observation.members, strict=True)]
         )

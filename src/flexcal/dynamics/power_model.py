@@ -31,13 +31,10 @@ class PowerModel(ScalarEquations):
 
     label = "the power of all joints"
 
-    def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        torques = self.observation.systems(motion, memory)
+    def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        systems = self.observation.systems(motion, memory)
         power = np.zeros((len(self.names) + 1, len(motion)))
-        start = 0
-        for speed, members in zip(motion.dq.T, self.observation.members, strict=True):
-            stop = start + len(members)
-            power[members] += speed * torques[start:stop]
-            power[-1] += speed * torques[stop]
-            start = stop + 1
+        for speed, members, system in zip(motion.dq.T, self.observation.members, systems, strict=True):
+            power[members] += speed * system[:-1]
+            power[-1] += speed * system[-1]
         return power

@@ -23,8 +23,8 @@ class ScalarEquations(ABC):
     label: ClassVar[str]
 
     @abstractmethod
-    def systems(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """As `Equations.systems`."""
+    def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        """As `Equations.reduced`."""
 
     @property
     def model(self) -> RobotModel:
@@ -42,7 +42,11 @@ class ScalarEquations(ABC):
     def members(self) -> tuple[np.ndarray, ...]:
         return (np.arange(len(self.names)),)
 
-    @property
+    @cached_property
+    def spread(self) -> tuple[np.ndarray, ...]:
+        return (np.eye(len(self.names)),)
+
+    @cached_property
     def widths(self) -> list[int]:
         return [len(self.names) + 1]
 

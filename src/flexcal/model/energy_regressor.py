@@ -6,7 +6,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_batch
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.regressor import INERTIAL, torque_regressor
 from flexcal.model.robot_model import RobotModel
 
 
@@ -20,8 +20,9 @@ def energy_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray) -> np.nda
     if q.shape != dq.shape:
         raise FlexcalError(f"q and dq have shapes {q.shape} and {dq.shape}; give as many samples of each.")
     geometry, still = np.ascontiguousarray(model.geometry), np.zeros((*q.shape, 3))
-    momentum = model.tree.torque_regressor(geometry, np.zeros(3), q, np.zeros_like(q), dq)  # M q̇
-    energy = 0.5 * np.einsum("sj,jks->sk", dq, momentum)
+    rest = np.zeros_like(q)
+    momentum = torque_regressor(model, q, rest, dq) - torque_regressor(model, q, rest, rest)  # M q̇
+    energy = 0.5 * np.einsum("sj,sjk->sk", dq, momentum)
     for joint in range(model.n):
         origin = -geometry[joint, 3:]  # the length errors of a joint lie beyond its link's frame
         position, orientation, _, _ = model.tree.point(

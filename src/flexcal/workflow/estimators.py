@@ -34,9 +34,7 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "irls": huber_least_squares,
     "energy": lambda _, recorded: energy_least_squares(recorded),
     "power": lambda _, recorded: power_least_squares(recorded),
-    "tls": lambda data, recorded: total_least_squares(
-        data, column_errors(recorded, noisy_logs(recorded.experiments))
-    ),
+    "tls": lambda data, recorded: total_least_squares(data, column_errors(recorded, noisy_logs(recorded))),
     "ml": maximum_likelihood,
     "ekf": kalman_filter,
 }
