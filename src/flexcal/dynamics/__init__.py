@@ -1,7 +1,11 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
+from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.attenuation import attenuation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.column_errors import column_errors, noisy_logs
+from flexcal.dynamics.drive_play import with_play
+from flexcal.dynamics.drive_spring import DriveSpring, Play
 from flexcal.dynamics.drive_terms import (
     CLASSIC,
     Column,
@@ -48,6 +52,7 @@ from flexcal.dynamics.wls import weighted_least_squares
 __all__ = [
     "CLASSIC",
     "FRICTION_TERMS",
+    "ArmSide",
     "AsymmetricCoulomb",
     "BaseParameters",
     "Batch",
@@ -55,6 +60,7 @@ __all__ = [
     "Column",
     "Coulomb",
     "Coupling",
+    "DriveSpring",
     "DriveTerm",
     "EssentialParameters",
     "Experiment",
@@ -65,6 +71,7 @@ __all__ = [
     "Motion",
     "MotionBandwidth",
     "Observation",
+    "Play",
     "Presliding",
     "RecordedRows",
     "RegressionData",
@@ -79,6 +86,7 @@ __all__ = [
     "Viscous",
     "WarmUp",
     "Window",
+    "attenuation",
     "batches_each",
     "column_errors",
     "energy_least_squares",
@@ -99,4 +107,5 @@ __all__ = [
     "select_friction",
     "total_least_squares",
     "weighted_least_squares",
+    "with_play",
 ]

@@ -77,7 +77,7 @@ def _scores(
     root: np.ndarray,
 ) -> list[_Scores]:
     place = {number: i for i, number in enumerate(kept)}
-    joints = len(data.observation.members)
+    equations = len(data.observation.members)
     columns = [
         np.array([i for i, m in enumerate(members) if m in place]) for members in data.observation.members
     ]
@@ -91,10 +91,10 @@ def _scores(
         information = np.zeros((length, len(kept), len(kept)))
         for batch in batches:
             seen, missed = [], []
-            for joint, factor in enumerate(batch.factors):
-                sigma = noise[number * joints + joint]
-                seen.append(factor[:, columns[joint]] @ roots[joint] / sigma)
-                members = data.observation.members[joint]
+            for equation, factor in enumerate(batch.factors):
+                sigma = noise[number * equations + equation]
+                seen.append(factor[:, columns[equation]] @ roots[equation] / sigma)
+                members = data.observation.members[equation]
                 missed.append((factor[:, -1] - factor[:, :-1] @ parameters[members]) / sigma)
             matrix = np.vstack(seen)
             score[batch.number] = np.concatenate(missed) @ matrix

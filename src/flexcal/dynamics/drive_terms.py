@@ -17,7 +17,7 @@ Memory = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What torque (N,) one unit of the parameter `name` asks of one joint."""
+    """What torque (N,) one unit of the parameter `name` asks of one joint: the number of its equation in an `Observation`."""
 
     name: str
     joint: int

@@ -20,7 +20,8 @@ BATCHES = 128
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Rows that follow each other: `factors` has for every joint a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by reflections of its rows.
+    """Rows that follow each other: `factors` has for every equation of the observation a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by
+    reflections of its rows.
 
     `number` counts the batches of the experiment, whatever is left out; a batch without rows does not exist.
     """
@@ -55,7 +56,7 @@ def experiment_system(
 ) -> ExperimentSystem:
     """One pass over an experiment, in at most about so many `batches` of equal length.
 
-    `weights` (n, rows) are those of every joint's rows by their numbers; without, all count alike.
+    `weights` (equations, rows) are those of every equation's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
     """
     total = max(0, experiment.samples - 2 * decimation.support - 1) // decimation.factor + 1

@@ -37,8 +37,9 @@ def feasible_set(observation: Equations, system: Triangle) -> tuple[Cone, ...]:
     A link's pseudo-inertia is positive definite (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018), with CAD as its reference and the
     prior's relative standard deviation of the mass; the CAD mass bounds its mass. Without one the reference is a ball as heavy as the
     average link and as wide as this one is long. Rotor inertia and viscous friction are positive, as matrices where motors turn with
-    two joints; Coulomb friction is positive. A drive parameter that robot.yaml does not give has hardly a prior, and as reference the
-    least size at which one of its kind would be as large as all torques; one that the data do not depend on is left out.
+    two joints; Coulomb friction, and stiffness and damping of springs, are positive. A drive parameter that robot.yaml does not give
+    has hardly a prior, and as reference the least size at which one of its kind would be as large as all torques; one that the data do
+    not depend on is left out.
     """
     return (*_links(observation.model), *_drives(observation, system))
 
@@ -101,7 +102,8 @@ def _drives(observation: Equations, system: Triangle) -> Iterator[Cone]:
             yield Cone(np.array(members), np.array(basis), size, _DRIVE_FLOOR, std)
     for name in names:
         key = _kind(name)
-        if name in seen and (key == "coulomb" or key.startswith("coulomb_at_")):
+        positive = key in ("coulomb", "stiffness", "damping") or key.startswith("coulomb_at_")
+        if name in seen and positive:
             yield _scalar(names.index(name), reference(name)[0], _DRIVE_FLOOR, _UNKNOWN_STD)
 
 

@@ -42,7 +42,8 @@ class JointLog:
 
     @classmethod
     def read(cls, path: Path, model: RobotModel, cutoff_hz: float, scratch: Path) -> JointLog:
-        """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints.
+        """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints,
+        and 48 for their arm sides.
 
         Raises `InputError` as `log_blocks` does, and `FlexcalError` as `filtered_positions` does and where the folder cannot take it.
         """
@@ -57,20 +58,21 @@ class JointLog:
         lowest, highest = np.full(model.n, np.inf), np.full(model.n, -np.inf)
         try:
             with NamedTemporaryFile(dir=scratch, suffix=".npy", delete=False) as stream:
-                for part in filtered_positions(watched(), cutoff_hz):
+                for part in filtered_positions(watched(), cutoff_hz, model.config.dynamics.torque):
                     if not len(part):
                         continue
                     np.save(stream, part.q.T)
                     np.save(stream, part.torque.T)
                     starts.append(part.start)
                     samples += len(part)
-                    top_speed = np.maximum(top_speed, part.motion().top_speed)
-                    lowest = np.minimum(lowest, part.q.min(axis=0))
-                    highest = np.maximum(highest, part.q.max(axis=0))
+                    motion = part.motion()
+                    top_speed = np.maximum(top_speed, motion.top_speed)
+                    lowest = np.minimum(lowest, motion.q.min(axis=0))
+                    highest = np.maximum(highest, motion.q.max(axis=0))
         except OSError as problem:
             raise FlexcalError(
                 f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
-                "set TMPDIR to a folder with room for 96 bytes a sample."
+                "set TMPDIR to a folder with room for 144 bytes a sample."
             ) from problem
         top_speed[highest - lowest < _MOVES] = 0.0
         span = (read[0][0], read[-1][1])

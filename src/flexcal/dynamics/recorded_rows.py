@@ -20,7 +20,7 @@ from flexcal.dynamics.rows import Experiment, Window, rows
 class RecordedRows:
     """Where the equations of a fit come from; every method is one pass over all `experiments`, of which each has a window.
 
-    Of the rows that are kept between passes only one number a row and joint stays in memory.
+    Of the rows that are kept between passes only one number a row and equation stays in memory.
     """
 
     observation: Observation
@@ -31,12 +31,11 @@ class RecordedRows:
     mask_standstill: bool = True
 
     def residuals(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Y − W χ (n, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
+        """Y − W χ (equations, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
         found = []
         for experiment, window in zip(self.experiments, self.windows, strict=True):
-            missed = np.full(
-                (self.observation.model.n, experiment.samples // self.decimation.factor + 1), np.nan
-            )
+            count = experiment.samples // self.decimation.factor + 1
+            missed = np.full((len(self.observation.labels), count), np.nan)
             for block in rows(self.observation, experiment, self.decimation, window):
                 part = block.where(~block.still) if self.mask_standstill else block
                 missed[:, part.number] = part.torque - part.predicted(self.observation.members, parameters)
@@ -44,7 +43,7 @@ class RecordedRows:
         return found
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
-        """The equations, each multiplied by the root of its weight: (n, rows) an experiment, as `residuals` are."""
+        """The equations, each multiplied by the root of its weight: (equations, rows) an experiment, as `residuals` are."""
         return self._data(self.observation, weights)
 
     def observed_as(self, equations: Equations) -> RegressionData:
