@@ -96,9 +96,10 @@ def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndar
 def _steps(
     observation: Observation, motion: Motion, stride: int, memory: Memory, slowest: np.ndarray
 ) -> ForwardSteps:
-    middle = Motion(
-        *(_means(part, stride) for part in (motion.time, motion.q, motion.dq, motion.ddq, motion.torque))
+    time, q, dq, ddq, torque = (
+        _means(part, stride) for part in (motion.time, motion.q, motion.dq, motion.ddq, motion.torque)
     )
+    middle = Motion(time, q, dq, ddq, torque)
     before = dict(memory)
     whole = columns(observation, middle, memory)
     n = observation.model.n
