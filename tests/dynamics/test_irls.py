@@ -103,7 +103,7 @@ def test_a_second_pass_gives_the_equations_of_the_first(
     weighted = again.weighted([np.ones_like(r) for r in residuals])
     for first, second in zip(data.subsystems, weighted.subsystems, strict=True):
         np.testing.assert_array_equal(first.triangle.factor, second.triangle.factor)
-        own = residuals[first.experiment][first.joint]
+        own = residuals[first.experiment][first.equation]
         assert np.isfinite(own).sum() == first.triangle.rows
         expected = first.triangle.residual(truth[first.members])
         assert np.sqrt(np.nansum(own**2)) == pytest.approx(expected, rel=1e-10)

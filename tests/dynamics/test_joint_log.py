@@ -21,6 +21,7 @@ from flexcal.dynamics import (
 from flexcal.dynamics.rows import rows
 from flexcal.errors import FlexcalError, InputError
 from flexcal.progress import silent
+from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.treatment import Treatment
 
@@ -108,3 +109,21 @@ def test_a_gap_is_refused(swing: Motion, observation: Observation, tmp_path: Pat
 def test_no_room_for_the_filtered_log(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
     with pytest.raises(FlexcalError, match=r"cannot take the filtered log \(No such file.*set TMPDIR"):
         JointLog.read(logs[0], observation.model, 10.0, tmp_path / "nowhere")
+
+
+def test_a_joint_that_never_moves(swing: Motion, observation: Observation, tmp_path: Path) -> None:
+    """The noise of its encoder is no motion; its drive is named as not seen, the others are identified."""
+    rng, path = np.random.default_rng(2), tmp_path / "log.csv"
+    q = swing.q.copy()
+    q[:, 1] = 0.4 + 1e-5 * rng.normal(size=len(q))
+    write_recording(path, Recording(STEP, q, 20.0 * np.cos(q) + rng.normal(size=q.shape)))
+    log = JointLog.read(path, observation.model, 10.0, tmp_path)
+    motion = Motion.joined(log.blocks())
+    assert not motion.dq[:, 1].any() and not motion.ddq[:, 1].any()
+    data = observe(observation, BaseParameters.of(observation), [log], Decimation(2))
+    assert data.silent == ("joint_2.rotor_inertia", "joint_2.viscous", "joint_2.coulomb")
+    estimate = weighted_least_squares(data)
+    assert not set(data.silent) & {n for n, k in zip(data.names, estimate.identifiable, strict=True) if k}
+    assert dynamics_remarks(data, estimate, "wls")[0] == (
+        "joint_2: rotor_inertia, viscous, coulomb stay as they were: these recordings leave their columns at zero"
+    )

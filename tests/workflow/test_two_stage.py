@@ -13,11 +13,13 @@ import polars as pl
 import pytest
 
 from flexcal.calibration import ErrorStatistics
+from flexcal.cell import read_truth
 from flexcal.data import read_estimates, sha256_of
 from flexcal.estimates_file import block_sha256
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.workflow import two_stage
 from flexcal.workflow.frequency_plans import frequency_plan
+from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
 TOLD: list[tuple[str, float]] = []
 """Progress of the run."""
@@ -39,6 +41,17 @@ def demo(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[P
             examples / "tx90l" / "robot.yaml", out, seed=77, progress=lambda *call: TOLD.append(call)
         )
     yield out
+
+
+def test_drives_agree_with_those_from_the_arm_side(demo: Path, arm_side_logs, tmp_path: Path) -> None:
+    """Frequency response and flexible model (Eq. 2.22) of one robot: their 95 % intervals meet at every drive."""
+    robot, logs = arm_side_logs(tmp_path, read_truth(demo / "truth.yaml"), 77, 4)
+    flexible = identify_robot_dynamics(robot, logs, flexible=True).estimate
+    stage1 = read_estimates(demo / "estimates.yaml")["stiffness"]
+    for name in (f"joint_{i}.drive.stiffness" for i in (1, 2, 3)):
+        (low, high), (soft, stiff) = stage1.interval(name) or (), flexible.interval(name) or ()
+        assert low < stiff and soft < high, name
+        assert high - low < 0.3 * flexible.values[name]
 
 
 def test_every_stage_tells_how_far_it_is(demo: Path) -> None:

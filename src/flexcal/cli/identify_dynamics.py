@@ -12,6 +12,8 @@ from flexcal.cli.console import Console
 from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
+_SPRINGS = (".drive.stiffness", ".drive.damping")
+
 
 @dataclass(frozen=True)
 class IdentifyDynamics:
@@ -31,10 +33,16 @@ class IdentifyDynamics:
     """Keep the last share of every log's time out of the fit, and predict its torques."""
     validate: Annotated[tuple[Path, ...], arg(metavar="LOG", help_behavior_hint="")] = ()
     """Logs that the fit does not see, whose torques it predicts."""
-    estimator: Literal["wls", "ols", "sdp", "irls", "iv", "didim"] = "wls"
+    estimator: Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"] = (
+        "wls"
+    )
     """wls: every joint and log by its own noise; ols: every equation alike; sdp: as wls, among robots that can be built;
-    irls: as wls, with single rows that miss by far held back; iv: as wls, without the bias of noisy velocities; didim: from torques alone.
-    iv and didim simulate the robot under the `controller:` of robot.yaml, again and again."""
+    irls: as wls, with single rows that miss by far held back; iv: as wls, without the bias of noisy velocities; didim: from torques
+    alone (both simulate the robot under the `controller:` of robot.yaml); energy, power: all joints together in one equation a row;
+    tls: as wls, knowing the noise of the positions; ml: from the scatter between four or more periods of one motion;
+    ekf: in one go with positions and velocities, as a Kalman filter."""
+    flexible: bool = False
+    """Tell motors and arm of elastic joints apart, by logs that have the arm side (qa1…), and find the stiffness of the drives."""
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
@@ -43,7 +51,7 @@ class IdentifyDynamics:
 
     def run(self) -> None:
         """Fit, and print the base parameters and the error of the torques."""
-        from flexcal.cli.tables import base_parameter_table, friction_table
+        from flexcal.cli.tables import base_parameter_table, friction_table, quantity_table
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
         require_robot(self.robot, *self.logs)
@@ -60,12 +68,17 @@ class IdentifyDynamics:
                 hold_out=share,
                 validate=self.validate,
                 estimator=self.estimator,
+                flexible=self.flexible,
                 out=self.out,
                 jobs=self.jobs,
                 progress=progress,
             )
         document = found.document()
         console.show(base_parameter_table(document["base_parameters"]))
+        if self.flexible:
+            springs = {name: q for name, q in document["parameters"].items() if name.endswith(_SPRINGS)}
+            units = {item.name: item.unit for item in found.estimate.parameters}
+            console.show(quantity_table("drives of the elastic joints", springs, units))
         console.say(
             f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"

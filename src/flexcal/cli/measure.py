@@ -57,7 +57,10 @@ class Measure:
                 truth=self.truth,
                 progress=progress,
             )
-        if found.recordings:
+        if found.kind == "trajectory":
+            console.say(f"wrote {found.recordings} recordings to {self.out}")
+            following = f"flexcal identify dynamics {robot} {self.out}/*.parquet"
+        elif found.recordings:
             console.say(f"wrote {found.recordings} recordings of {found.poses} poses to {self.out}")
             following = f"flexcal identify response {robot} {self.out} --out responses"
         else:

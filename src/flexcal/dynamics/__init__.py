@@ -1,8 +1,13 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
+from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.attenuation import attenuation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.column_errors import column_errors, noisy_logs
 from flexcal.dynamics.didim import direct_and_inverse
 from flexcal.dynamics.drive_gains import drive_gains
+from flexcal.dynamics.drive_play import with_play
+from flexcal.dynamics.drive_spring import DriveSpring, Play
 from flexcal.dynamics.drive_terms import (
     CLASSIC,
     Column,
@@ -13,6 +18,8 @@ from flexcal.dynamics.drive_terms import (
     TorqueOffset,
     Viscous,
 )
+from flexcal.dynamics.ekf import kalman_filter
+from flexcal.dynamics.energy_model import energy_least_squares
 from flexcal.dynamics.essential_parameters import EssentialParameters, essential_parameters
 from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, experiment_system
 from flexcal.dynamics.feasible import feasible_least_squares
@@ -30,15 +37,18 @@ from flexcal.dynamics.friction_terms import FRICTION_TERMS
 from flexcal.dynamics.instrumental_variables import instrumental_variables
 from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
+from flexcal.dynamics.maximum_likelihood import maximum_likelihood
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.power_model import power_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
+from flexcal.dynamics.tls import total_least_squares
 from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
@@ -46,6 +56,7 @@ from flexcal.dynamics.wls import weighted_least_squares
 __all__ = [
     "CLASSIC",
     "FRICTION_TERMS",
+    "ArmSide",
     "AsymmetricCoulomb",
     "BaseParameters",
     "Batch",
@@ -53,6 +64,7 @@ __all__ = [
     "Column",
     "Coulomb",
     "Coupling",
+    "DriveSpring",
     "DriveTerm",
     "EssentialParameters",
     "Experiment",
@@ -63,6 +75,7 @@ __all__ = [
     "Motion",
     "MotionBandwidth",
     "Observation",
+    "Play",
     "Presliding",
     "RecordedRows",
     "RegressionData",
@@ -78,20 +91,29 @@ __all__ = [
     "Viscous",
     "WarmUp",
     "Window",
+    "attenuation",
     "batches_each",
+    "column_errors",
     "direct_and_inverse",
     "drive_gains",
+    "energy_least_squares",
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",
     "huber_least_squares",
     "identify_with_prior",
     "instrumental_variables",
+    "kalman_filter",
     "log_blocks",
+    "maximum_likelihood",
     "motion_bandwidth",
+    "noisy_logs",
     "observe",
     "ordinary_least_squares",
+    "power_least_squares",
     "predict_torques",
     "select_friction",
+    "total_least_squares",
     "weighted_least_squares",
+    "with_play",
 ]

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.dynamics.arm_side import ArmSide
 from flexcal.dynamics.link_columns import random_states, scale_by_kind
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
@@ -45,10 +46,11 @@ class BaseParameters:
         model, names = observation.model, observation.names
         samples = _SAMPLES_PER_PARAMETER * len(names)
         q, dq, ddq = random_states(model, samples)
-        columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q)))
-        matrix = np.zeros((model.n * samples, len(names)))
-        for joint, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
-            matrix[joint * samples : (joint + 1) * samples, members] = block.T
+        arm = ArmSide(*np.roll((q, dq, ddq), 1, axis=1))
+        columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q), arm))
+        matrix = np.zeros((len(columns) * samples, len(names)))
+        for k, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
+            matrix[k * samples : (k + 1) * samples, members] = block.T
         prefer = [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
         prefer += [name for name in names if name not in set(prefer)]
         return cls(analyse(matrix, names, scale=scale_by_kind(matrix, names), prefer=prefer))

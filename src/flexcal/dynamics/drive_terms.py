@@ -4,20 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from flexcal.dynamics.motion import Motion
 from flexcal.model import RobotModel
 
-Memory = dict[str, tuple[float, float]]
+Memory = dict[str, Any]
 """What terms carry from one block of an experiment to the next; empty at its start."""
 
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What torque (N,) one unit of the parameter `name` asks of one joint."""
+    """What torque (N,) one unit of the parameter `name` asks of one joint: the number of its equation in an `Observation`."""
 
     name: str
     joint: int

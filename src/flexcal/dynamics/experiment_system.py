@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.filtering import Decimation
-from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.rows import Experiment, Rows, Window, rows
 from flexcal.dynamics.triangle import triangular
 from flexcal.errors import FlexcalError
@@ -21,7 +21,8 @@ BATCHES = 128
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Rows that follow each other: `factors` has for every joint a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by reflections of its rows.
+    """Rows that follow each other: `factors` has for every equation of the observation a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by
+    reflections of its rows.
 
     `number` counts the batches of the experiment, whatever is left out; a batch without rows does not exist.
     """
@@ -45,7 +46,7 @@ class ExperimentSystem:
 
 
 def experiment_system(
-    observation: Observation,
+    observation: Equations,
     experiment: Experiment,
     decimation: Decimation,
     window: Window,
@@ -56,7 +57,7 @@ def experiment_system(
 ) -> ExperimentSystem:
     """One pass over an experiment, in at most about so many `batches` of equal length.
 
-    `weights` (n, rows) are those of every joint's rows by their numbers; without, all count alike.
+    `weights` (equations, rows) are those of every equation's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
     """
     blocks = rows(observation, experiment, decimation, window)

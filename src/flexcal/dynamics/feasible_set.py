@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from flexcal.dynamics.cone import Cone
-from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model import Inertia, RobotModel
 from flexcal.model.pseudo_inertia import PSEUDO_INERTIA, pseudo_inertia
@@ -31,14 +31,15 @@ _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.05
 """kg and m, of a link of which neither URDF nor the other links tell anything."""
 
 
-def feasible_set(observation: Observation, system: Triangle) -> tuple[Cone, ...]:
+def feasible_set(observation: Equations, system: Triangle) -> tuple[Cone, ...]:
     """The cones of all links and drives of an observation, whose weighted equations are `system`.
 
     A link's pseudo-inertia is positive definite (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018), with CAD as its reference and the
     prior's relative standard deviation of the mass; the CAD mass bounds its mass. Without one the reference is a ball as heavy as the
     average link and as wide as this one is long. Rotor inertia and viscous friction are positive, as matrices where motors turn with
-    two joints; Coulomb friction is positive. A drive parameter that robot.yaml does not give has hardly a prior, and as reference the
-    least size at which one of its kind would be as large as all torques; one that the data do not depend on is left out.
+    two joints; Coulomb friction, and stiffness and damping of springs, are positive. A drive parameter that robot.yaml does not give
+    has hardly a prior, and as reference the least size at which one of its kind would be as large as all torques; one that the data do
+    not depend on is left out.
     """
     return (*_links(observation.model), *_drives(observation, system))
 
@@ -72,7 +73,7 @@ def _guessed(model: RobotModel, link: int) -> Inertia:
     return Inertia(mass, np.zeros(3), 0.4 * mass * radius**2 * np.eye(3))
 
 
-def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
+def _drives(observation: Equations, system: Triangle) -> Iterator[Cone]:
     model, names = observation.model, observation.names
     torque, sizes = float(np.linalg.norm(system.right)) or 1.0, np.linalg.norm(system.matrix, axis=0)
     largest: dict[str, float] = {}
@@ -101,7 +102,8 @@ def _drives(observation: Observation, system: Triangle) -> Iterator[Cone]:
             yield Cone(np.array(members), np.array(basis), size, _DRIVE_FLOOR, std)
     for name in names:
         key = _kind(name)
-        if name in seen and (key == "coulomb" or key.startswith("coulomb_at_")):
+        positive = key in ("coulomb", "stiffness", "damping") or key.startswith("coulomb_at_")
+        if name in seen and positive:
             yield _scalar(names.index(name), reference(name)[0], _DRIVE_FLOOR, _UNKNOWN_STD)
 
 

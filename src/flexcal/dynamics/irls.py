@@ -57,7 +57,7 @@ def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimat
 def _robust_noise(data: RegressionData, residuals: Sequence[np.ndarray]) -> list[float]:
     """σ̂ of each subsystem, N m, by the median."""
     return [
-        s.floored(_NORMAL * float(np.nanmedian(np.abs(residuals[s.experiment][s.joint]))))
+        s.floored(_NORMAL * float(np.nanmedian(np.abs(residuals[s.experiment][s.equation]))))
         for s in data.subsystems
     ]
 

@@ -20,18 +20,23 @@ from flexcal.model import RobotModel
 
 _ROWS = 20_000
 """Rows of the file that are in memory at once."""
+_MOVES = 1e-3
+"""rad or m from end to end, at least, of a joint that moves."""
 
 
 @dataclass(frozen=True, eq=False)
 class JointLog:
-    """The log at `path`, its positions low-pass filtered: with the torques in the file `filtered`, in parts that begin at `starts`, s.
+    """The log at `path`, its positions low-pass filtered at `cutoff_hz`: with the torques in the file `filtered`, in parts that begin at
+    `starts`, s.
 
     The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `span` are the
     times of the first and the last sample of the log itself, s. `payload` is kg, as the column `payload` says, None where there is
-    none; `weight` is what its torques carry.
+    none; `weight` is what its torques carry. A joint that never moves has no velocity and no acceleration: what its encoder shows of
+    them is noise, of which friction would take the sign.
     """
 
     path: Path
+    cutoff_hz: float
     filtered: Path
     starts: tuple[float, ...]
     samples: int
@@ -43,7 +48,8 @@ class JointLog:
 
     @classmethod
     def read(cls, path: Path, model: RobotModel, cutoff_hz: float, scratch: Path) -> JointLog:
-        """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints.
+        """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints,
+        and 48 for their arm sides.
 
         Raises `InputError` as `log_blocks` does, and `FlexcalError` as `filtered_positions` does and where the folder cannot take it.
         """
@@ -60,24 +66,30 @@ class JointLog:
                 yield recording
 
         starts, samples, top_speed = [], 0, np.zeros(model.n)
+        lowest, highest = np.full(model.n, np.inf), np.full(model.n, -np.inf)
         try:
             with NamedTemporaryFile(dir=scratch, suffix=".npy", delete=False) as stream:
-                for part in filtered_positions(watched(), cutoff_hz):
+                for part in filtered_positions(watched(), cutoff_hz, model.config.dynamics.torque):
                     if not len(part):
                         continue
                     np.save(stream, part.q.T)
                     np.save(stream, part.torque.T)
                     starts.append(part.start)
                     samples += len(part)
-                    top_speed = np.maximum(top_speed, part.motion().top_speed)
+                    motion = part.motion()
+                    top_speed = np.maximum(top_speed, motion.top_speed)
+                    lowest = np.minimum(lowest, motion.q.min(axis=0))
+                    highest = np.maximum(highest, motion.q.max(axis=0))
         except OSError as problem:
             raise FlexcalError(
                 f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
-                "set TMPDIR to a folder with room for 96 bytes a sample."
+                "set TMPDIR to a folder with room for 144 bytes a sample."
             ) from problem
+        top_speed[highest - lowest < _MOVES] = 0.0
         span = (read[0][0], read[-1][1])
         return cls(
             path,
+            cutoff_hz,
             Path(stream.name),
             tuple(starts),
             samples,
@@ -98,7 +110,10 @@ class JointLog:
         with self.filtered.open("rb") as stream:
             for start in self.starts:
                 q, torque = np.load(stream).T, np.load(stream).T
-                yield FilteredPositions(start, self.time_step, q, torque).motion()
+                motion = FilteredPositions(start, self.time_step, q, torque).motion()
+                motion.dq[:, self.top_speed == 0] = 0.0
+                motion.ddq[:, self.top_speed == 0] = 0.0
+                yield motion
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -22,45 +23,82 @@ def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
     is that of `batch_covariance`, in place of (WᵀW)⁻¹ σ̂² (Eq. 2.30), which takes the errors for independent from row to row.
     Raises `FlexcalError` with no more rows than parameters.
     """
-    names = data.names
     system = weighted_system(data, noise)
-    base = data.base.found
-    structural = [names[i] for i in base.kept]
-    seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
-    kept = [base.kept[i] for i in seen.kept]
-    start = data.observation.values()
-    right = system.right - system.matrix @ start
-    scale = 1.0 / np.linalg.norm(system.matrix[:, kept], axis=0)
-    factor = Triangle.of(system.matrix[:, kept] * scale, right).factor
+    unknowns = Unknowns.of(data, system)
+    kept, start = unknowns.kept, data.observation.values()
+    factor, scale = unknowns.reduced(system)
     triangle, target = factor[:-1, :-1], factor[:-1, -1]
     found = start.copy()
     found[kept] += scale * np.linalg.solve(triangle, target)
-    freedom = system.rows - len(kept)
-    if freedom <= 0:
-        raise FlexcalError(
-            f"{system.rows} equations do not determine {len(kept)} parameters; record for longer."
-        )
+    freedom = unknowns.freedom(system)
     cost = float(factor[-1, -1] ** 2)
     root = scale[:, None] * np.linalg.solve(triangle, np.eye(len(kept)))
     spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
-    covariance = np.zeros((len(names), len(names)))
-    covariance[np.ix_(kept, kept)] = spread.covariance
-    return Estimate(
-        parameters=Parameters(
-            Parameter(name, unit_of(name), float(v)) for name, v in zip(names, found, strict=True)
-        ),
-        covariance=covariance,
-        rank=len(kept),
-        dropped=_dropped(base.regrouping, names, base.kept, seen.dropped),
-        identifiable=tuple(i in set(kept) for i in range(len(names))),
-        cost=cost,
-        chi2=cost,
-        degrees_of_freedom=freedom,
-        status="converged",
-        message="linear least squares",
-        iterations=1,
-        covariance_freedom=spread.freedom,
-    )
+    return unknowns.estimate(found, spread.covariance, spread.freedom, cost, freedom, "linear least squares")
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """What a linear estimator estimates: the `kept` columns (k,), of a system that leaves the `hidden` base parameters open."""
+
+    data: RegressionData
+    kept: list[int]
+    hidden: tuple[Dropped, ...]
+
+    @classmethod
+    def of(cls, data: RegressionData, system: Triangle) -> Unknowns:
+        """The base parameters that a weighted `system` of all columns determines."""
+        base = data.base.found
+        structural = [data.names[i] for i in base.kept]
+        seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
+        return cls(data, [base.kept[i] for i in seen.kept], seen.dropped)
+
+    def reduced(self, system: Triangle) -> tuple[np.ndarray, np.ndarray]:
+        """R (k + 1, k + 1) of the kept columns times a scale (k,), and of what is left of Y at the model's values; and that scale."""
+        right = system.right - system.matrix @ self.data.observation.values()
+        scale = 1.0 / np.linalg.norm(system.matrix[:, self.kept], axis=0)
+        return Triangle.of(system.matrix[:, self.kept] * scale, right).factor, scale
+
+    def freedom(self, system: Triangle) -> int:
+        """Rows less parameters; raises `FlexcalError` where none is left."""
+        freedom = system.rows - len(self.kept)
+        if freedom <= 0:
+            raise FlexcalError(
+                f"{system.rows} equations do not determine {len(self.kept)} parameters; record for longer."
+            )
+        return freedom
+
+    def estimate(
+        self,
+        found: np.ndarray,
+        covariance: np.ndarray,
+        covariance_freedom: float,
+        cost: float,
+        freedom: int,
+        message: str,
+        iterations: int = 1,
+    ) -> Estimate:
+        """Of all parameters `found` (p,), with the `covariance` (k, k) of the kept ones."""
+        names, base = self.data.names, self.data.base.found
+        whole = np.zeros((len(names), len(names)))
+        whole[np.ix_(self.kept, self.kept)] = covariance
+        seen = set(self.kept)
+        return Estimate(
+            parameters=Parameters(
+                Parameter(name, unit_of(name), float(v)) for name, v in zip(names, found, strict=True)
+            ),
+            covariance=whole,
+            rank=len(self.kept),
+            dropped=_dropped(base.regrouping, names, base.kept, self.hidden),
+            identifiable=tuple(i in seen for i in range(len(names))),
+            cost=cost,
+            chi2=cost,
+            degrees_of_freedom=freedom,
+            status="converged",
+            message=message,
+            iterations=iterations,
+            covariance_freedom=covariance_freedom,
+        )
 
 
 def weighted_system(data: RegressionData, noise: Sequence[float]) -> Triangle:

@@ -5,11 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from itertools import chain
+from typing import Literal
 
 import numpy as np
 
 from flexcal.data import Recording
 from flexcal.data.low_pass import LowPass
+from flexcal.dynamics.arm_side import ArmSide
+
+TorqueLog = Literal["held", "instantaneous", "mean"]
+"""What a logged torque is over its sample."""
 
 _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
@@ -19,13 +24,17 @@ _BESIDE = 2
 
 @dataclass(frozen=True, eq=False)
 class Motion:
-    """`q`, `dq`, `ddq` (N, n) in rad, m and s, the motor `torque` (N, n) referred to the joint, at `time` (N,), s."""
+    """`q`, `dq`, `ddq` (N, n) in rad, m and s, the motor `torque` (N, n) referred to the joint, at `time` (N,), s.
+
+    Positions are the motors', referred to the joint; `arm` has those behind elastic drives, where they were measured.
+    """
 
     time: np.ndarray
     q: np.ndarray
     dq: np.ndarray
     ddq: np.ndarray
     torque: np.ndarray
+    arm: ArmSide | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -52,23 +61,28 @@ class Motion:
     def part(self, start: int, stop: int) -> Motion:
         """Samples from `start` to before `stop`."""
         at = slice(start, stop)
-        return Motion(self.time[at], self.q[at], self.dq[at], self.ddq[at], self.torque[at])
+        arm = None if self.arm is None else self.arm.part(start, stop)
+        return Motion(self.time[at], self.q[at], self.dq[at], self.ddq[at], self.torque[at], arm)
 
     @classmethod
     def joined(cls, parts: Iterable[Motion]) -> Motion:
         """Motions that follow each other as one."""
-        columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in parts), strict=True)
-        return cls(*(np.concatenate(column) for column in columns))
+        held = list(parts)
+        columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in held), strict=True)
+        return cls(*(np.concatenate(column) for column in columns), arm=ArmSide.joined([m.arm for m in held]))
 
     @classmethod
-    def of(cls, recording: Recording, cutoff_hz: float) -> Motion:
+    def of(cls, recording: Recording, cutoff_hz: float, torque: TorqueLog = "instantaneous") -> Motion:
         """All of a recording as `filtered_motion` gives it; raises `FlexcalError` as that does."""
-        return cls.joined(filtered_motion([recording], cutoff_hz))
+        return cls.joined(filtered_motion([recording], cutoff_hz, torque))
 
 
 @dataclass(frozen=True, eq=False)
 class FilteredPositions:
-    """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before."""
+    """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before.
+
+    Where the arm side was measured too, its positions follow those of the motors: `q` (N + 4, 2 n).
+    """
 
     start: float
     time_step: float
@@ -86,16 +100,26 @@ class FilteredPositions:
     def motion(self) -> Motion:
         """With velocities and accelerations by central differences."""
         time = self.start + self.time_step * np.arange(len(self))
-        return Motion(time, *differences(self.q, self.time_step), self.torque)
+        n = self.torque.shape[1]
+        q, dq, ddq = differences(self.q, self.time_step)
+        arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if q.shape[1] > n else None
+        return Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], self.torque, arm)
 
 
-def filtered_motion(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[Motion]:
+def filtered_motion(
+    recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog = "instantaneous"
+) -> Iterator[Motion]:
     """The motions of `filtered_positions`; raises `FlexcalError` as that does."""
-    return (part.motion() for part in filtered_positions(recordings, cutoff_hz))
+    return (part.motion() for part in filtered_positions(recordings, cutoff_hz, torque))
 
 
-def filtered_positions(recordings: Iterable[Recording], cutoff_hz: float) -> Iterator[FilteredPositions]:
-    """Positions through a zero-phase low-pass; the torque as measured.
+def filtered_positions(
+    recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog = "instantaneous"
+) -> Iterator[FilteredPositions]:
+    """Positions through a zero-phase low-pass; the torque at the same instants.
+
+    A logged `torque` that is held until the next sample, or is the mean until then, belongs to the middle of that step: the torque at a
+    sample is the mean of its own and the one before. Half a sample of delay between torque and twist would count as K T/2 of damping.
 
     `recordings` follow each other without a seam, as blocks of one log; so do the parts, and they do not depend on where the blocks
     are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
@@ -105,16 +129,28 @@ def filtered_positions(recordings: Iterable[Recording], cutoff_hz: float) -> Ite
     first = next(iterator)
     step = first.time_step
     border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
-    columns = ((recording.q, recording.torque) for recording in chain([first], iterator))
+    columns = _columns(chain([first], iterator), torque)
     number, held = 0, None
-    for q, torque in smoothed(columns, LowPass(step, cutoff_hz)):
+    for q, acted in smoothed(columns, LowPass(step, cutoff_hz)):
         if held is not None:
             yield held
-        found = FilteredPositions(first.start + step * number, step, q, torque)
+        found = FilteredPositions(first.start + step * number, step, q, acted)
         held = found.part(min(max(0, border - number), len(found)), len(found))
         number += len(found)
     if held is not None:
         yield held.part(0, len(held) - border)
+
+
+def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Positions (motor side, then arm side where measured) and the torques that act at the same instants."""
+    last = None
+    for recording in recordings:
+        sides = [recording.q] if recording.arm is None else [recording.q, recording.arm]
+        acted = recording.torque
+        if torque != "instantaneous":
+            before = np.concatenate([acted[:1] if last is None else last, acted[:-1]])
+            last, acted = acted[-1:], 0.5 * (acted + before)
+        yield np.hstack(sides), acted
 
 
 def smoothed(

@@ -1,4 +1,4 @@
-"""The observation matrix of a robot, joint by joint: link inertials and drive terms (Eq. 2.20)."""
+"""The observation matrix of a robot, joint by joint: link inertials and drive terms, rigid (Eq. 2.20) or flexible (Eq. 2.22)."""
 
 from __future__ import annotations
 
@@ -8,6 +8,8 @@ from functools import cached_property
 
 import numpy as np
 
+from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.drive_spring import DriveSpring
 from flexcal.dynamics.drive_terms import Column, DriveTerm, Memory
 from flexcal.dynamics.link_columns import LinkColumns, link_columns
 from flexcal.dynamics.motion import Motion
@@ -19,12 +21,16 @@ from flexcal.model.regressor import INERTIAL, write_torque_regressor
 class Observation:
     """Which parameters the torques depend on, and how.
 
+    There is one equation a joint, and after them one a motor that is connected by one of the `springs`: that of the motor alone. The
+    joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor.
+
     Of the columns of a joint that the links bring, some always are combinations of others, whatever the motion is. `reduced` leaves them
-    out, and `spread` (one a joint) says how the others give them back: W = W_reduced · spread.
+    out, and `spread` (one an equation) says how the others give them back: W = W_reduced · spread.
     """
 
     model: RobotModel
     terms: tuple[DriveTerm, ...]
+    springs: tuple[DriveSpring, ...] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -32,16 +38,31 @@ class Observation:
         drives = [column.name for column in self._at_rest]
         return (*inertial_names(self.model), *dict.fromkeys(drives))
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The joints' names, then those of the motors alone."""
+        return (*self.model.joint_names, *(f"{motor}, motor" for motor in self.motors))
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The joints whose motors have equations of their own, in the order of these."""
+        return tuple(self.model.joint_names[spring.joint] for spring in self.springs)
+
+    @cached_property
+    def _torques(self) -> list[int]:
+        """For every equation the joint whose motor torque is its right side."""
+        return [*range(self.model.n), *(spring.joint for spring in self.springs)]
+
     @cached_property
     def members(self) -> tuple[np.ndarray, ...]:
-        """For every joint the numbers of the columns that it can feel, ascending."""
+        """For every equation the numbers of the columns that it can feel, ascending."""
         return tuple(
             np.concatenate([links.felt, own]) for links, own in zip(self._links, self._drives, strict=True)
         )
 
     @cached_property
     def spread(self) -> tuple[np.ndarray, ...]:
-        """For every joint (reduced, members): its columns from its reduced ones."""
+        """For every equation (reduced, members): its columns from its reduced ones."""
         found = []
         for links, own in zip(self._links, self._drives, strict=True):
             kept, felt = links.spread.shape
@@ -52,26 +73,28 @@ class Observation:
 
     @cached_property
     def _links(self) -> tuple[LinkColumns, ...]:
-        return link_columns(self.model)
+        """For every equation; a motor alone feels no link."""
+        nothing = LinkColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
+        return (*link_columns(self.model), *(nothing for _ in self.springs))
 
     @cached_property
     def _at_rest(self) -> list[Column]:
         state = np.zeros((1, self.model.n))
-        still = Motion(np.zeros(1), state, state, state, state)
+        still = Motion(np.zeros(1), state, state, state, state, ArmSide(state, state, state))
         return list(self._drive_columns(still, {}))
 
     @cached_property
     def _drives(self) -> list[np.ndarray]:
-        """For every joint the numbers of the drive columns that it feels, ascending."""
+        """For every equation the numbers of the drive columns that it feels, ascending."""
         number = {name: i for i, name in enumerate(self.names)}
-        felt: list[set[int]] = [set() for _ in range(self.model.n)]
+        felt: list[set[int]] = [set() for _ in self.labels]
         for column in self._at_rest:
             felt[column.joint].add(number[column.name])
         return [np.array(sorted(numbers), dtype=int) for numbers in felt]
 
     @cached_property
     def widths(self) -> list[int]:
-        """For every joint the number of its reduced columns, and one for its torque."""
+        """For every equation the number of its reduced columns, and one for its torque."""
         return [len(spread) + 1 for spread in self.spread]
 
     @cached_property
@@ -79,7 +102,7 @@ class Observation:
         """Rows of `reduced`: of the links' entries (n, 10 n), -1 for those left out, and of every drive column in the terms' order."""
         starts = np.cumsum([0, *self.widths])
         links = np.full((self.model.n, len(INERTIAL) * self.model.n), -1)
-        for joint, own in enumerate(self._links):
+        for joint, own in enumerate(self._links[: self.model.n]):
             links[joint, own.kept] = starts[joint] + np.arange(len(own.kept))
         number = {name: i for i, name in enumerate(self.names)}
         drives = [
@@ -91,18 +114,24 @@ class Observation:
         return links, np.array(drives, dtype=int)
 
     def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
-        """For every joint its reduced columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
+        """For every equation its reduced columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
 
-        The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without.
+        The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without. Raises `FlexcalError`
+        where there are springs and the motion has no arm side.
         """
         links, drives = self._places
         found = np.empty((sum(self.widths), len(motion)))
-        write_torque_regressor(self.model, motion.q, motion.dq, motion.ddq, links, found)
-        found[np.cumsum(self.widths) - 1] = motion.torque.T
+        write_torque_regressor(self.model, *self._link_states(motion), links, found)
+        found[np.cumsum(self.widths) - 1] = motion.torque[:, self._torques].T
         columns = self._drive_columns(motion, {} if memory is None else memory)
         for place, column in zip(drives, columns, strict=True):
             found[place] = column.values
         return found
+
+    def systems(self, motion: Motion, memory: Memory | None = None) -> list[np.ndarray]:
+        """For every joint all its columns and, last, its torque (members + 1, N), where `reduced` leaves some out."""
+        parts = np.split(self.reduced(motion, memory), np.cumsum(self.widths)[:-1])
+        return [np.vstack([s.T @ part[:-1], part[-1]]) for s, part in zip(self.spread, parts, strict=True)]
 
     def follow(self, motion: Motion, memory: Memory) -> None:
         """Bring `memory` up to the end of a motion whose columns are not needed."""
@@ -110,16 +139,31 @@ class Observation:
             pass
 
     def _drive_columns(self, motion: Motion, memory: Memory) -> Iterator[Column]:
+        motors = {spring.joint: self.model.n + k for k, spring in enumerate(self.springs)}
         for term in self.terms:
-            yield from term.columns(self.model, motion, memory)
+            for column in term.columns(self.model, motion, memory):
+                yield column
+                if column.joint in motors:
+                    yield Column(column.name, motors[column.joint], column.values)
+        for spring in self.springs:
+            yield from spring.columns(self.model, motion, motors[spring.joint])
+
+    def _link_states(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions, velocities and accelerations of the links: behind the springs, else as the motors."""
+        states = motion.q, motion.dq, motion.ddq
+        if motion.arm is None or not self.springs:
+            return states
+        behind = np.isin(np.arange(self.model.n), [spring.joint for spring in self.springs])
+        arm = motion.arm.q, motion.arm.dq, motion.arm.ddq
+        q, dq, ddq = (np.where(behind, far, near) for far, near in zip(arm, states, strict=True))
+        return q, dq, ddq
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
-        """For every joint all its columns (members, N) at every sample of the motion, none left out."""
-        links = torque_regressor(self.model, motion.q, motion.dq, motion.ddq)
-        found = []
-        for joint, (own, drives) in enumerate(zip(self._links, self._drives, strict=True)):
-            found.append(np.zeros((len(own.felt) + len(drives), len(motion))))
-            found[-1][: len(own.felt)] = links[:, joint, own.felt].T
+        """For every equation all its columns (members, N) at every sample of the motion, none left out."""
+        links = torque_regressor(self.model, *self._link_states(motion))
+        found = [np.zeros((len(members), len(motion))) for members in self.members]
+        for joint, own in enumerate(self._links[: self.model.n]):
+            found[joint][: len(own.felt)] = links[:, joint, own.felt].T
         number = {name: i for i, name in enumerate(self.names)}
         for column in self._drive_columns(motion, {}):
             members = self.members[column.joint]
@@ -129,4 +173,4 @@ class Observation:
     def values(self) -> np.ndarray:
         """The model's values of all columns (p,), zero where it knows none."""
         known = self.model.values
-        return np.nan_to_num([known[name] for name in self.names])
+        return np.nan_to_num([known.get(name, 0.0) for name in self.names])

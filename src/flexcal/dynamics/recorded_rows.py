@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.experiment_system import ExperimentSystem, batch_length, batched, experiment_system
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData, batches_each
@@ -23,7 +24,7 @@ _Join = Callable[[Rows, Rows], Rows]
 class RecordedRows:
     """Where the equations of a fit come from; every method is one pass over all `experiments`, of which each has a window.
 
-    Of the rows that are kept between passes only one number a row and joint stays in memory.
+    Of the rows that are kept between passes only one number a row and equation stays in memory.
     """
 
     observation: Observation
@@ -34,12 +35,11 @@ class RecordedRows:
     mask_standstill: bool = True
 
     def residuals(self, parameters: np.ndarray) -> list[np.ndarray]:
-        """Y − W χ (n, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
+        """Y − W χ (equations, rows), N m, of every experiment at `parameters` (p,), NaN for rows that are left out."""
         found = []
         for experiment, window in zip(self.experiments, self.windows, strict=True):
-            missed = np.full(
-                (self.observation.model.n, experiment.samples // self.decimation.factor + 1), np.nan
-            )
+            count = experiment.samples // self.decimation.factor + 1
+            missed = np.full((len(self.observation.labels), count), np.nan)
             for block in rows(self.observation, experiment, self.decimation, window):
                 part = block.where(~block.still) if self.mask_standstill else block
                 missed[:, part.number] = part.torque - part.predicted(self.observation.members, parameters)
@@ -47,11 +47,18 @@ class RecordedRows:
         return found
 
     def weighted(self, weights: Sequence[np.ndarray]) -> RegressionData:
-        """The equations, each multiplied by the root of its weight: (n, rows) an experiment, as `residuals` are."""
+        """The equations, each multiplied by the root of its weight: (equations, rows) an experiment, as `residuals` are."""
+        return self._data(self.observation, weights)
+
+    def observed_as(self, equations: Equations) -> RegressionData:
+        """Other equations for the same samples."""
+        return self._data(equations, [None] * len(self.experiments))
+
+    def _data(self, equations: Equations, weights: Sequence[np.ndarray | None]) -> RegressionData:
         batches = batches_each(len(self.experiments))
         systems = [
             experiment_system(
-                self.observation,
+                equations,
                 experiment,
                 self.decimation,
                 window,
@@ -61,7 +68,7 @@ class RecordedRows:
             )
             for experiment, window, own in zip(self.experiments, self.windows, weights, strict=True)
         ]
-        return RegressionData.of(self.observation, self.base, systems)
+        return RegressionData.of(equations, self.base, systems)
 
     def simulated(self, parameters: np.ndarray) -> RegressionData:
         """The equations with the observation matrix of the simulated closed loop with `parameters` (p,), and the measured torques.

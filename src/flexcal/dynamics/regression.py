@@ -1,4 +1,4 @@
-"""Recordings to the overdetermined system W χ + ρ = Y (Eq. 2.26), one triangle a joint and experiment."""
+"""Recordings to the overdetermined system W χ + ρ = Y (Eq. 2.26), one triangle an equation and experiment."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.experiment_system import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
-from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model.regressor import INERTIAL
@@ -24,9 +24,9 @@ _ALL_BATCHES = 512
 
 @dataclass(frozen=True, eq=False)
 class Subsystem:
-    """The equations of one joint in one experiment; `members` are the numbers of its columns among all."""
+    """One of an observation's equations in one experiment; `members` are the numbers of its columns among all."""
 
-    joint: int
+    equation: int
     experiment: int
     members: np.ndarray
     triangle: Triangle
@@ -44,7 +44,7 @@ class RegressionData:
     `batches` are the same equations once more, experiment by experiment in parts that follow each other in time.
     """
 
-    observation: Observation
+    observation: Equations
     base: BaseParameters
     subsystems: tuple[Subsystem, ...]
     masked: int
@@ -86,30 +86,29 @@ class RegressionData:
         return found
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
-        """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all joints stacked, and of each (n,)."""
-        n = self.observation.model.n
-        missed, size = np.zeros(n), np.zeros(n)
+        """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all equations stacked, and of each of the observation's."""
+        missed, size = np.zeros((2, len(self.observation.labels)))
         for s in self.subsystems:
-            missed[s.joint] += s.triangle.residual(parameters[s.members]) ** 2
-            size[s.joint] += np.sum(s.triangle.right**2)
+            missed[s.equation] += s.triangle.residual(parameters[s.members]) ** 2
+            size[s.equation] += np.sum(s.triangle.right**2)
         return math.sqrt(missed.sum() / size.sum()), np.sqrt(missed / size)
 
     @classmethod
     def of(
-        cls, observation: Observation, base: BaseParameters, systems: Sequence[ExperimentSystem]
+        cls, observation: Equations, base: BaseParameters, systems: Sequence[ExperimentSystem]
     ) -> RegressionData:
         """The systems of several experiments together."""
         subsystems = [
-            Subsystem(joint, number, members, _merged(system, joint))
+            Subsystem(equation, number, members, _merged(system, equation))
             for number, system in enumerate(systems)
-            for joint, members in enumerate(observation.members)
+            for equation, members in enumerate(observation.members)
         ]
         masked = sum(system.masked for system in systems)
         return cls(observation, base, tuple(subsystems), masked, tuple(system.batches for system in systems))
 
 
 def observe(
-    observation: Observation,
+    observation: Equations,
     base: BaseParameters,
     experiments: Sequence[Experiment],
     decimation: Decimation,
@@ -138,6 +137,6 @@ def batches_each(experiments: int) -> int:
     return max(1, min(BATCHES, _ALL_BATCHES // max(1, experiments)))
 
 
-def _merged(system: ExperimentSystem, joint: int) -> Triangle:
-    factor = reduced([batch.factors[joint] for batch in system.batches])
+def _merged(system: ExperimentSystem, equation: int) -> Triangle:
+    factor = reduced([batch.factors[equation] for batch in system.batches])
     return Triangle.padded(factor, sum(batch.rows for batch in system.batches))

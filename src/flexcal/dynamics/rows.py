@@ -11,8 +11,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.observation import Observation
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
@@ -55,9 +55,9 @@ class Window:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """M equations of every joint that follow each other.
+    """M equations of every kind (of each joint, and of motors alone) that follow each other.
 
-    `reduced` has for every joint the reduced columns of W and, last, Y transposed (·, M), and `spread` what gives W back, as an
+    `reduced` has for every kind the reduced columns of W and, last, Y transposed (·, M), and `spread` what gives W back, as an
     `Observation` has them. `number` (M,) counts the rows of the experiment, whatever is left out; `time` (M,) is s, and `still` (M,)
     tells where the robot stands still within a row: no joint is faster than a hundredth of its top speed.
     """
@@ -73,16 +73,16 @@ class Rows:
 
     @property
     def columns(self) -> list[np.ndarray]:
-        """For every joint W transposed (members, M)."""
+        """For every kind W transposed (members, M)."""
         return [spread.T @ own[:-1] for spread, own in zip(self.spread, self.reduced, strict=True)]
 
     @property
     def torque(self) -> np.ndarray:
-        """Y of all joints (n, M)."""
+        """Y of all kinds (·, M)."""
         return np.array([own[-1] for own in self.reduced])
 
     def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
-        """W χ of all joints (n, M) for `parameters` (p,), of which `members` are the numbers of every joint's own."""
+        """W χ of all kinds (·, M) for `parameters` (p,), of which `members` are the numbers of each kind's own."""
         each = zip(members, self.spread, self.reduced, strict=True)
         return np.array([(spread @ parameters[felt]) @ own[:-1] for felt, spread, own in each])
 
@@ -94,20 +94,20 @@ class Rows:
         return Rows(self.number[keep], self.time[keep], self.still[keep], reduced, self.spread)
 
     def weighted(self, weights: np.ndarray) -> Rows:
-        """Every joint's rows times the root of their `weights` (n, M)."""
+        """The rows of every kind times the root of their `weights` (·, M)."""
         reduced = [own * root for own, root in zip(self.reduced, np.sqrt(weights), strict=True)]
         return Rows(self.number, self.time, self.still, reduced, self.spread)
 
 
 def rows(
-    observation: Observation, experiment: Experiment, decimation: Decimation, window: Window
+    observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
 ) -> Iterator[Rows]:
     """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 
     Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
     """
     ends = np.cumsum(observation.widths)
-    slowest = np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
+    slowest = slowest_speeds(experiment)
     stream = DecimationStream(decimation)
     centres = _Centres(decimation)
     memory: Memory = {}
@@ -128,6 +128,11 @@ def rows(
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)
+
+
+def slowest_speeds(experiment: Experiment) -> np.ndarray:
+    """Speed (n,) up to which each joint stands still."""
+    return np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
 
 
 class _Centres:

@@ -63,8 +63,8 @@ def predict_torques(
         steps = np.diff(np.concatenate([[before], block.time]))
         step = step if np.isfinite(step) else float(steps[-1])
         before = float(block.time[-1])
-        torque = block.torque.T
-        model = block.predicted(observation.members, parameters).T
+        torque = block.torque[:n].T
+        model = block.predicted(observation.members, parameters)[:n].T
         spectrum.push(np.hstack([torque, torque - model]))
         kept = block.number % stride == 0
         times.append(block.time[kept])

@@ -1,4 +1,4 @@
-"""Weighted least squares: the equations of each joint and experiment by their own noise (Eqs. 2.29-2.31)."""
+"""Weighted least squares: the equations of each joint (or motor alone) and experiment by their own noise (Eqs. 2.29-2.31)."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def noise_levels(data: RegressionData) -> list[float]:
     noise = []
     for s, (sigma, rank) in zip(data.subsystems, data.noise(), strict=True):
         if np.isnan(sigma):
-            joint = data.observation.model.joint_names[s.joint]
+            label = data.observation.labels[s.equation]
             raise FlexcalError(
-                f"{s.triangle.rows} equations of {joint} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
+                f"{s.triangle.rows} equations of {label} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
                 "record for longer, or decimate less."
             )
         noise.append(s.floored(sigma))

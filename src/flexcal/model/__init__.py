@@ -1,6 +1,7 @@
 """URDF and robot.yaml to RobotModel, and its forward maps, each with exact derivatives."""
 
 from flexcal.model.elastic_joint import ElasticJoint
+from flexcal.model.energy_regressor import energy_regressor
 from flexcal.model.equilibrium import Equilibrium, gravity_torque, static_equilibrium
 from flexcal.model.inertia import Inertia
 from flexcal.model.joint import Joint
@@ -18,6 +19,7 @@ __all__ = [
     "Point",
     "PointKinematics",
     "RobotModel",
+    "energy_regressor",
     "gravity_torque",
     "inertial_names",
     "inertial_parameters",

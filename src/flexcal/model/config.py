@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Literal
 
 from flexcal.errors import FlexcalError
 
@@ -136,12 +137,14 @@ class DynamicsConfig:
     """Signal treatment and friction of the identification of dynamics; an absent cut-off and decimation are proposed from the data.
 
     friction: "classic" (viscous, Coulomb, offset), a list of terms, or "auto": the classic ones and what cross-validation adds to them.
+    torque: what a logged torque is over a sample, as in plans; `tau` in files.
     """
 
     friction: str | tuple[str, ...] = "auto"
     cutoff_hz: float | None = None
     decimation: int | None = None
     mask_standstill: bool = True
+    torque: Literal["held", "instantaneous", "mean"] = field(default="instantaneous", metadata={"key": "tau"})
 
     def __post_init__(self) -> None:
         if isinstance(self.friction, str) and self.friction not in ("auto", "classic"):

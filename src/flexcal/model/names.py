@@ -19,6 +19,7 @@ _UNITS = {
     "stiffness": "N m/rad", "damping": "N m s/rad", "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
+    "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     "warm_up": "N m s/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
 }  # fmt: skip
 

@@ -13,8 +13,10 @@ from flexcal.estimation import Estimate
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.robot_model import RobotModel
 
-NUISANCE = re.compile(r".*\.(pose_[0-9]+|half_gap)")
-"""Names of what was estimated for an experiment: not the robot's own."""
+NUISANCE = re.compile(
+    r".*\.(pose_[0-9]+|half_gap|arm_inertia|arm_viscous|arm_coulomb|drive\.torque_offset|drive\.gap_torque)"
+)
+"""Names of what was estimated for an experiment, and of what the flexible model tells apart: not the robot's own here."""
 
 
 def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = None) -> RobotModel:

@@ -8,16 +8,23 @@ from typing import Literal
 from flexcal.dynamics import (
     RecordedRows,
     RegressionData,
+    column_errors,
     direct_and_inverse,
+    energy_least_squares,
     feasible_least_squares,
     huber_least_squares,
     instrumental_variables,
+    kalman_filter,
+    maximum_likelihood,
+    noisy_logs,
     ordinary_least_squares,
+    power_least_squares,
+    total_least_squares,
     weighted_least_squares,
 )
 from flexcal.estimation import Estimate
 
-EstimatorName = Literal["wls", "ols", "sdp", "irls", "iv", "didim"]
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"]
 
 Estimator = Callable[[RegressionData, RecordedRows], Estimate]
 """Of the equations, and of the rows that they came from, for those that need to see them again."""
@@ -29,4 +36,9 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "irls": huber_least_squares,
     "iv": instrumental_variables,
     "didim": direct_and_inverse,
+    "energy": lambda _, recorded: energy_least_squares(recorded),
+    "power": lambda _, recorded: power_least_squares(recorded),
+    "tls": lambda data, recorded: total_least_squares(data, column_errors(recorded, noisy_logs(recorded))),
+    "ml": maximum_likelihood,
+    "ekf": kalman_filter,
 }

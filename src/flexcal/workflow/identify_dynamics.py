@@ -24,12 +24,14 @@ from flexcal.dynamics import (
     batches_each,
     essential_parameters,
     select_friction,
+    with_play,
 )
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.log_payloads import require_unloaded
@@ -45,7 +47,8 @@ from flexcal.workflow.treatment import Treatment, treatment_of
 class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
-    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were.
+    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
+    whose motors have equations of their own.
     """
 
     estimate: Estimate
@@ -57,6 +60,7 @@ class RobotDynamics:
     validated: tuple[Path, ...]
     essential: EssentialParameters
     friction: FrictionSelection
+    motors: tuple[str, ...]
     treatment: Treatment
     seconds: float
     estimates: Path
@@ -70,13 +74,15 @@ class RobotDynamics:
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         x = self.estimate.parameters.coordinates()
-        error, per_joint = self.train.errors(x)
+        error, each = self.train.errors(x)
         joints = self.train.observation.model.joint_names
         percent: dict[str, Any] = {"train": 100 * error, "held_out": None}
         if self.held_out is not None:
-            error, per_joint = self.held_out.errors(x)
+            error, each = self.held_out.errors(x)
             percent["held_out"] = 100 * error
-        percent["per_joint"] = dict(zip(joints, 100 * per_joint, strict=True))
+        percent["per_joint"] = dict(zip(joints, 100 * each[: len(joints)], strict=True))
+        if self.motors:
+            percent["per_motor"] = dict(zip(self.motors, 100 * each[len(joints) :], strict=True))
         return {
             "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
@@ -154,6 +160,7 @@ def identify_robot_dynamics(
     hold_out: float = 0.0,
     validate: Sequence[Path] = (),
     estimator: EstimatorName = "wls",
+    flexible: bool = False,
     out: Path | None = None,
     jobs: int = 1,
     progress: Progress = silent,
@@ -161,17 +168,20 @@ def identify_robot_dynamics(
     """Fit link inertials, rotor inertias and friction of a robot.yaml to joint logs, and store the block `dynamics`.
 
     Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
-    six joints. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what the filters would carry
-    over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks. With `out`, estimates,
-    results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and for a log with a
-    payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed. `irls`, `iv` and `didim` go through the
-    logs again and again, in this process alone.
+    six joints, and 48 for their arm sides. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what
+    the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks.
+    With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and
+    for a log with a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed. `flexible`
+    tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the drives' springs;
+    friction terms are chosen before that, as if the robot were rigid. `irls`, `iv` and `didim` go through the logs again and
+    again, in this process alone.
     """
     begun = time.perf_counter()
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
+    springs = drive_springs(model, [*logs, *validate], estimator) if flexible else ()
     treatment = treatment_of(model, logs)
 
     with TemporaryDirectory(prefix="flexcal_") as folder:
@@ -195,18 +205,25 @@ def identify_robot_dynamics(
 
         declared = model.config.dynamics.friction
         friction = select_friction(model, declared, equations, treatment.decimation)
-        observation = Observation(model, friction.terms)
+        observation = with_play(Observation(model, friction.terms, springs), equations)
         base = BaseParameters.of(observation)
         train = RegressionData.of(observation, base, equations(observation))
         held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
-        estimate = ESTIMATORS[estimator](train, _recorded(fitted, train, treatment))
-        options = {"estimator": estimator, "hold_out": hold_out, "friction": ", ".join(friction.labels)}
+        estimate = ESTIMATORS[estimator](train, _recorded(fitted, observation, base, treatment))
+        options = {
+            "estimator": estimator,
+            "hold_out": hold_out,
+            "friction": ", ".join(friction.labels),
+            "flexible": flexible,
+        }
         origin = provenance([robot, bare.urdf, *logs], options, source if blocks else None, tuple(blocks))
         estimate = replace(estimate, provenance=origin)
         target = source if out is None else out / ESTIMATES
         essential = essential_parameters(train, estimate)
         seconds = time.perf_counter() - begun
-        classic = base if friction.terms == CLASSIC else BaseParameters.of(Observation(model, CLASSIC))
+        classic = (
+            base if friction.terms == CLASSIC else BaseParameters.of(replace(observation, terms=CLASSIC))
+        )
         result = RobotDynamics(
             estimate,
             estimator,
@@ -217,6 +234,7 @@ def identify_robot_dynamics(
             tuple(validate),
             essential,
             friction,
+            observation.motors,
             treatment,
             seconds,
             target,
@@ -240,9 +258,9 @@ def identify_robot_dynamics(
         return result
 
 
-def _recorded(fitted: Sequence[LogPart], train: RegressionData, treatment: Treatment) -> RecordedRows:
+def _recorded(
+    fitted: Sequence[LogPart], observation: Observation, base: BaseParameters, treatment: Treatment
+) -> RecordedRows:
     """The rows of the fit once more, log after log in this process."""
     logs, windows = [part.log for part in fitted], [part.window for part in fitted]
-    return RecordedRows(
-        train.observation, train.base, logs, windows, treatment.decimation, treatment.mask_standstill
-    )
+    return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

@@ -1,0 +1,37 @@
+"""How much the noise of the positions may lower the stiffness of a drive: errors in variables (Fuller 1987, section 1.1)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.dynamics.linear_fit import weighted_system
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.wls import noise_levels
+from flexcal.estimation import Estimate
+
+
+def attenuation(data: RegressionData, estimate: Estimate) -> dict[str, float]:
+    """By name of the identified drive stiffnesses, the largest share by which noise of q - θ can have made them too small.
+
+    Noise of size σ_e in N rows of a column of which the others leave t makes K smaller by K N σ_e² / ‖t‖². It also stands in the
+    residual of its equation, K σ_e ≤ σ, so that the share is at most N (σ / (K ‖t‖))²: no size of the noise need be known.
+    Raises `FlexcalError` as `noise_levels` does.
+    """
+    names = data.names
+    stiffnesses = [name for name in names if name.endswith(".drive.stiffness")]
+    if not stiffnesses:
+        return {}
+    matrix = weighted_system(data, noise_levels(data)).matrix
+    seen = [i for i, known in enumerate(estimate.identifiable) if known]
+    norms = np.linalg.norm(matrix, axis=0)
+    found: dict[str, float] = {}
+    for name in stiffnesses:
+        own = names.index(name)
+        if own not in seen:
+            continue
+        others = [i for i in seen if i != own]
+        basis = np.linalg.qr(matrix[:, others] / norms[others])[0]
+        left = matrix[:, own] - basis @ (basis.T @ matrix[:, own])
+        rows = sum(s.triangle.rows for s in data.subsystems if own in s.members)
+        found[name] = rows / float(estimate.values[name] ** 2 * (left @ left))
+    return found

@@ -1,0 +1,36 @@
+"""Where the gaps of elastic drives with backlash lie, from passes over the equations."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.experiment_system import ExperimentSystem
+from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.wls import weighted_least_squares
+
+_PASSES = 2
+"""The first finds at what reading of both encoders a spring is relaxed, the second how wide the gap there is."""
+
+
+def with_play(
+    observation: Observation, equations: Callable[[Observation], Sequence[ExperimentSystem]]
+) -> Observation:
+    """The observation whose springs at joints with backlash know their gap; the same where no spring has one.
+
+    `equations` gives those of the fit for any observation. Raises `FlexcalError` as `weighted_least_squares` does.
+    """
+    model = observation.model
+    if not any(spring.joint in model.backlash_joints for spring in observation.springs):
+        return observation
+    for _ in range(_PASSES):
+        data = RegressionData.of(observation, BaseParameters.of(observation), equations(observation))
+        values = weighted_least_squares(data).values
+        springs = (
+            spring.with_play(model, values) if spring.joint in model.backlash_joints else spring
+            for spring in observation.springs
+        )
+        observation = replace(observation, springs=tuple(springs))
+    return observation

@@ -1,0 +1,120 @@
+"""Maximum likelihood for periodic excitation: the noise of torques and motion is what differs between the periods (Swevers 1997)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.linear_fit import Unknowns
+from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.observation import Observation
+from flexcal.dynamics.periodic_motion import real_rows
+from flexcal.dynamics.recorded_rows import RecordedRows
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.repeated_motion import RepeatedMotion
+from flexcal.dynamics.triangle import Triangle
+from flexcal.dynamics.wls import weighted_least_squares
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+
+_REACH = 5
+"""Neighbouring lines on either side that the noise of a line is read from."""
+_SMALLEST = 1e-9
+"""Noise of torques that are fitted exactly, relative to them."""
+_SETTLED = 1e-2
+"""Largest step of a parameter, in its standard deviations, that ends the iteration."""
+_ITERATIONS = 20
+_BLOCK = 512
+"""Samples whose columns are in memory at once."""
+
+
+def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate:
+    """χ̂ from the mean period of every experiment, its torques weighed by their covariance, line by line and over all joints.
+
+    Rows are Fourier coefficients up to the band of the decimated rows. The noise of torque and motion acts together in τ − W(q) χ, whose
+    scatter between the periods is therefore what likelihood asks for, to first order in the noise; it is read anew with every χ, as
+    the noise of the motion goes through the parameters. W is that of the mean motion: averaging takes the noise out before it can bend W.
+    The covariance is that of the weighted rows, raised by their mean squared error where the model misses more than the noise; with noisy
+    motion it is on the safe side, as that error is below one where the mean motion leaves noise out that the scatter has. Standstill is
+    not masked. Raises `FlexcalError` as `RepeatedMotion.of` and `weighted_least_squares` do, and where the steps do not settle.
+    """
+    motions = [
+        RepeatedMotion.of(experiment, window)
+        for experiment, window in zip(recorded.experiments, recorded.windows, strict=True)
+    ]
+    observation, factor = recorded.observation, recorded.decimation.factor
+    means = [_mean_rows(observation, motion, factor) for motion in motions]
+    found = weighted_least_squares(data).parameters.coordinates()
+    for iteration in range(1, _ITERATIONS + 1):
+        noise = [_scatter(observation, motion, found, factor) for motion in motions]
+        parts = [_whitened(rows, covariance) for rows, covariance in zip(means, noise, strict=True)]
+        stack = np.concatenate(parts)
+        system = Triangle.of(stack[:, :-1], stack[:, -1])
+        unknowns = Unknowns.of(data, system)
+        before, kept = found, unknowns.kept
+        triangle, scale = unknowns.reduced(system)
+        found = observation.values()
+        found[kept] += scale * np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1])
+        freedom, cost = unknowns.freedom(system), float(triangle[-1, -1] ** 2)
+        root = scale[:, None] * np.linalg.solve(triangle[:-1, :-1], np.eye(len(kept)))
+        covariance = max(1.0, cost / freedom) * root @ root.T
+        if np.all(np.abs(found - before)[kept] <= _SETTLED * np.sqrt(np.diag(covariance))):
+            periods = " + ".join(str(len(motion.periods)) for motion in motions)
+            message = f"maximum likelihood from {periods} periods; mean squared error {cost / freedom:.3g} of the noise"
+            return unknowns.estimate(found, covariance, float(freedom), cost, freedom, message, iteration)
+    raise FlexcalError(
+        f"the noise does not settle in {_ITERATIONS} iterations; look at these data with --estimator wls."
+    )
+
+
+def _mean_rows(observation: Observation, motion: RepeatedMotion, factor: int) -> np.ndarray:
+    """[W, Y] of the mean period (2 K + 1, n, p + 1); friction that remembers begins as the first period leaves it."""
+    memory: Memory = {}
+    observation.follow(motion.periods[0], memory)
+    systems = [_rows(system.T, factor) for system in observation.systems(motion.mean, memory)]
+    found = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
+    for joint, (system, members) in enumerate(zip(systems, observation.members, strict=True)):
+        found[:, joint, members] = system[:, :-1]
+        found[:, joint, -1] = system[:, -1]
+    return found
+
+
+def _rows(values: np.ndarray, factor: int) -> np.ndarray:
+    """Real Fourier coefficients (2 K + 1, …) of one period (N, …) up to half the rate that a decimation by `factor` leaves."""
+    lines = min(len(values) // (2 * factor), (len(values) - 1) // 2) + 1
+    return real_rows(np.fft.rfft(values, axis=0)[:lines] / len(values))
+
+
+def _scatter(
+    observation: Observation, motion: RepeatedMotion, parameters: np.ndarray, factor: int
+) -> np.ndarray:
+    """Covariance (2 K + 1, n, n) of the mean of τ − W χ over the periods, smooth over the lines."""
+    memory: Memory = {}
+    residuals = np.array([_rows(_missed(observation, p, parameters, memory), factor) for p in motion.periods])
+    count = len(residuals)
+    apart = residuals - residuals.mean(axis=0)
+    products = np.einsum("tli,tlj->lij", apart, apart)
+    above = np.arange(1, len(products) // 2 + 1)
+    lines = np.concatenate([[0], above, above])
+    near = (np.abs(lines[:, None] - lines) <= _REACH).astype(float)
+    pooled = np.einsum("lk,kij->lij", near, products) / near.sum(axis=1)[:, None, None]
+    return pooled / (count * (count - 1))
+
+
+def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, memory: Memory) -> np.ndarray:
+    """τ − W χ (N, n) of one period."""
+    found = []
+    for start in range(0, len(motion), _BLOCK):
+        part = motion.part(start, min(start + _BLOCK, len(motion)))
+        systems = observation.systems(part, memory)
+        found.append(
+            [s[-1] - parameters[m] @ s[:-1] for s, m in zip(systems, observation.members, strict=True)]
+        )
+    return np.concatenate(found, axis=1).T
+
+
+def _whitened(rows: np.ndarray, covariance: np.ndarray) -> np.ndarray:
+    """Equations (n (2 K + 1), p + 1) whose errors are independent and of variance one."""
+    floor = (_SMALLEST * np.sqrt(np.mean(rows[:, :, -1] ** 2, axis=0))) ** 2
+    left = np.linalg.cholesky(covariance + np.diag(np.where(floor > 0, floor, 1.0)))
+    return np.linalg.solve(left, rows).reshape(-1, rows.shape[2])

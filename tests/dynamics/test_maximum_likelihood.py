@@ -1,0 +1,133 @@
+"""Maximum likelihood of periodic motion: exact without noise, true intervals with coloured noise, four periods or more."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from recovery import covered, driven, errors, recorded
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    BaseParameters,
+    Motion,
+    Observation,
+    Window,
+    maximum_likelihood,
+    observe,
+    weighted_least_squares,
+)
+from flexcal.dynamics.repeated_motion import RepeatedMotion
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+
+NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
+PERIOD = 1000
+
+
+@pytest.fixture(scope="module")
+def truth(observation: Observation) -> np.ndarray:
+    rng = np.random.default_rng(5)
+    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
+
+
+@pytest.fixture(scope="module")
+def clean(observation: Observation, truth: np.ndarray, sines: Callable[[int, float], Motion]) -> Motion:
+    """Five periods of ten seconds at 100 Hz."""
+    return driven(observation, sines(5 * PERIOD, 100.0), truth)
+
+
+def likeliest(observation: Observation, base: BaseParameters, *motions: Motion) -> tuple[Estimate, Estimate]:
+    """And weighted least squares."""
+    data = observe(observation, base, motions, Decimation(1))
+    return maximum_likelihood(data, recorded(observation, base, *motions)), weighted_least_squares(data)
+
+
+def coloured(shape: tuple[int, int], rng: np.random.Generator) -> np.ndarray:
+    """Of variance one, holding for a fifth of a second."""
+    from scipy.signal import lfilter
+
+    decay = np.exp(-0.05)
+    white = rng.standard_normal((shape[0] + 300, shape[1]))
+    return np.sqrt(1 - decay**2) * lfilter([1.0], [1.0, -decay], white, axis=0)[300:]
+
+
+def spoilt(motion: Motion, acceleration: float, rng: np.random.Generator) -> Motion:
+    """Coloured noise of the torques, and white noise of the accelerations."""
+    torque = motion.torque + NOISE * coloured(motion.torque.shape, rng)
+    return replace(motion, torque=torque, ddq=motion.ddq + acceleration * rng.normal(size=motion.ddq.shape))
+
+
+def test_without_noise_the_truth_comes_back(
+    observation: Observation, base: BaseParameters, clean: Motion, truth: np.ndarray
+) -> None:
+    found, _ = likeliest(observation, base, clean)
+    assert found.rank == 61
+    assert max(map(abs, errors(found, observation, truth).values())) < 1e-8
+
+
+@pytest.mark.parametrize(("acceleration", "gain"), [(0.0, 0.95), (0.5, 0.75)])
+def test_intervals_cover_where_noise_is_coloured(
+    acceleration: float,
+    gain: float,
+    observation: Observation,
+    base: BaseParameters,
+    clean: Motion,
+    truth: np.ndarray,
+    rng: np.random.Generator,
+) -> None:
+    """Nearer to the truth than weighted least squares, the more so where the motion is noisy too."""
+    inside, ratio = scatter(observation, base, clean, truth, acceleration, 4, rng)
+    assert 0.9 < inside < 0.99
+    assert ratio < gain
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("acceleration", [0.0, 0.5])
+def test_intervals_cover_in_many_recordings(
+    acceleration: float,
+    observation: Observation,
+    base: BaseParameters,
+    clean: Motion,
+    truth: np.ndarray,
+    rng: np.random.Generator,
+) -> None:
+    inside, _ = scatter(observation, base, clean, truth, acceleration, 50, rng)
+    assert 0.93 < inside < 0.98
+
+
+def scatter(
+    observation: Observation,
+    base: BaseParameters,
+    clean: Motion,
+    truth: np.ndarray,
+    acceleration: float,
+    recordings: int,
+    rng: np.random.Generator,
+) -> tuple[float, float]:
+    """Share of the 95 % intervals of 61 parameters that hold the truth, and the median error over that of weighted least squares."""
+    inside, ratios = [], []
+    for _ in range(recordings):
+        found, other = likeliest(observation, base, spoilt(clean, acceleration, rng))
+        missed, plain = errors(found, observation, truth), errors(other, observation, truth)
+        inside.append(covered(found, missed))
+        ratios.append([abs(missed[name] / plain[name]) for name in missed])
+    return float(np.mean(inside)), float(np.median(ratios))
+
+
+def test_the_period_is_found_in_the_motion(clean: Motion, rng: np.random.Generator) -> None:
+    noisy = replace(clean, q=clean.q + 1e-3 * rng.normal(size=clean.q.shape))
+    assert [len(p) for p in RepeatedMotion.of(noisy, Window()).periods] == [PERIOD] * 5
+    assert len(RepeatedMotion.of(noisy, Window(start=5.0, end=47.0)).periods) == 4
+
+
+def test_what_cannot_tell_its_noise_is_refused(
+    observation: Observation, base: BaseParameters, clean: Motion, swing: Motion, rng: np.random.Generator
+) -> None:
+    with pytest.raises(FlexcalError, match="shows 3 whole periods; maximum likelihood reads the noise"):
+        likeliest(observation, base, clean.part(0, 4 * PERIOD - 1))
+    with pytest.raises(FlexcalError, match="shows no motion that repeats itself"):
+        likeliest(observation, base, replace(swing, torque=rng.normal(size=swing.torque.shape)))
+    walk = np.cumsum(rng.normal(size=clean.q.shape), axis=0)
+    with pytest.raises(FlexcalError, match="shows no motion that repeats itself"):
+        RepeatedMotion.of(replace(clean, q=walk), Window())
