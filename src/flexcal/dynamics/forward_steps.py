@@ -97,7 +97,11 @@ def _steps(
     observation: Observation, motion: Motion, stride: int, memory: Memory, slowest: np.ndarray
 ) -> ForwardSteps:
     middle = Motion(
-        *(_means(part, stride) for part in (motion.time, motion.q, motion.dq, motion.ddq, motion.torque))
+        _means(motion.time, stride),
+        _means(motion.q, stride),
+        _means(motion.dq, stride),
+        _means(motion.ddq, stride),
+        _means(motion.torque, stride),
     )
     before = dict(memory)
     whole = columns(observation, middle, memory)
