@@ -102,4 +102,5 @@ class NoisyLog:
         return filtered_motion(
             (replace(r, q=r.q + self.std * rng.normal(size=r.q.shape)) for r in recordings),
             self.log.cutoff_hz,
+            self.model.config.dynamics.torque,
         )

@@ -96,10 +96,13 @@ def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndar
 def _steps(
     observation: Observation, motion: Motion, stride: int, memory: Memory, slowest: np.ndarray
 ) -> ForwardSteps:
-    time, q, dq, ddq, torque = (
-        _means(part, stride) for part in (motion.time, motion.q, motion.dq, motion.ddq, motion.torque)
+    middle = Motion(
+        _means(motion.time, stride),
+        _means(motion.q, stride),
+        _means(motion.dq, stride),
+        _means(motion.ddq, stride),
+        _means(motion.torque, stride),
     )
-    middle = Motion(time, q, dq, ddq, torque)
     before = dict(memory)
     whole = columns(observation, middle, memory)
     n = observation.model.n

@@ -129,7 +129,7 @@ class Observation:
         return found
 
     def systems(self, motion: Motion, memory: Memory | None = None) -> list[np.ndarray]:
-        """For every joint all its columns and, last, its torque (members + 1, N), where `reduced` leaves some out."""
+        """For every equation all its columns and, last, its torque (members + 1, N), where `reduced` leaves some out."""
         parts = np.split(self.reduced(motion, memory), np.cumsum(self.widths)[:-1])
         return [np.vstack([s.T @ part[:-1], part[-1]]) for s, part in zip(self.spread, parts, strict=True)]
 
