@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pytest
 
@@ -63,22 +64,41 @@ def test_blocks_give_the_whole(
         np.testing.assert_allclose(estimates[0].covariance, estimates[1].covariance, rtol=1e-8, atol=1e-18)
 
 
-def test_processes_change_nothing(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
-    treatment = Treatment(10.0, Decimation(4), True)
+def systems(logs: list[Path], observation: Observation, scratch: Path, jobs: int) -> list[ExperimentSystem]:
+    """Those of the first 70 % and of the rest of every log."""
+    treatment, parts = Treatment(10.0, Decimation(4), True), []
+    for log in read_logs(logs, observation.model, treatment, scratch, jobs=jobs):
+        early, late = split(log, treatment, 0.3)
+        assert late is not None
+        parts += [LogPart(log, early), LogPart(log, late)]
+    return log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
 
-    def systems(jobs: int) -> list[ExperimentSystem]:
-        parts = []
-        for log in read_logs(logs, observation.model, treatment, tmp_path, jobs=jobs):
-            early, late = split(log, treatment, 0.3)
-            assert late is not None
-            parts += [LogPart(log, early), LogPart(log, late)]
-        return log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
 
-    for one, other in zip(systems(1), systems(2), strict=True):
+def check_equal(found: list[ExperimentSystem], expected: list[ExperimentSystem]) -> None:
+    for one, other in zip(found, expected, strict=True):
         for mine, theirs in zip(one.batches, other.batches, strict=True):
             assert (mine.number, mine.rows) == (theirs.number, theirs.rows)
             for factor, same in zip(mine.factors, theirs.factors, strict=True):
                 np.testing.assert_allclose(factor, same, rtol=0, atol=1e-12)
+
+
+def test_processes_change_nothing(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
+    check_equal(systems(logs, observation, tmp_path, 2), systems(logs, observation, tmp_path, 1))
+
+
+def test_the_same_call_on_dask(logs: list[Path], observation: Observation, tmp_path: Path) -> None:
+    distributed = pytest.importorskip("distributed", reason="distributed (Dask) is not installed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None, local_directory=str(tmp_path / "dask")
+        ) as cluster,
+        distributed.Client(cluster),
+        joblib.parallel_config(backend="dask"),
+    ):
+        found = systems(logs, observation, tmp_path, 2)
+        done = sum(moved[2] == "memory" for moved in cluster.scheduler.transition_log)
+    assert done >= 3 * len(logs)  # every log is read, and both its parts are reduced
+    check_equal(found, systems(logs, observation, tmp_path, 1))
 
 
 def test_a_window_reads_no_more_than_it_needs(swing: Motion, observation: Observation) -> None:
