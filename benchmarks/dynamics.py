@@ -1,7 +1,7 @@
-"""Logs to base parameters with intervals, against a Pinocchio loop with NumPy's lstsq; processor time and peak memory.
+"""Logs to base parameters with intervals, against a Pinocchio loop with NumPy's lstsq and against figaroh; processor time and peak memory.
 
-From motions to the estimate both do the same; the peer builds one dense matrix of all joints' rows, which a long log does not allow, so it
-is timed on a short one, by the sample. Whole processes read the file, too.
+From motions to the estimate all do the same; the peers build one dense matrix of all joints' rows, which a long log does not allow, so they
+are timed on a short one, by the sample. Whole processes read the file, too. figaroh runs in an environment of its own.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 import pinocchio as pin
 
+from benchmarks.peers import PeerAbsentError, run_peer
 from flexcal.data import Recording, write_recording
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
@@ -64,11 +65,13 @@ def run() -> list[tuple[str, float, str]]:
             lambda: weighted_least_squares(observe(observation, base, [log], Decimation(10))),
         )
         peer *= 1e6 / SHORT
+        figaroh, how = _figaroh(swing)
         for factor, seconds in ((1, undecimated), (10, decimated)):
             ours = seconds / SAMPLES * 1e6
             label = f"1e6 samples, decimated by {factor}"
             results += [
                 (f"{label}: Pinocchio loop, dense lstsq", peer / ours, f"{peer:.1f} µs a sample, ours {ours:.2f}"),
+                (f"{label}: figaroh, regressor to double QR", figaroh / ours, how),
                 (f"{label}: limit {MICROSECONDS:g} µs a sample", MICROSECONDS / ours, f"{ours:.2f} µs"),
             ]  # fmt: skip
             robot = folder / f"decimated_by_{factor}.yaml"
@@ -135,6 +138,17 @@ def dense(observation: Observation, swing: Motion) -> np.ndarray:
         for column in term.columns(observation.model, swing, {}):
             matrix[:, column.joint, observation.names.index(column.name)] = column.values
     return np.linalg.lstsq(matrix.reshape(-1, matrix.shape[2]), swing.torque.ravel(), rcond=None)[0]
+
+
+def _figaroh(swing: Motion) -> tuple[float, str]:
+    """µs a sample of its regressor, elimination and double QR, and in words; NaN where it cannot be installed."""
+    rows = {key: getattr(swing, key).tolist() for key in ("q", "dq", "ddq", "torque")}
+    try:
+        found = run_peer("figaroh_fit.py", ("figaroh==1.0.2",), {"urdf": str(EXAMPLE / "tx40.urdf"), **rows})
+    except PeerAbsentError as absent:
+        return float("nan"), f"skipped: {absent}"
+    each = found["seconds"] * 1e6 / len(swing)
+    return each, f"{each:.1f} µs a sample, {found['rank']} base parameters"
 
 
 def _identified(robot: Path, log: Path) -> tuple[float, float]:
