@@ -7,10 +7,8 @@
 #include <array>
 #include <cstdint>
 #include <cstring>
-#include <vector>
 
-#include "lanes.hpp"
-#include "tree.hpp"
+#include "tree_motion.hpp"
 
 namespace flexcal {
 
@@ -18,8 +16,9 @@ constexpr int inertial_size = 10;  // m, m c_x, m c_y, m c_z, Ixx, Ixy, Ixz, Iyy
 
 // What torques per unit parameter a joint feels from a link.
 template <class S>
-inline std::array<S, inertial_size> inertial_torques(const Vector<S>& v, const Vector<S>& u, const Vector<S>& w, const Vector<S>& dw,
-                                                     const Vector<S>& a) {
+inline std::array<S, inertial_size> inertial_torques(const Motion<S>& joint, const Link<S>& link) {
+    const auto& [v, u] = joint;
+    const auto& [w, dw, a] = link;
     const Vector<S> moment = cross(v, dw) + cross(w, cross(w, v)) + cross(a, u), t = cross(u, w);
     return {dot(v, a),
             moment.x,
@@ -33,104 +32,28 @@ inline std::array<S, inertial_size> inertial_torques(const Vector<S>& v, const V
             u.z * dw.z + t.z * w.z};
 }
 
-// The regressor of a tree, S samples at a time; S needs + - * with itself, cosine, sine and broadcast.
-template <class S>
-class Regressor {
-  public:
-    Regressor(const Tree& tree, const double* geometry, Vector3 gravity) : tree_(tree), up_(lift(-1.0 * gravity)) {
-        const std::vector<Prepared> prepared = tree.prepare(geometry);
-        for (int i = 0; i < tree.size(); ++i) {
-            const Prepared& p = prepared[i];
-            fixed_.push_back({lift(p.translation), lift(p.aligned), lift(p.bearing_inverse), lift(tree.joints[i].bearing.z), p.offset});
-            paths_.push_back(tree.path(i));
-        }
-        links_.resize(tree.size());
-        motions_.resize(static_cast<std::size_t>(tree.size()) * tree.size());
-    }
-
-    // q, dq, ddq: one S a joint. store(joint, column, torque) is called for every entry that is not zero by structure.
-    template <class Store>
-    void evaluate(const S* q, const S* dq, const S* ddq, Store&& store) {
-        const int n = tree_.size();
-        const Vector<S> still{S{}, S{}, S{}};
-        for (int i = 0; i < n; ++i) {
-            const Fixed& f = fixed_[i];
-            const int parent = tree_.joints[i].parent;
-            const bool slides = tree_.joints[i].prismatic;
-            const S motion = q[i] + f.offset;
-            RotationOf<S> r = f.aligned;
-            Vector<S> arm = f.translation;
-            if (slides)
-                arm = arm + motion * f.aligned.z;
-            else
-                turn_z(r, cosine(motion), sine(motion));
-            const RotationOf<S> back = transpose(r * f.bearing_inverse);
-            Link& link = links_[i];
-            link = {still, still, up_};
-            if (parent >= 0) link = links_[parent];
-            link.a = back * (link.a + cross(link.dw, arm) + cross(link.w, cross(link.w, arm)));
-            link.w = back * link.w;
-            link.dw = back * link.dw;
-            const Vector<S> rate = dq[i] * f.axis, push = ddq[i] * f.axis, swept = cross(link.w, rate);
-            if (slides) {
-                link.a = link.a + push + swept + swept;
-            } else {
-                link.w = link.w + rate;
-                link.dw = link.dw + push + swept;
-            }
-            for (int j : paths_[i]) {
-                Motion& m = motions_[i * n + j];
-                if (j == i) {
-                    m = slides ? Motion{f.axis, still} : Motion{still, f.axis};
-                } else {
-                    const Motion& before = motions_[parent * n + j];
-                    m = {back * (before.v + cross(before.u, arm)), back * before.u};
-                }
-                const std::array<S, inertial_size> torques = inertial_torques(m.v, m.u, link.w, link.dw, link.a);
-                for (int k = 0; k < inertial_size; ++k) store(j, inertial_size * i + k, torques[k]);
-            }
+// Calls store(joint, column, torque) for every entry of the regressor that is not zero by structure. q, dq, ddq: one S a joint.
+template <class S, class Store>
+void regressor(TreeMotion<S>& tree, const S* q, const S* dq, const S* ddq, Store&& store) {
+    for (int i = 0; i < tree.size(); ++i) {
+        const Link<S>& link = tree.advance(i, q[i], dq[i], ddq[i]);
+        for (int j : tree.path(i)) {
+            const std::array<S, inertial_size> torques = inertial_torques(tree.reach(i, j), link);
+            for (int k = 0; k < inertial_size; ++k) store(j, inertial_size * i + k, torques[k]);
         }
     }
-
-  private:
-    struct Fixed {
-        Vector<S> translation;
-        RotationOf<S> aligned, bearing_inverse;
-        Vector<S> axis;
-        double offset;
-    };
-    struct Link {
-        Vector<S> w, dw, a;
-    };
-    struct Motion {
-        Vector<S> v, u;
-    };
-
-    static Vector<S> lift(Vector3 a) { return {broadcast<S>(a.x), broadcast<S>(a.y), broadcast<S>(a.z)}; }
-    static RotationOf<S> lift(const Rotation& r) { return {lift(r.x), lift(r.y), lift(r.z)}; }
-
-    const Tree& tree_;
-    Vector<S> up_;
-    std::vector<Fixed> fixed_;
-    std::vector<std::vector<int>> paths_;
-    std::vector<Link> links_;
-    std::vector<Motion> motions_;
-};
+}
 
 // q, dq, ddq: (samples, n). places: (n, 10 n), for every entry of the regressor the row of out that takes it over the samples, or -1.
 // out: (·, samples); entries that are zero by structure are not written.
 inline void torque_regressor(const Tree& tree, const double* geometry, Vector3 gravity, const double* q, const double* dq, const double* ddq,
                              const std::int64_t* places, std::ptrdiff_t samples, double* out) {
     const int n = tree.size();
-    Regressor<Lanes> regressor(tree, geometry, gravity);
-    std::vector<Lanes> states(3 * static_cast<std::size_t>(n));
-    const double* sources[3] = {q, dq, ddq};
+    TreeMotion<Lanes> motion(tree, geometry, gravity);
+    JointStates states(n);
     for (std::ptrdiff_t s = 0; s < samples; s += lane_count) {
-        const int present = static_cast<int>(samples - s < lane_count ? samples - s : lane_count);
-        for (int part = 0; part < 3; ++part)
-            for (int i = 0; i < n; ++i)
-                for (int lane = 0; lane < present; ++lane) states[part * n + i][lane] = sources[part][(s + lane) * n + i];
-        regressor.evaluate(states.data(), states.data() + n, states.data() + 2 * n, [&](int joint, int column, const Lanes& torque) {
+        const int present = states.read(q, dq, ddq, s, samples);
+        regressor(motion, states.q(), states.dq(), states.ddq(), [&](int joint, int column, const Lanes& torque) {
             const std::ptrdiff_t place = places[joint * inertial_size * n + column];
             if (place < 0) return;
             double* p = out + place * samples + s;
