@@ -9,7 +9,7 @@
 #include "bindings.hpp"
 #include "equilibrium.hpp"
 #include "kinematics.hpp"
-#include "regressor.hpp"
+#include "regressor_adjoint.hpp"
 
 namespace nb = nanobind;
 using namespace flexcal;
@@ -19,6 +19,7 @@ namespace {
 using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
 using Places = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using ReadRows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Result = nb::ndarray<nb::numpy, double>;
 
 void expect(const Array& array, std::initializer_list<std::size_t> shape, const char* name) {
@@ -113,7 +114,9 @@ nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& 
     return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
 }
 
-void torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq, Places places, Rows out) {
+// rows: of the array that places point into, (rows, samples).
+void expect_motion(const Tree& tree, const Array& geometry, const Array& gravity, const Array& q, const Array& dq, const Array& ddq,
+                   const Places& places, std::size_t rows) {
     const std::size_t n = tree.size(), samples = q.shape(0);
     expect(geometry, {n, 6}, "geometry must be (n, 6)");
     expect(gravity, {3}, "gravity must be (3,)");
@@ -121,12 +124,30 @@ void torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq,
     expect(dq, {samples, n}, "dq must be (samples, n)");
     expect(ddq, {samples, n}, "ddq must be (samples, n)");
     if (places.shape(0) != n || places.shape(1) != inertial_size * n) throw nb::value_error("places must be (n, 10 n)");
-    if (out.shape(1) != samples) throw nb::value_error("out must be (rows, samples)");
     for (std::size_t i = 0; i < places.size(); ++i)
-        if (places.data()[i] >= static_cast<std::int64_t>(out.shape(0))) throw nb::value_error("a place is no row of out");
+        if (places.data()[i] >= static_cast<std::int64_t>(rows)) throw nb::value_error("a place is beyond the rows");
+}
+
+void torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq, Places places, Rows out) {
+    const std::size_t samples = q.shape(0);
+    expect_motion(tree, geometry, gravity, q, dq, ddq, places, out.shape(0));
+    if (out.shape(1) != samples) throw nb::value_error("out must be (rows, samples)");
     nb::gil_scoped_release release;
     torque_regressor(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(), places.data(),
                      static_cast<std::ptrdiff_t>(samples), out.data());
+}
+
+Result torques_adjoint(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq, Places places, ReadRows weights) {
+    const std::size_t n = tree.size(), samples = q.shape(0);
+    expect_motion(tree, geometry, gravity, q, dq, ddq, places, weights.shape(0));
+    if (weights.shape(1) != samples) throw nb::value_error("weights must be (rows, samples)");
+    Buffer out({3, samples, n});
+    {
+        nb::gil_scoped_release release;
+        torque_regressor_adjoint(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(), places.data(),
+                                 weights.data(), static_cast<std::ptrdiff_t>(samples), out.data.get());
+    }
+    return out.release();
 }
 
 }  // namespace
@@ -145,5 +166,9 @@ void bind_tree(nb::module_& m) {
         .def("torque_regressor", &torques, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),
              nb::arg("places"), nb::arg("out").noconvert(),
              "Joint torques by mass, first moment and inertia of every link, into the rows of out (·, samples) that places (n, 10 n) names; "
-             "-1 leaves an entry out, and those that are zero by structure are not written.");
+             "-1 leaves an entry out, and those that are zero by structure are not written.")
+        .def("torque_regressor_adjoint", &torques_adjoint, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),
+             nb::arg("places"), nb::arg("weights"),
+             "Derivatives (3, samples, n) by q, dq and ddq of a scalar whose derivatives by the entries of the torque regressor are the rows "
+             "of weights (·, samples) that places (n, 10 n) names; -1 stands for zeros, and entries that are zero by structure are not read.");
 }

@@ -10,7 +10,7 @@ from flexcal.model import RobotModel
 
 @pytest.mark.skipif(not _kernels.avx2, reason="this processor runs only one of the builds")
 def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) -> None:
-    """On what this processor makes of the same tree, regressor and triangle: else results would depend on the machine."""
+    """On what this processor makes of the same tree, regressor with its adjoint, and triangle: else results would depend on the machine."""
     from flexcal import _kernels_avx2
 
     arm = tx90l.joints
@@ -28,12 +28,14 @@ def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) ->
     for build in (_kernels, _kernels_avx2):
         out = np.zeros((360, 101))
         places = np.arange(360).reshape(6, 60)
-        build.Tree.build(*links).torque_regressor(geometry, tx90l.gravity, *states, places, out)
+        tree = build.Tree.build(*links)
+        tree.torque_regressor(geometry, tx90l.gravity, *states, places, out)
+        adjoint = tree.torque_regressor_adjoint(geometry, tx90l.gravity, *states, places, out)
         factor = np.zeros((60, 60))
         build.append(factor, out[:60].copy())
-        found.append((out, factor))
-    np.testing.assert_array_equal(found[0][0], found[1][0])
-    np.testing.assert_array_equal(found[0][1], found[1][1])
+        found.append((out, adjoint, factor))
+    for ours, theirs in zip(*found, strict=True):
+        np.testing.assert_array_equal(ours, theirs)
     assert np.abs(found[0][0]).max() > 1.0
 
 

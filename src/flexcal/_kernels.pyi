@@ -48,6 +48,16 @@ class Tree:
         places: np.ndarray,
         out: np.ndarray,
     ) -> None: ...
+    def torque_regressor_adjoint(
+        self,
+        geometry: np.ndarray,
+        gravity: np.ndarray,
+        q: np.ndarray,
+        dq: np.ndarray,
+        ddq: np.ndarray,
+        places: np.ndarray,
+        weights: np.ndarray,
+    ) -> np.ndarray: ...
 
 def append(triangle: np.ndarray, rows: np.ndarray) -> None: ...
 def closed_loop(

@@ -8,6 +8,7 @@ from flexcal.model.joint import Joint
 from flexcal.model.kinematics import PointKinematics, point_kinematics
 from flexcal.model.point import Payload, Point
 from flexcal.model.regressor import inertial_names, inertial_parameters, torque_regressor
+from flexcal.model.regressor_adjoint import torque_regressor_adjoint
 from flexcal.model.robot_model import RobotModel
 
 __all__ = [
@@ -26,4 +27,5 @@ __all__ = [
     "point_kinematics",
     "static_equilibrium",
     "torque_regressor",
+    "torque_regressor_adjoint",
 ]

@@ -43,13 +43,21 @@ def write_torque_regressor(
     `places` (n, 10 n) is -1 for what is not needed; `out` is (rows, samples). Entries that are zero because link i is not beyond joint j
     are not written. Raises `FlexcalError` as that does.
     """
+    q, dq, ddq = motion_batch(model, q, dq, ddq)
+    geometry = np.ascontiguousarray(model.geometry)
+    model.tree.torque_regressor(geometry, model.gravity, q, dq, ddq, places, out)
+
+
+def motion_batch(
+    model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """All three as contiguous (samples, n) arrays. Raises `FlexcalError` where the shapes differ or do not fit the robot."""
     q, dq, ddq = (joint_batch(model, values) for values in (q, dq, ddq))
     if not q.shape == dq.shape == ddq.shape:
         raise FlexcalError(
             f"q, dq and ddq have shapes {q.shape}, {dq.shape} and {ddq.shape}; give as many samples of each."
         )
-    geometry = np.ascontiguousarray(model.geometry)
-    model.tree.torque_regressor(geometry, model.gravity, q, dq, ddq, places, out)
+    return q, dq, ddq
 
 
 def inertial_parameters(model: RobotModel) -> np.ndarray:
