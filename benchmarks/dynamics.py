@@ -59,7 +59,7 @@ def run() -> list[tuple[str, float, str]]:
         swing = motion(observation, np.arange(SHORT))
         write_recording(folder / "log.parquet", long_log(observation))
         log = JointLog.read(folder / "log.parquet", observation.model, CUTOFF_HZ, folder)
-        peer, undecimated, decimated = _best(
+        peer, undecimated, decimated = best_times(
             lambda: dense(observation, swing),
             lambda: weighted_least_squares(observe(observation, base, [log], Decimation(1))),
             lambda: weighted_least_squares(observe(observation, base, [log], Decimation(10))),
@@ -174,7 +174,7 @@ def _identified(robot: Path, log: Path) -> tuple[float, float]:
     return min(once() for _ in range(RUNS))
 
 
-def _best(*works: Callable[[], object]) -> list[float]:
+def best_times(*works: Callable[[], object]) -> list[float]:
     """The shortest processor time of each, s, taken by turns, as the machine is not always equally fast."""
     rounds = []
     for _ in range(RUNS):
