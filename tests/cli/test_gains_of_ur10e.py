@@ -1,20 +1,14 @@
-"""Drive gains of a UR10e from measured currents, against those published with the recordings (Frontiers in Robotics and AI 2020, 571574).
-
-Without a licence the recordings are not part of this repository: FLEXCAL_DATASETS names the folder with `ur10e` in it.
-"""
+"""Drive gains of a UR10e from measured currents, against the published ones."""
 
 import json
-import os
 from pathlib import Path
 
 import numpy as np
-import polars as pl
 import pytest
+from ur10e_logs import FOLDER, at_hand, log, published_gains
 
 from flexcal.cli.main import main
 
-FOLDER = Path(os.environ.get("FLEXCAL_DATASETS", "")) / "ur10e"
-PUBLISHED = FOLDER / "UR10E_parameters.txt"
 PAYLOAD = 2.805
 ROBOT = f"""robot: {FOLDER.absolute() / "ur10e.urdf"}
 dynamics: {{cutoff_hz: 5, decimation: 10, friction: classic}}
@@ -22,21 +16,16 @@ signals: {{tau: {{columns: [i1, i2, i3, i4, i5, i6], unit: A, gain: [1, 1, 1, 1,
 payload: {{frame: tool0, mass: {PAYLOAD}, com: [0, 0, 0.05]}}
 """
 
-pytestmark = pytest.mark.skipif(
-    not PUBLISHED.exists(), reason="FLEXCAL_DATASETS names no folder with the recordings of the UR10e"
-)
+pytestmark = at_hand
 
 
 @pytest.fixture
 def given(tmp_path: Path) -> list[str]:
     """robot.yaml and both logs: the motion without the three seconds of rest before and after it."""
     (tmp_path / "robot.yaml").write_text(ROBOT)
-    names = ["t", *(f"q{i + 1}" for i in range(6)), *(f"i{i + 1}" for i in range(6))]
     for name, mass in (("", 0.0), ("Load", PAYLOAD)):
-        table = np.loadtxt(FOLDER / f"ur-20_02_19_14harm50sec{name}.csv", delimiter=",")[300:-300]
-        columns = np.column_stack([table[:, :7], table[:, 13:19]])
-        log = pl.DataFrame(columns, schema=names).with_columns(payload=mass)
-        log.write_csv(tmp_path / f"log{name}.csv")
+        found = log(f"ur-20_02_19_14harm50sec{name}.csv", slice(300, -300))
+        found.with_columns(payload=mass).write_csv(tmp_path / f"log{name}.csv")
     return [str(tmp_path / name) for name in ("robot.yaml", "log.csv", "logLoad.csv")]
 
 
@@ -45,8 +34,7 @@ def test_published_gains(given: list[str], capsys: pytest.CaptureFixture[str]) -
 
     All are known to a sixth of themselves or better, the first one, about the vertical, least.
     """
-    line = next(row for row in PUBLISHED.read_text().splitlines() if row.startswith("drvGains = ["))
-    published = np.array(line[line.index("[") + 1 : line.index("]")].split(), dtype=float)
+    published = published_gains()
     assert main(["identify", "gains", *given, "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     gains = np.array(found["gains"])

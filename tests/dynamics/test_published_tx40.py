@@ -23,9 +23,8 @@ def motion(tx40: RobotModel, examples: Path) -> Motion:
     dq = np.diff(q, axis=0) * RATE
     ddq = np.gradient(dq, 1 / RATE, axis=0)
     ddq[:, 5] = 0.0
-    count = len(ddq)
-    torque = recording.torque[BORDER : BORDER + count]
-    return Motion(recording.time[BORDER : BORDER + count], q[:count], dq, ddq, torque)
+    inner = slice(BORDER, -BORDER - 2)
+    return Motion(recording.time[inner], q[:-2], dq[:-1], ddq[:-1], recording.torque[inner])
 
 
 def twice_decimated(columns: np.ndarray) -> np.ndarray:
@@ -35,8 +34,11 @@ def twice_decimated(columns: np.ndarray) -> np.ndarray:
 
 
 def test_with_its_faults_the_published_estimate_comes_back(tx40: RobotModel, motion: Motion) -> None:
-    """Sixty values and standard deviations of weighted least squares. What is left, at most 0.8 of them, is not explained:
-    the rotor inertias of joints 3 to 5 come out larger by half a standard deviation."""
+    """Sixty values and standard deviations of weighted least squares, to the digits in which they were published.
+
+    It takes a third fault. The differences had cost the motion two samples, the torques none, and the rows of all joints, one joint below
+    the other, were taken apart as if there were as many of each as torques: every joint is two samples ahead of the joint before it.
+    """
     observation = Observation(tx40, CLASSIC)
     names = observation.names
     kept = [i for i in BaseParameters.of(observation).found.kept if names[i] != "joint_6.rotor_inertia"]
@@ -44,9 +46,9 @@ def test_with_its_faults_the_published_estimate_comes_back(tx40: RobotModel, mot
     for joint, (columns, members) in enumerate(
         zip(observation.columns(motion), observation.members, strict=True)
     ):
-        wide = np.zeros((len(names), len(columns[0]) // 100 + 1))
-        wide[members] = twice_decimated(columns)
         torque = twice_decimated(motion.torque[:, joint])
+        wide = np.zeros((len(names), len(torque)))
+        wide[members] = twice_decimated(columns[:, 2 * joint :])
         moves = np.abs(wide[names.index(f"joint_{joint + 1}.viscous")]) >= SLOW[joint]
         systems.append((wide[kept][:, moves].T, torque[moves]))
 
@@ -62,6 +64,5 @@ def test_with_its_faults_the_published_estimate_comes_back(tx40: RobotModel, mot
     assert set(published) == {names[i] for i in kept}
     expected = np.array([published[names[i]] for i in kept])
     off = np.abs(weighted - expected[:, 0]) / expected[:, 1]
-    assert np.median(off) < 0.13
-    assert np.max(off) < 0.8
-    np.testing.assert_allclose(std, expected[:, 1], rtol=0.05)
+    assert np.max(off) < 0.01
+    np.testing.assert_allclose(std, expected[:, 1], rtol=0.005)

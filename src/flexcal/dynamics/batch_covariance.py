@@ -76,9 +76,10 @@ def score_covariance(
     A joint's columns (width) of a batch times `seen` (width, k) give its part of Q, with QᵀQ = 1 over all joints and batches, and times
     `missed` (width,) the errors ρ, both divided by the subsystem's `noise`. M sums the outer squares of the scores of
     all windows of ℓ batches that follow each other, which is Bartlett's kernel, over joints together. ℓ is the bandwidth of Andrews (1991)
-    for the first autocorrelation of the scores, all parameters pooled. The scores of a window are freed of what the fit took from its
-    residuals, so that independent errors give root · rootᵀ σ² without bias (Bell & McCaffrey 2002). So many parameters from so few batches
-    leave correlations uncertain: they are drawn towards those of root · rootᵀ, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ.
+    for the first autocorrelation of the scores, all parameters pooled; what that kernel leaves out where they are autoregressive is given
+    back. The scores of a window are freed of what the fit took from its residuals, so that independent errors give root · rootᵀ σ² without
+    bias (Bell & McCaffrey 2002). So many parameters from so few batches leave correlations uncertain: they are drawn towards those of
+    root · rootᵀ, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ.
     """
     joints, size = len(seen), root.shape[1]
     found = [
@@ -86,10 +87,11 @@ def score_covariance(
         for number, own in enumerate(experiments)
     ]
     batches = sum(e.batches for e in found)
-    window = _bandwidth(found, batches)
+    follows = _first_autocorrelation(found)
+    window = _bandwidth(follows, batches)
     middle = np.zeros((size, size))
     for experiment in found:
-        middle += _windows(experiment, window, variance)
+        middle += _windows(experiment, window, variance) / _seen_share(follows, window)
     freedom = min(batches - 1.0, 1.5 * batches / window)
     spread = root @ middle @ root.T
     std = np.sqrt(np.diag(spread))
@@ -115,13 +117,25 @@ def _scores(
     return _Scores(score, information, len(batches))
 
 
-def _bandwidth(experiments: Sequence[_Scores], batches: int) -> int:
-    """Andrews' (1991) bandwidth of Bartlett's kernel for first-order autoregressive scores, at most a quarter of the batches."""
+def _first_autocorrelation(experiments: Sequence[_Scores]) -> float:
+    """Of the scores from batch to batch, at most 0.97."""
     product = sum(float(np.sum(e.score[1:] * e.score[:-1])) for e in experiments)
     size = sum(float(np.sum(e.score**2)) for e in experiments)
-    r = min(abs(product / size), 0.97) if size > 0 else 0.0
+    return min(product / size, 0.97) if size > 0 else 0.0
+
+
+def _bandwidth(r: float, batches: int) -> int:
+    """Andrews' (1991) bandwidth of Bartlett's kernel for first-order autoregressive scores, at most a quarter of the batches."""
     best = 1.1447 * (4 * r**2 / ((1 - r) ** 2 * (1 + r) ** 2) * batches) ** (1 / 3)
     return max(1, min(math.ceil(best), batches // 4))
+
+
+def _seen_share(r: float, window: int) -> float:
+    """What Bartlett's weights leave of the variance of the sum of first-order autoregressive scores, at most 1."""
+    if r <= 0:
+        return 1.0
+    lag = np.arange(1, window)
+    return (1 + 2 * float(np.sum((1 - lag / window) * r**lag))) * (1 - r) / (1 + r)
 
 
 def _windows(experiment: _Scores, window: int, variance: float) -> np.ndarray:

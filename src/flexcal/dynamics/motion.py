@@ -16,6 +16,8 @@ from flexcal.dynamics.arm_side import ArmSide
 TorqueLog = Literal["held", "instantaneous", "mean"]
 """What a logged torque is over its sample."""
 
+AT_REST = 1e-3
+"""rad/s or m/s, below which a joint is at rest: there it is noise that seems to move it."""
 _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
 _BESIDE = 2
@@ -98,10 +100,11 @@ class FilteredPositions:
         return FilteredPositions(time, self.time_step, self.q[start : stop + 4], self.torque[start:stop])
 
     def motion(self) -> Motion:
-        """With velocities and accelerations by central differences."""
+        """With velocities and accelerations by central differences; that of a joint at rest is zero: friction would take its sign."""
         time = self.start + self.time_step * np.arange(len(self))
         n = self.torque.shape[1]
         q, dq, ddq = differences(self.q, self.time_step)
+        dq[np.abs(dq) < AT_REST] = 0.0
         arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if q.shape[1] > n else None
         return Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], self.torque, arm)
 

@@ -12,14 +12,12 @@ import numpy as np
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.equations import Equations
-from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion import AT_REST, Motion
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
 _STANDSTILL = 0.01
-"""A joint stands still below this share of its largest speed in the recording."""
-_AT_REST = 1e-3
-"""rad/s or m/s, below which it stands still in any case: there it is noise that seems to move it."""
+"""A joint stands still below this share of its largest speed in the recording, and where it is at rest."""
 
 
 class Experiment(Protocol):
@@ -132,7 +130,7 @@ def rows(
 
 def slowest_speeds(experiment: Experiment) -> np.ndarray:
     """Speed (n,) up to which each joint stands still."""
-    return np.maximum(_STANDSTILL * experiment.top_speed, _AT_REST)
+    return np.maximum(_STANDSTILL * experiment.top_speed, AT_REST)
 
 
 class _Centres:
