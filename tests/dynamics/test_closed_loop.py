@@ -1,5 +1,6 @@
 """Estimators with a simulated closed loop: the loop itself, the truth without noise, and no bias where least squares has one."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -146,6 +147,21 @@ def test_didim_with_the_true_controller_holds_the_truth(declared: Observation, c
     linear, _ = errors(weighted_least_squares(data), declared, true_values(declared))
     inertia = 2
     assert abs(error[inertia]) < 0.1 * abs(linear[inertia])
+
+
+def test_a_joint_that_never_moves_does_not_in_the_simulation(unknown: Observation, clean: Motion) -> None:
+    """Its loads would push it about in a loop of finite gains, and the friction of that show in torques that no friction is in."""
+    truth, elbow = true_values(unknown), np.array([0.0, 1.0])
+    still = replace(clean, q=clean.q * elbow, dq=clean.dq * elbow, ddq=clean.ddq * elbow)
+    torques = [truth[m] @ w for m, w in zip(unknown.members, unknown.columns(still), strict=True)]
+    still = replace(still, torque=np.stack(torques, axis=1))
+    rows = recorded(unknown, still, 2)
+    data = observe(unknown, rows.base, [still], Decimation(2))
+    found = direct_and_inverse(data, rows)
+    seen = {name for name, known in zip(unknown.names, found.identifiable, strict=True) if known}
+    assert not seen & {"shoulder.rotor_inertia", "shoulder.viscous", "shoulder.coulomb"}
+    assert found.rank == weighted_least_squares(data).rank
+    assert found.values["elbow.viscous"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_robot_that_cannot_be_simulated(unknown: Observation, clean: Motion) -> None:

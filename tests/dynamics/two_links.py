@@ -54,7 +54,7 @@ def driven(observation: Observation, truth: np.ndarray, samples: int) -> Motion:
     rng = np.random.default_rng(7)
     size, phase = rng.normal(size=(5, 2)), rng.uniform(0, 2 * np.pi, (5, 2))
     q = np.einsum("jn,tjn->tn", size, np.sin(time[:, None, None] * rate[:, None] + phase))
-    command = Motion(time, q, np.zeros_like(q), np.zeros_like(q), np.zeros_like(q))
+    command = Motion(time, q, np.gradient(q, time, axis=0), np.zeros_like(q), np.zeros_like(q))
     simulated = Motion.joined(SimulatedExperiment(observation, truth, command, Decimation(1)).blocks())
     torques = [truth[m] @ w for m, w in zip(observation.members, observation.columns(simulated), strict=True)]
     return replace(simulated, torque=np.stack(torques, axis=1))

@@ -28,7 +28,8 @@ class SimulatedExperiment:
 
     The path to track is the recorded one through one more low-pass, at a tenth of the rate of the rows that `decimation` makes of it; the
     torque that a declared controller is given beforehand is the measured one, through the same. Without a controller the loop is
-    critically damped, its natural frequency half that rate. Raises `FlexcalError` as `ClosedLoop.reach` does.
+    critically damped, its natural frequency half that rate. A joint that never moves does not yield to its loads either. Raises
+    `FlexcalError` as `ClosedLoop.reach` does.
     """
 
     observation: Observation
@@ -53,7 +54,7 @@ class SimulatedExperiment:
 
     def blocks(self) -> Iterator[Motion]:
         """The simulated motion in parts that follow each other, with the measured torques."""
-        n = self.observation.model.n
+        n, rests = self.observation.model.n, self.top_speed == 0
         motions = iter(self.experiment.blocks())
         first = next(motions)
         step = float(first.time[1] - first.time[0])
@@ -70,4 +71,5 @@ class SimulatedExperiment:
             time, torque = beside[:, 0], beside[:, 1:]
             targets = map(Target, time, x[:, :n], dx[:, :n], ddx[:, :n], x[:, n:])
             states = np.array([loop.reach(target) for target in targets])
+            states[:, :, rests] = np.stack([x[:, :n], 0 * dx[:, :n], 0 * dx[:, :n]], axis=1)[:, :, rests]
             yield Motion(time, states[:, 0], states[:, 1], states[:, 2], torque)
