@@ -31,6 +31,7 @@ from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.workflow.distinct_logs import require_distinct
 from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
@@ -177,6 +178,7 @@ def identify_robot_dynamics(
     again, in this process alone.
     """
     begun = time.perf_counter()
+    require_distinct(logs, validate)
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}

@@ -22,6 +22,7 @@ from flexcal.dynamics import (
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.workflow.distinct_logs import require_distinct
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.results import quantities, write_results
@@ -67,6 +68,7 @@ def identify_gains(
     Friction is the classic one. With `out`, results.json goes to that folder; robot.yaml stays as it is. Raises `FlexcalError` where the
     logs do not fit the robot, a log does not say whether the payload was held, and as `drive_gains` does.
     """
+    require_distinct(logs)
     model = RobotModel.from_yaml(robot, estimates=False)
     treatment = treatment_of(model, logs)
     observation = Observation(model, CLASSIC)
