@@ -82,6 +82,23 @@ def test_a_gain_that_drowns_is_not_identifiable(arm: Observation) -> None:
     assert found.std(hidden[0]) is None
 
 
+def test_a_current_of_the_other_sign(arm: Observation) -> None:
+    """Its gain is below zero, and known as well as any."""
+    motions = [swings(arm, held, 7) for held in (0 * HELD, HELD)]
+    turned = [replace(m, torque=m.torque * [1, -1]) for m in motions]
+    found = drive_gains(observe(arm, BaseParameters.of(arm), turned, Decimation(1)), [0.0, HELD[0]])
+    assert found.parameters.coordinates() == pytest.approx(GAINS * [1, -1], rel=1e-9)
+    assert found.identifiable == (True, True) and found.dropped == ()
+
+
+def test_two_payloads_are_not_one(arm: Observation) -> None:
+    """Their centres of mass and inertias are not the same, and one estimate of them would pass for both."""
+    motions = [swings(arm, held, 7) for held in (0 * HELD, HELD, 0.5 * HELD)]
+    data = observe(arm, BaseParameters.of(arm), motions, Decimation(1))
+    with pytest.raises(FlexcalError, match="payloads of 2 and 4 kg are two"):
+        drive_gains(data, [0.0, 4.0, 2.0])
+
+
 def test_pairs_that_are_none(arm: Observation, tmp_path: Path) -> None:
     data = recorded(arm, 1.0, 2)
     bare = Observation(two_links(tmp_path), CLASSIC)
