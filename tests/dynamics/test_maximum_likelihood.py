@@ -9,6 +9,7 @@ from recovery import covered, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
+    CLASSIC,
     BaseParameters,
     Motion,
     Observation,
@@ -17,9 +18,11 @@ from flexcal.dynamics import (
     observe,
     weighted_least_squares,
 )
+from flexcal.dynamics.friction_library import Presliding, WarmUp
 from flexcal.dynamics.repeated_motion import RepeatedMotion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 PERIOD = 1000
@@ -64,6 +67,18 @@ def test_without_noise_the_truth_comes_back(
     found, _ = likeliest(observation, base, clean)
     assert found.rank == 61
     assert max(map(abs, errors(found, observation, truth).values())) < 1e-8
+
+
+def test_friction_that_depends_on_the_past_comes_back(
+    tx40: RobotModel, sines: Callable[[int, float], Motion]
+) -> None:
+    """Grease that warms up from period to period, and presliding that begins at rest with the recording."""
+    observation = Observation(tx40, (*CLASSIC, WarmUp(20.0), Presliding((0.02,) * 6)))
+    truth = observation.values() + np.random.default_rng(5).uniform(0.1, 1.0, len(observation.names))
+    motion = driven(observation, sines(4 * PERIOD, 100.0), truth)
+    found, _ = likeliest(observation, BaseParameters.of(observation), motion)
+    assert found.rank == 73
+    assert max(map(abs, errors(found, observation, truth).values())) < 1e-6
 
 
 @pytest.mark.parametrize(("acceleration", "gain"), [(0.0, 0.95), (0.5, 0.75)])
