@@ -1,5 +1,6 @@
 """Estimators with a simulated closed loop: the loop itself, the truth without noise, and no bias where least squares has one."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,7 @@ from flexcal.dynamics import (
     direct_and_inverse,
     instrumental_variables,
     observe,
+    simulated_experiment,
     simulated_iteration,
     weighted_least_squares,
 )
@@ -79,6 +81,35 @@ def test_a_linear_loop_answers_as_its_transfer_function(tmp_path: Path) -> None:
     for order, motion in enumerate((found.q, found.dq, found.ddq)):
         expected = (answer * s**order * np.exp(1j * omega * time)).imag
         assert np.abs(motion[late, 0] - expected[late]).max() < 0.01 * omega**order
+
+
+def test_steps_that_are_joined(unknown: Observation, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 2 kHz two samples make a step, wherever blocks are cut; finer steps change the motion by little."""
+    time, size = np.arange(6000) / 2000.0, np.array([0.8, 0.5])
+    angle = 2 * np.pi * np.array([0.5, 0.7]) * time[:, None]
+    rate = 2 * np.pi * np.array([0.5, 0.7])
+    q = size * np.sin(angle)
+    command = Motion(time, q, size * rate * np.cos(angle), -(rate**2) * q, 0 * q)
+
+    class Cut(Motion):
+        def blocks(self) -> Iterator[Motion]:
+            yield from (self.part(a, b) for a, b in ((0, 2), (2, 2500), (2500, 2503), (2503, 6000)))
+
+    cut = Cut(command.time, command.q, command.dq, command.ddq, command.torque)
+
+    def moved(experiment: Motion) -> Motion:
+        run = SimulatedExperiment(unknown, true_values(unknown), experiment, Decimation(40))
+        return Motion.joined(run.blocks())
+
+    whole, parts = moved(command), moved(cut)
+    for name in ("time", "q", "dq", "ddq"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), atol=1e-9)
+    assert len({tuple(row) for row in whole.ddq}) == 3000
+    monkeypatch.setattr(simulated_experiment, "_FINE", 0.0)
+    fine = moved(command)
+    assert len({tuple(row) for row in fine.ddq}) == 6000
+    assert np.abs(fine.q - whole.q).max() < 2e-3
+    assert np.abs(fine.dq - whole.dq).max() < 0.02
 
 
 def test_without_noise_the_truth_comes_back(

@@ -136,6 +136,20 @@ def test_the_period_is_found_in_the_motion(clean: Motion, rng: np.random.Generat
     assert len(RepeatedMotion.of(noisy, Window(start=5.0, end=47.0)).periods) == 4
 
 
+def test_rest_before_and_after_is_no_period(rng: np.random.Generator) -> None:
+    """Controllers hold the robot for seconds around what it was told: four periods are four."""
+    time, rate = np.arange(5200) / 100.0, 2 * np.pi / 10
+    phase = rate * np.clip(time - 5.0, 0.0, 40.0)[:, None]
+    lines = np.array([1, 2, 3, 4, 5, 6])
+    moves = (phase > 0) & (phase < 8 * np.pi)
+    q = 1 - np.cos(lines * phase)
+    dq = moves * rate * lines * np.sin(lines * phase)
+    motion = Motion(time, q + 1e-5 * rng.normal(size=q.shape), dq, 0 * q, 0 * q)
+    periods = RepeatedMotion.of(motion, Window()).periods
+    assert [len(p) for p in periods] == [PERIOD] * 4
+    assert periods[0].time[0] == pytest.approx(5.0, abs=0.06)
+
+
 def test_what_cannot_tell_its_noise_is_refused(
     observation: Observation, base: BaseParameters, clean: Motion, swing: Motion, rng: np.random.Generator
 ) -> None:

@@ -31,8 +31,7 @@ class SimulatedExperiment:
     The path to track is the recorded one through one more low-pass, at a tenth of the rate of the rows that `decimation` makes of it; the
     torque that a declared controller is given beforehand is the measured one, through the same. Without a controller the loop is
     critically damped, its natural frequency half that rate. Where samples are denser than the loop needs, accelerations are the same over
-    several. A joint that never moves does not yield to its loads either. Raises
-    `FlexcalError` as `ClosedLoop.reach` does.
+    several. A joint that never moves does not yield to its loads either. Raises `FlexcalError` as `ClosedLoop.reach` does.
     """
 
     observation: Observation
