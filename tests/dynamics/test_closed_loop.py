@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import recovery
 from two_links import CONTROLLER, RATE, driven, errors, recorded, true_values, two_links
 
 from flexcal.data import Recording
@@ -184,8 +185,7 @@ def test_a_joint_that_never_moves_does_not_in_the_simulation(unknown: Observatio
     """Its loads would push it about in a loop of finite gains, and the friction of that show in torques that no friction is in."""
     truth, elbow = true_values(unknown), np.array([0.0, 1.0])
     still = replace(clean, q=clean.q * elbow, dq=clean.dq * elbow, ddq=clean.ddq * elbow)
-    torques = [truth[m] @ w for m, w in zip(unknown.members, unknown.columns(still), strict=True)]
-    still = replace(still, torque=np.stack(torques, axis=1))
+    still = recovery.driven(unknown, still, truth)
     rows = recorded(unknown, still, 2)
     data = observe(unknown, rows.base, [still], Decimation(2))
     found = direct_and_inverse(data, rows)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recovery import covered, driven, errors, recorded
+from recovery import NOISE, covered, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
@@ -23,8 +23,6 @@ from flexcal.dynamics.friction_library import Presliding, WarmUp
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
-
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recovery import covered, driven, errors, recorded
+from recovery import NOISE, covered, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
@@ -24,14 +24,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 PERIOD = 1000
-
-
-@pytest.fixture(scope="module")
-def truth(observation: Observation) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
 
 
 @pytest.fixture(scope="module")

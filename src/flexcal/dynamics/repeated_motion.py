@@ -55,7 +55,7 @@ class RepeatedMotion:
             what = f"shows {count} whole periods" if size else "shows no motion that repeats itself"
             raise FlexcalError(
                 f"{experiment.name} {what}; maximum likelihood reads the noise from the scatter between at least {FEWEST}: record the same "
-                "periodic motion again and again, or take --estimator wls."
+                "periodic motion again and again, a little longer for the filters, or take --estimator wls."
             )
         return cls(tuple(motion.part(size * k, size * (k + 1)) for k in range(count)))
 
