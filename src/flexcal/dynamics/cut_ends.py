@@ -41,10 +41,12 @@ class Plateau:
 
     def merged(self, other: Plateau) -> Plateau:
         """With that of another part of the signal at the same value."""
-        pairs = zip(
-            (self.samples, self.speed, self.drop), (other.samples, other.speed, other.drop), strict=True
+        return Plateau(
+            self.value,
+            max(self.samples, other.samples),
+            max(self.speed, other.speed),
+            max(self.drop, other.drop),
         )
-        return Plateau(self.value, *(max(pair) for pair in pairs))
 
 
 class CutEnds:
