@@ -233,6 +233,15 @@ def test_two_ways_to_validate_exclude_each_other(tx40: Path, capsys: pytest.Capt
     assert "exclude each other" in refusal(arguments, capsys)
 
 
+def test_a_log_that_counts_twice(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Also under another name of its folder; what was fitted is not unseen."""
+    robot, log = str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")
+    again = str(tx40 / ".." / "tx40" / "exciting.parquet")
+    assert "exciting.parquet is given twice" in refusal([robot, log, again], capsys)
+    assert "is fitted and stands under --validate too" in refusal([robot, log, "--validate", again], capsys)
+    assert not (tx40 / "estimates.yaml").exists()
+
+
 def test_rows_that_are_grossly_wrong(
     tx40: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path, results: Results
 ) -> None:

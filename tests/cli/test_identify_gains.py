@@ -105,3 +105,17 @@ def test_a_payload_column_without_a_payload(arm: Path, capsys: pytest.CaptureFix
     assert "there is a column 'payload', but robot.yaml declares none" in refusal(
         "gains", arguments(arm, "free"), capsys
     )
+
+
+def test_columns_that_are_no_joints(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """With a matrix that mixes them no column has the gain of a joint."""
+    robot = arm / "robot.yaml"
+    (arm / "mixed.csv").write_text("1,0\n1,1\n")
+    robot.write_text(robot.read_text().replace("gain: [50, 20]", "gain: [50, 20], matrix: mixed.csv"))
+    assert "the matrix of signals.tau mixes columns" in refusal(
+        "gains", arguments(arm, "free", "loaded"), capsys
+    )
+    (arm / "mixed.csv").write_text("2,0\n0,1\n")
+    assert main(["identify", "gains", *arguments(arm, "free", "loaded"), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["gains"] == pytest.approx(list(DECLARED * GAINS * [0.5, 1]), rel=0.01)

@@ -245,6 +245,18 @@ def test_blocks_restart_after_a_gap(tmp_path: Path, robot: Any, hole: int) -> No
     assert found == [pytest.approx(0.501)]
 
 
+@pytest.mark.parametrize("put_down", [120, 150])
+def test_a_payload_that_is_put_down_on_the_way(
+    tmp_path: Path, robot: Any, put_down: int, fault: Callable[..., str]
+) -> None:
+    """Inside a block or where one ends."""
+    path, k = tmp_path / "log.parquet", np.arange(400)
+    columns = {name: np.zeros(400) for name in HEADER.split(",")}
+    pl.DataFrame(columns | {"t": k / 100, "payload": 4.0 * (k < put_down)}).write_parquet(path)
+    message = fault(lambda: list(read_recording_blocks(path, robot, rows=50)))
+    assert f"row {put_down + 1}, column payload: 0 kg follow 4 kg" in message
+
+
 def test_blocks_find_the_same_faults(tmp_path: Path, robot: Any, fault: Callable[..., str]) -> None:
     path = log(tmp_path / "log.csv", [f"{k / 100},0,0,0,0" for k in range(1000)])
     text = path.read_text().splitlines()

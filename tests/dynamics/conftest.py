@@ -55,3 +55,9 @@ def observation(tx40: RobotModel) -> Observation:
 @pytest.fixture(scope="session")
 def base(observation: Observation) -> BaseParameters:
     return BaseParameters.of(observation)
+
+
+@pytest.fixture(scope="session")
+def truth(observation: Observation) -> np.ndarray:
+    """Parameters (p,) that differ from CAD, and are all different from zero."""
+    return observation.values() + np.random.default_rng(5).uniform(0.1, 1.0, len(observation.names))

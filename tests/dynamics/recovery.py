@@ -8,6 +8,9 @@ from flexcal.data.filtering import Decimation
 from flexcal.dynamics import BaseParameters, Motion, Observation, RecordedRows, Window
 from flexcal.estimation import Estimate
 
+NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
+"""Of the TX40's torques, N m: some per cent of each joint's."""
+
 
 def driven(observation: Observation, motion: Motion, truth: np.ndarray) -> Motion:
     """The motion with the torques (N, n) of the true parameters (p,)."""

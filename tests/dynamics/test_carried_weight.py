@@ -39,3 +39,13 @@ def test_torques_and_currents(gain: float, recording: Recording, tx40: RobotMode
     log = log_of(replace(recording, torque=recording.torque / gain), tx40, tmp_path)
     require_joint_torques([log], tx40)
     assert log.weight.share == pytest.approx(1 / gain, rel=0.1)
+
+
+def test_torques_of_the_other_sign(recording: Recording, tx40: RobotModel, tmp_path: Path) -> None:
+    """All of them, as where a robot hangs from a ceiling that robot.yaml does not know, or those of one drive."""
+    for signs, joint in ((-np.ones(6), "joint_2"), (np.array([1, 1, -1, 1, 1, 1]), "joint_3")):
+        log = log_of(replace(recording, torque=recording.torque * signs), tx40, tmp_path)
+        with pytest.raises(
+            InputError, match=f"the torque of {joint} pulls with its weight instead of holding it"
+        ):
+            require_joint_torques([log], tx40)

@@ -1,9 +1,12 @@
 """Estimators with a simulated closed loop: the loop itself, the truth without noise, and no bias where least squares has one."""
 
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+import recovery
 from two_links import CONTROLLER, RATE, driven, errors, recorded, true_values, two_links
 
 from flexcal.data import Recording
@@ -17,6 +20,7 @@ from flexcal.dynamics import (
     direct_and_inverse,
     instrumental_variables,
     observe,
+    simulated_experiment,
     simulated_iteration,
     weighted_least_squares,
 )
@@ -78,6 +82,35 @@ def test_a_linear_loop_answers_as_its_transfer_function(tmp_path: Path) -> None:
     for order, motion in enumerate((found.q, found.dq, found.ddq)):
         expected = (answer * s**order * np.exp(1j * omega * time)).imag
         assert np.abs(motion[late, 0] - expected[late]).max() < 0.01 * omega**order
+
+
+def test_steps_that_are_joined(unknown: Observation, monkeypatch: pytest.MonkeyPatch) -> None:
+    """At 2 kHz two samples make a step, wherever blocks are cut; finer steps change the motion by little."""
+    time, size = np.arange(6000) / 2000.0, np.array([0.8, 0.5])
+    angle = 2 * np.pi * np.array([0.5, 0.7]) * time[:, None]
+    rate = 2 * np.pi * np.array([0.5, 0.7])
+    q = size * np.sin(angle)
+    command = Motion(time, q, size * rate * np.cos(angle), -(rate**2) * q, 0 * q)
+
+    class Cut(Motion):
+        def blocks(self) -> Iterator[Motion]:
+            yield from (self.part(a, b) for a, b in ((0, 2), (2, 2500), (2500, 2503), (2503, 6000)))
+
+    cut = Cut(command.time, command.q, command.dq, command.ddq, command.torque)
+
+    def moved(experiment: Motion) -> Motion:
+        run = SimulatedExperiment(unknown, true_values(unknown), experiment, Decimation(40))
+        return Motion.joined(run.blocks())
+
+    whole, parts = moved(command), moved(cut)
+    for name in ("time", "q", "dq", "ddq"):
+        np.testing.assert_allclose(getattr(parts, name), getattr(whole, name), atol=1e-9)
+    assert len({tuple(row) for row in whole.ddq}) == 3000
+    monkeypatch.setattr(simulated_experiment, "_FINE", 0.0)
+    fine = moved(command)
+    assert len({tuple(row) for row in fine.ddq}) == 6000
+    assert np.abs(fine.q - whole.q).max() < 2e-3
+    assert np.abs(fine.dq - whole.dq).max() < 0.02
 
 
 def test_without_noise_the_truth_comes_back(
@@ -146,6 +179,20 @@ def test_didim_with_the_true_controller_holds_the_truth(declared: Observation, c
     linear, _ = errors(weighted_least_squares(data), declared, true_values(declared))
     inertia = 2
     assert abs(error[inertia]) < 0.1 * abs(linear[inertia])
+
+
+def test_a_joint_that_never_moves_does_not_in_the_simulation(unknown: Observation, clean: Motion) -> None:
+    """Its loads would push it about in a loop of finite gains, and the friction of that show in torques that no friction is in."""
+    truth, elbow = true_values(unknown), np.array([0.0, 1.0])
+    still = replace(clean, q=clean.q * elbow, dq=clean.dq * elbow, ddq=clean.ddq * elbow)
+    still = recovery.driven(unknown, still, truth)
+    rows = recorded(unknown, still, 2)
+    data = observe(unknown, rows.base, [still], Decimation(2))
+    found = direct_and_inverse(data, rows)
+    seen = {name for name, known in zip(unknown.names, found.identifiable, strict=True) if known}
+    assert not seen & {"shoulder.rotor_inertia", "shoulder.viscous", "shoulder.coulomb"}
+    assert found.rank == weighted_least_squares(data).rank
+    assert found.values["elbow.viscous"] == pytest.approx(1.0, abs=0.1)
 
 
 def test_a_robot_that_cannot_be_simulated(unknown: Observation, clean: Motion) -> None:

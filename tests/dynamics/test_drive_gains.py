@@ -9,6 +9,8 @@ from two_links import GAINS, HELD, PAYLOAD, swings, two_links
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import CLASSIC, BaseParameters, Observation, RegressionData, drive_gains, observe
+from flexcal.dynamics.experiment_system import Batch
+from flexcal.dynamics.instrumental_fit import instrumental_fit
 from flexcal.errors import FlexcalError
 
 
@@ -80,6 +82,42 @@ def test_a_gain_that_drowns_is_not_identifiable(arm: Observation) -> None:
     hidden = [entry.name for entry in found.dropped]
     assert hidden and not all(found.identifiable)
     assert found.std(hidden[0]) is None
+
+
+def test_a_current_of_the_other_sign(arm: Observation) -> None:
+    """Its gain is below zero, and known as well as any."""
+    motions = [swings(arm, held, 7) for held in (0 * HELD, HELD)]
+    turned = [replace(m, torque=m.torque * [1, -1]) for m in motions]
+    found = drive_gains(observe(arm, BaseParameters.of(arm), turned, Decimation(1)), [0.0, HELD[0]])
+    assert found.parameters.coordinates() == pytest.approx(GAINS * [1, -1], rel=1e-9)
+    assert found.identifiable == (True, True) and found.dropped == ()
+
+
+def test_two_payloads_are_not_one(arm: Observation) -> None:
+    """Their centres of mass and inertias are not the same, and one estimate of them would pass for both."""
+    motions = [swings(arm, held, 7) for held in (0 * HELD, HELD, 0.5 * HELD)]
+    data = observe(arm, BaseParameters.of(arm), motions, Decimation(1))
+    with pytest.raises(FlexcalError, match="payloads of 2 and 4 kg are two"):
+        drive_gains(data, [0.0, 4.0, 2.0])
+
+
+def test_a_payload_that_was_not_held(arm: Observation) -> None:
+    """The same recording called loaded tells no gain."""
+    noise = np.random.default_rng(0)
+    free = [swings(arm, 0 * HELD, 7) for _ in range(2)]
+    noisy = [replace(m, torque=m.torque + 0.3 * noise.normal(size=m.torque.shape)) for m in free]
+    found = drive_gains(observe(arm, BaseParameters.of(arm), noisy, Decimation(1)), [0.0, HELD[0]])
+    assert found.identifiable == (False, False)
+
+
+def test_instruments_that_follow_nothing(rng: np.random.Generator) -> None:
+    """One of two has nothing of either column in it."""
+    columns = rng.normal(size=(60, 2))
+    basis = np.linalg.qr(np.column_stack([columns, rng.normal(size=60)]))[0]
+    instruments = np.column_stack([columns[:, 0], basis[:, 2]])
+    batch = Batch(0, 60, (np.column_stack([instruments, columns, columns.sum(axis=1)]),))
+    with pytest.raises(FlexcalError, match="an instrument hardly follows what it stands for"):
+        instrumental_fit([[batch]], [np.arange(2)], [1.0], np.zeros(2), [0, 1])
 
 
 def test_pairs_that_are_none(arm: Observation, tmp_path: Path) -> None:

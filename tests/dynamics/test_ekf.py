@@ -5,22 +5,24 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recovery import covered, driven, errors, recorded
+from recovery import NOISE, covered, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     BaseParameters,
     Motion,
     Observation,
+    Window,
     kalman_filter,
     observe,
     weighted_least_squares,
 )
 from flexcal.dynamics.ekf import POSITION_NOISE
+from flexcal.dynamics.forward_steps import forward_steps
+from flexcal.dynamics.friction_library import Presliding, WarmUp
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
+from flexcal.model import RobotModel
 
 
 @pytest.fixture(scope="module")
@@ -139,3 +141,16 @@ def test_a_robot_without_mass_is_refused(
     pushed = replace(swing, torque=-5.0 * swing.ddq + 0.1 * rng.normal(size=swing.torque.shape))
     with pytest.raises(FlexcalError, match="is not positive definite with the filter's parameters"):
         filtered(observation, base, pushed)
+
+
+def test_a_window_begins_with_what_friction_remembers(tx40: RobotModel, swing: Motion) -> None:
+    """Columns of steps inside a window are those that all steps have there."""
+    observation = Observation(tx40, (WarmUp(20.0), Presliding((0.02,) * 6)))
+    slowest = np.zeros(6)
+    whole = list(forward_steps(observation, swing, Window(), slowest))
+    late = list(forward_steps(observation, swing, Window(start=5.0, end=8.0), slowest))
+    time, again = (np.concatenate([steps.middle.time for steps in parts]) for parts in (whole, late))
+    columns, found = (np.concatenate([steps.columns for steps in parts]) for parts in (whole, late))
+    inside = (time > 5.0) & (time < 7.995)
+    np.testing.assert_allclose(again, time[inside])
+    np.testing.assert_allclose(found, columns[inside], rtol=0, atol=0.02)

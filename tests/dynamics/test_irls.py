@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from recovery import NOISE, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
@@ -18,37 +19,17 @@ from flexcal.dynamics import (
 )
 from flexcal.estimation import Estimate
 
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
-
-
-@pytest.fixture(scope="module")
-def truth(observation: Observation) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
-
 
 @pytest.fixture(scope="module")
 def clean(observation: Observation, truth: np.ndarray, swing: Motion) -> Motion:
     """At 50 Hz, with the torques of the truth."""
     short = Motion(*(part[::4] for part in (swing.time, swing.q, swing.dq, swing.ddq, swing.torque)))
-    torques = [truth[m] @ c for m, c in zip(observation.members, observation.columns(short), strict=True)]
-    return replace(short, torque=np.stack(torques, axis=1))
-
-
-def recorded(observation: Observation, base: BaseParameters, motions: list[Motion]) -> RecordedRows:
-    return RecordedRows(observation, base, motions, [Window()] * len(motions), Decimation(1))
+    return driven(observation, short, truth)
 
 
 def robust(observation: Observation, base: BaseParameters, motions: list[Motion]) -> Estimate:
     data = observe(observation, base, motions, Decimation(1))
-    return huber_least_squares(data, recorded(observation, base, motions))
-
-
-def errors(estimate: Estimate, observation: Observation, truth: np.ndarray) -> dict[str, float]:
-    """Of the base parameters."""
-    hidden = {entry.name for entry in estimate.dropped}
-    expected = estimate.regrouped(dict(zip(observation.names, truth, strict=True)))
-    return {name: estimate.values[name] - v for name, v in expected.items() if name not in hidden}
+    return huber_least_squares(data, recorded(observation, base, *motions))
 
 
 def test_without_noise_the_truth_comes_back(

@@ -19,6 +19,7 @@ from flexcal.dynamics import (
     observe,
     weighted_least_squares,
 )
+from flexcal.dynamics.column_errors import NoisyLog
 from flexcal.dynamics.rows import rows
 from flexcal.errors import FlexcalError, InputError
 from flexcal.progress import silent
@@ -140,6 +141,9 @@ def test_a_joint_that_never_moves(swing: Motion, observation: Observation, tmp_p
     log = JointLog.read(path, observation.model, 10.0, tmp_path)
     motion = Motion.joined(log.blocks())
     assert not motion.dq[:, 1].any() and not motion.ddq[:, 1].any()
+    assert np.ptp(motion.q[:, 1]) == 0 and abs(motion.q[0, 1] - 0.4) < 1e-5
+    noisy = Motion.joined(NoisyLog(log, observation.model, np.full(6, 1e-4), 1).blocks())
+    assert not noisy.dq[:, 1].any() and np.ptp(noisy.q[:, 1]) == 0
     data = observe(observation, BaseParameters.of(observation), [log], Decimation(2))
     assert data.silent == ("joint_2.rotor_inertia", "joint_2.viscous", "joint_2.coulomb")
     estimate = weighted_least_squares(data)

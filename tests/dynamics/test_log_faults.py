@@ -5,10 +5,11 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from flexcal.data import Recording, write_recording
-from flexcal.dynamics import Motion, Observation, log_blocks
+from flexcal.dynamics import JointLog, Motion, Observation
 from flexcal.errors import InputError
 from flexcal.model import RobotModel, torque_regressor
 
@@ -58,6 +59,18 @@ def swapped(recording: Recording) -> Recording:
     return replace(recording, velocity=recording.velocity[:, ::-1])
 
 
+def unmeasured(recording: Recording) -> Recording:
+    """Joint 5 has no torque sensor."""
+    return replace(recording, torque=recording.torque * [1, 1, 1, 1, 0, 1])
+
+
+def frozen(recording: Recording) -> Recording:
+    """The encoder of joint 3 says nothing new, while its drive measures velocities."""
+    q = recording.q.copy()
+    q[:, 2] = q[0, 2]
+    return replace(recording, q=q)
+
+
 @pytest.mark.parametrize(
     ("fault", "sentence"),
     [
@@ -68,7 +81,10 @@ def swapped(recording: Recording) -> Recording:
         ),
         (rates(180 / np.pi), r"velocities of joint_1 .* degrees a second: declare 'unit: deg/s'"),
         (rates(-1.0), "velocities of joint_1 .* their sign is the other one"),
+        (rates(0.0), "velocities of joint_1 .* they are 0 times as large"),
         (swapped, "velocities of joint_1 are not those of its positions"),
+        (unmeasured, "the torque of joint_5 is the same throughout; it was not measured"),
+        (frozen, "velocities of joint_3 are not those of its positions"),
     ],
 )
 def test_a_sensor_that_lies(
@@ -81,7 +97,53 @@ def test_a_sensor_that_lies(
     path = tmp_path / "log.parquet"
     write_recording(path, fault(recording))
     with pytest.raises(InputError, match=sentence):
-        list(log_blocks(path, tx40))
+        JointLog.read(path, tx40, 10.0, tmp_path)
+
+
+def motors(recording: Recording, model: RobotModel) -> pl.DataFrame:
+    """What the TX40 logs: q and τ through the inverses of the matrices that robot.yaml declares."""
+    q_from, torque_from = (
+        np.loadtxt(model.path.parent / name, delimiter=",")
+        for name in ("joint_from_motor.csv", "joint_from_motor_torque.csv")
+    )
+    zeros = np.pi / 2 * np.array([0, -1, 1, 0, 0, 0])
+    angles = np.linalg.solve(q_from, (recording.q - zeros).T)
+    torques = np.linalg.solve(torque_from, recording.torque.T)
+    columns = {f"motor_{k + 1}": angles[k] for k in range(6)} | {
+        f"torque_{k + 1}": torques[k] for k in range(6)
+    }
+    return pl.DataFrame({"t": recording.time} | columns)
+
+
+@pytest.mark.parametrize(
+    ("column", "what"), [("torque_5", "stays at its extreme"), ("motor_6", "is clipped")]
+)
+def test_a_motor_that_drives_two_joints(
+    column: str, what: str, recording: Recording, tx40: RobotModel, tmp_path: Path
+) -> None:
+    """Its limit is that of no joint: joint 5 feels the torque of motor 6 as well, joint 6 turns with motor 5."""
+    table = motors(replace(recording, torque=20.0 * np.cos(recording.q)), tx40)
+    limit = 0.6 * pl.col(column).abs().max()
+    table.with_columns(pl.col(column).clip(-limit, limit)).write_parquet(tmp_path / "log.parquet")
+    with pytest.raises(InputError, match=f"of column {column} .*{what}"):
+        JointLog.read(tmp_path / "log.parquet", tx40, 10.0, tmp_path)
+
+
+def test_an_encoder_that_ends_though_time_stamps_jitter(
+    recording: Recording, tx40: RobotModel, tmp_path: Path
+) -> None:
+    """What is interpolated onto even instants overshoots the ends of its stay, and is there the same to rounding only."""
+    time = recording.time + np.random.default_rng(6).uniform(-0.2, 0.2, len(recording)) / RATE
+    q = np.stack([np.interp(time, recording.time, column) for column in recording.q.T], axis=1)
+    write_recording(tmp_path / "log.csv", clipped(replace(recording, q=q, velocity=0 * q)))
+    table = (
+        pl.read_csv(tmp_path / "log.csv")
+        .with_columns(pl.Series("t", time))
+        .drop(f"dq{k}" for k in range(1, 7))
+    )
+    table.write_csv(tmp_path / "log.csv")
+    with pytest.raises(InputError, match="the encoder is clipped"):
+        JointLog.read(tmp_path / "log.csv", tx40, 10.0, tmp_path)
 
 
 def standing(recording: Recording) -> Recording:
@@ -110,10 +172,21 @@ def late(recording: Recording) -> Recording:
     return replace(recording, velocity=recording.velocity[np.maximum(np.arange(len(recording)) - 5, 0)])
 
 
-@pytest.mark.parametrize("oddity", [lambda same: same, standing, repeated, coarse, late])
+def locked(recording: Recording) -> Recording:
+    """Joint 2 never moves, and its drive makes velocities of the noise of its encoder."""
+    rng = np.random.default_rng(3)
+    q, velocity = recording.q.copy(), recording.velocity
+    assert velocity is not None
+    q[:, 1] = 0.3 + 1e-5 * rng.normal(size=len(q))
+    velocity = velocity * [1, 0, 1, 1, 1, 1]
+    velocity[:, 1] = 0.01 * rng.normal(size=len(q))
+    return replace(recording, q=q, velocity=velocity)
+
+
+@pytest.mark.parametrize("oddity", [lambda same: same, standing, repeated, coarse, late, locked])
 def test_what_only_looks_odd(
     oddity: Callable[[Recording], Recording], recording: Recording, tx40: RobotModel, tmp_path: Path
 ) -> None:
     path = tmp_path / "log.parquet"
     write_recording(path, oddity(recording))
-    assert sum(len(block) for block in log_blocks(path, tx40)) == len(recording)
+    assert JointLog.read(path, tx40, 10.0, tmp_path).span == (0.0, pytest.approx(recording.duration))

@@ -5,10 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recovery import covered, driven, errors, recorded
+from recovery import NOISE, covered, driven, errors, recorded
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
+    CLASSIC,
     BaseParameters,
     Motion,
     Observation,
@@ -17,18 +18,13 @@ from flexcal.dynamics import (
     observe,
     weighted_least_squares,
 )
+from flexcal.dynamics.friction_library import Presliding, WarmUp
 from flexcal.dynamics.repeated_motion import RepeatedMotion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
 
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 PERIOD = 1000
-
-
-@pytest.fixture(scope="module")
-def truth(observation: Observation) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +60,18 @@ def test_without_noise_the_truth_comes_back(
     found, _ = likeliest(observation, base, clean)
     assert found.rank == 61
     assert max(map(abs, errors(found, observation, truth).values())) < 1e-8
+
+
+def test_friction_that_depends_on_the_past_comes_back(
+    tx40: RobotModel, sines: Callable[[int, float], Motion]
+) -> None:
+    """Grease that warms up from period to period, and presliding that begins at rest with the recording."""
+    observation = Observation(tx40, (*CLASSIC, WarmUp(20.0), Presliding((0.02,) * 6)))
+    truth = observation.values() + np.random.default_rng(5).uniform(0.1, 1.0, len(observation.names))
+    motion = driven(observation, sines(4 * PERIOD, 100.0), truth)
+    found, _ = likeliest(observation, BaseParameters.of(observation), motion)
+    assert found.rank == 73
+    assert max(map(abs, errors(found, observation, truth).values())) < 1e-6
 
 
 @pytest.mark.parametrize(("acceleration", "gain"), [(0.0, 0.95), (0.5, 0.75)])
@@ -119,6 +127,20 @@ def test_the_period_is_found_in_the_motion(clean: Motion, rng: np.random.Generat
     noisy = replace(clean, q=clean.q + 1e-3 * rng.normal(size=clean.q.shape))
     assert [len(p) for p in RepeatedMotion.of(noisy, Window()).periods] == [PERIOD] * 5
     assert len(RepeatedMotion.of(noisy, Window(start=5.0, end=47.0)).periods) == 4
+
+
+def test_rest_before_and_after_is_no_period(rng: np.random.Generator) -> None:
+    """Controllers hold the robot for seconds around what it was told: four periods are four."""
+    time, rate = np.arange(5200) / 100.0, 2 * np.pi / 10
+    phase = rate * np.clip(time - 5.0, 0.0, 40.0)[:, None]
+    lines = np.array([1, 2, 3, 4, 5, 6])
+    moves = (phase > 0) & (phase < 8 * np.pi)
+    q = 1 - np.cos(lines * phase)
+    dq = moves * rate * lines * np.sin(lines * phase)
+    motion = Motion(time, q + 1e-5 * rng.normal(size=q.shape), dq, 0 * q, 0 * q)
+    periods = RepeatedMotion.of(motion, Window()).periods
+    assert [len(p) for p in periods] == [PERIOD] * 4
+    assert periods[0].time[0] == pytest.approx(5.0, abs=0.06)
 
 
 def test_what_cannot_tell_its_noise_is_refused(

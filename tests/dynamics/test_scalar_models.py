@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from recovery import covered, driven, errors, recorded
+from recovery import NOISE, covered, driven, errors, recorded
 
 from flexcal.dynamics import (
     BaseParameters,
@@ -20,14 +20,6 @@ from flexcal.dynamics.energy_model import EnergyModel
 from flexcal.dynamics.power_model import PowerModel
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
-
-
-@pytest.fixture(scope="module")
-def truth(observation: Observation) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from recovery import covered, driven, errors, recorded
+from recovery import NOISE, covered, driven, errors, recorded
 
 from flexcal.data import Recording, write_recording
 from flexcal.data.filtering import Decimation
@@ -27,14 +27,7 @@ from flexcal.dynamics.wls import noise_levels
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
-NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 SPEED, ACCELERATION = 0.05, 1.5
-
-
-@pytest.fixture(scope="module")
-def truth(observation: Observation) -> np.ndarray:
-    rng = np.random.default_rng(5)
-    return observation.values() + rng.uniform(0.1, 1.0, len(observation.names))
 
 
 @pytest.fixture(scope="module")

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import recovery
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import BaseParameters, Motion, Observation, RecordedRows, Window
@@ -54,10 +55,9 @@ def driven(observation: Observation, truth: np.ndarray, samples: int) -> Motion:
     rng = np.random.default_rng(7)
     size, phase = rng.normal(size=(5, 2)), rng.uniform(0, 2 * np.pi, (5, 2))
     q = np.einsum("jn,tjn->tn", size, np.sin(time[:, None, None] * rate[:, None] + phase))
-    command = Motion(time, q, np.zeros_like(q), np.zeros_like(q), np.zeros_like(q))
+    command = Motion(time, q, np.gradient(q, time, axis=0), np.zeros_like(q), np.zeros_like(q))
     simulated = Motion.joined(SimulatedExperiment(observation, truth, command, Decimation(1)).blocks())
-    torques = [truth[m] @ w for m, w in zip(observation.members, observation.columns(simulated), strict=True)]
-    return replace(simulated, torque=np.stack(torques, axis=1))
+    return recovery.driven(observation, simulated, truth)
 
 
 def swings(arm: Observation, held: np.ndarray, seed: int) -> Motion:
@@ -71,8 +71,8 @@ def swings(arm: Observation, held: np.ndarray, seed: int) -> Motion:
     motion = Motion(time, q, dq, ddq, np.zeros_like(q))
     values = true_values(arm)
     values[10:20] += held
-    torques = [values[m] @ w for m, w in zip(arm.members, arm.columns(motion), strict=True)]
-    return replace(motion, torque=np.stack(torques, axis=1) / GAINS)
+    held_up = recovery.driven(arm, motion, values)
+    return replace(held_up, torque=held_up.torque / GAINS)
 
 
 def recorded(observation: Observation, motion: Motion, factor: int) -> RecordedRows:

@@ -108,6 +108,7 @@ def _stamped(
 ) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Time stamps and all other quantities, block by block, checked as a whole log is."""
     before: float | None = None
+    held: float | None = None
     for table in tables:
         t = signals["t"].values(table)[:, 0]
         _check_increasing(table, signals["t"], t, before)
@@ -116,11 +117,14 @@ def _stamped(
                 raise table.error(0, None, "this is the only sample; a log needs at least two.")
             _check_rate(table, signals["t"], float(np.median(np.diff(t))))
         before = float(t[-1])
-        yield t, _stacked(model, table, signals)
+        yield t, _stacked(model, table, signals, held)
+        held = float(signals["payload"].values(table)[0, 0]) if "payload" in signals else None
 
 
-def _stacked(model: RobotModel, table: Table, signals: dict[str, Signal]) -> np.ndarray:
-    """All quantities but the time side by side (N, ·), in the order of `signals`."""
+def _stacked(
+    model: RobotModel, table: Table, signals: dict[str, Signal], held: float | None = None
+) -> np.ndarray:
+    """All quantities but the time side by side (N, ·), in the order of `signals`; `held` is the payload of the rows before, kg."""
     parts = []
     for quantity, signal in signals.items():
         if quantity == "t":
@@ -129,23 +133,26 @@ def _stacked(model: RobotModel, table: Table, signals: dict[str, Signal]) -> np.
         if quantity in ("q", "qa"):
             check_joint_units(model, table, signal, values)
         if quantity == "payload":
-            _check_payload(model, table, signal, values[:, 0])
+            _check_payload(model, table, signal, values[:, 0], held)
         parts.append(values)
     return np.concatenate(parts, axis=1)
 
 
-def _check_payload(model: RobotModel, table: Table, signal: Signal, held: np.ndarray) -> None:
+def _check_payload(
+    model: RobotModel, table: Table, signal: Signal, held: np.ndarray, before: float | None
+) -> None:
     if model.payload is None:
         raise table.file.error(
             "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame that it hangs on."
         )
-    wrong = (held < 0) | (held != held[0])
+    first = held[0] if before is None else before
+    wrong = (held < 0) | (held != first)
     if wrong.any():
         row = int(np.argmax(wrong))
         sentence = (
             f"a payload of {held[row]:g} kg; it must not be negative."
             if held[row] < 0
-            else f"{held[row]:g} kg follow {held[0]:g} kg; a log has one payload, so cut it there into two files."
+            else f"{held[row]:g} kg follow {first:g} kg; a log has one payload, so cut it there into two files."
         )
         raise table.error(row, signal.columns[0], sentence)
 

@@ -13,6 +13,10 @@ _POSES = 200
 """Samples of a block whose weight is looked at."""
 _TOO_WEAK = 1 / 20
 """Torques that follow less than this share of the weight are of the motors' side: gears begin beyond, currents in A do not reach it."""
+_HEAVY = 1 / 10
+"""Share of the heaviest joint's weight that a joint must carry to tell which way it pulls."""
+_AGAINST = -1 / 2
+"""Correlation below which torques pull the way that the weight does; friction and inertia bring it near zero, but not beyond."""
 _SMALL = 1 / 8
 """Of the weight's; friction may add that to torques of motors."""
 
@@ -56,6 +60,13 @@ class CarriedWeight:
         """Of its weight that the torques of the heaviest joint follow; 1 where nothing weighs."""
         k = self.heaviest
         return float(abs(self.of_both[k]) / self.of_weight[k]) if self.of_weight[k] > 0 else 1.0
+
+    @property
+    def reversed(self) -> int | None:
+        """The first joint of some weight whose torques do not hold it but pull it down; None where there is none."""
+        heavy = self.of_weight > _HEAVY**2 * self.of_weight.max()
+        against = self.of_both < _AGAINST * np.sqrt(self.of_weight * self.of_torque)
+        return next((int(k) for k in np.flatnonzero(heavy & against)), None)
 
     @property
     def by_motors(self) -> bool:

@@ -99,8 +99,6 @@ class NoisyLog:
     def blocks(self) -> Iterator[Motion]:
         rng = np.random.default_rng(self.seed)
         recordings = log_blocks(self.log.path, self.model)
-        return filtered_motion(
-            (replace(r, q=r.q + self.std * rng.normal(size=r.q.shape)) for r in recordings),
-            self.log.cutoff_hz,
-            self.model.config.dynamics.torque,
-        )
+        noisy = (replace(r, q=r.q + self.std * rng.normal(size=r.q.shape)) for r in recordings)
+        motions = filtered_motion(noisy, self.log.cutoff_hz, self.model.config.dynamics.torque)
+        return map(self.log.settled, motions)

@@ -14,22 +14,39 @@ _USUAL = 5.0
 """How many times longer than the mean run of equal values they must be: slow sensors repeat every value."""
 _APPROACH = 5e-3
 """s over which the speed before the extreme is looked at."""
-_FAST = 0.25
+_FAST = 0.05
 """Share of the top speed at which no robot runs into a stop unless it is its encoder's."""
+_HARD = 2.0
+"""How many times the usual changes of speed within `_APPROACH` such a stop is, at least; real robots reach a third of that."""
+_USUALLY = 0.99
+"""Share of the samples of a block that count as usual."""
 _STEPS = 8.0
 """Steps of its resolution by which the signal leaves its extreme within half the stay; a peak that is quantised leaves it by four."""
+_OVERSHOOT = 0.1
+"""Of the large steps between samples, how far from its extreme a signal may stay."""
+_ROUNDING = 1e-12
+"""Relative difference of values that are the same."""
 _LARGE = 0.5
 """Share of the largest size that an extreme must have: torque zero is a brake."""
 
 
 @dataclass(frozen=True)
 class Plateau:
-    """So many `samples` in a row at `value`, entered or left at `speed` (1/s); half of them further out it is `drop` away."""
+    """At most so many `samples` in a row at `value`, entered or left at up to `speed` (1/s); half of them further out it is `drop` away."""
 
     value: float
     samples: int
     speed: float
     drop: float
+
+    def merged(self, other: Plateau) -> Plateau:
+        """With that of another part of the signal at the same value."""
+        return Plateau(
+            self.value,
+            max(self.samples, other.samples),
+            max(self.speed, other.speed),
+            max(self.drop, other.drop),
+        )
 
 
 class CutEnds:
@@ -37,17 +54,18 @@ class CutEnds:
 
     def __init__(self) -> None:
         self._ends: dict[int, Plateau] = {}
-        self._top_speed = 0.0
-        self._size = 0.0
+        self._top_speed, self._usual_change = 0.0, 0.0
         self._samples, self._changes = 0, 1
         self._resolution = np.inf
 
     def add(self, values: np.ndarray, time_step: float) -> None:
         """The block (N,) that follows, with samples every `time_step`, s."""
         reach = max(1, round(_APPROACH / time_step))
-        moved = np.abs(values[reach:] - values[:-reach]) / (reach * time_step)
-        self._top_speed = max(self._top_speed, float(moved.max(initial=0.0)))
-        self._size = max(self._size, float(np.abs(values).max()))
+        speed = (values[reach:] - values[:-reach]) / (reach * time_step)
+        change = np.abs(speed[reach:] - speed[:-reach])
+        self._top_speed = max(self._top_speed, float(np.abs(speed).max(initial=0.0)))
+        if len(change):
+            self._usual_change = max(self._usual_change, float(np.quantile(change, _USUALLY)))
         self._samples += len(values)
         steps = np.abs(np.diff(values))
         steps = steps[steps > 0]
@@ -55,24 +73,29 @@ class CutEnds:
         if len(steps):
             self._resolution = min(self._resolution, float(np.quantile(steps, _FINEST)))
         for sign in (-1, 1):
-            found = _longest(values, float(sign * np.max(sign * values)), moved, reach)
-            known = self._ends.get(sign)
-            if (
-                known is None
-                or sign * found.value > sign * known.value
-                or (found.value == known.value and found.samples > known.samples)
-            ):
+            found = _plateau(values, sign, np.abs(speed), reach)
+            known = self._ends.get(sign, found)
+            if np.isclose(found.value, known.value, rtol=_ROUNDING, atol=0.0):
+                self._ends[sign] = found.merged(known)
+            elif sign * found.value > sign * known.value:
                 self._ends[sign] = found
+
+    @property
+    def span(self) -> float:
+        """From the smallest value to the largest."""
+        return self._ends[1].value - self._ends[-1].value
 
     @property
     def held(self) -> Plateau | None:
         """The longest stay at an extreme that is no chance, and not near zero."""
-        return next((end for end in self._long() if abs(end.value) >= _LARGE * self._size > 0), None)
+        size = max(abs(end.value) for end in self._ends.values())
+        return next((end for end in self._long() if abs(end.value) >= _LARGE * size), None)
 
     @property
     def cut(self) -> Plateau | None:
         """The longest stay at an extreme into or out of which the signal runs too fast to have stopped by itself."""
-        return next((end for end in self._long() if end.speed > _FAST * self._top_speed), None)
+        fast = max(_FAST * self._top_speed, _HARD * self._usual_change)
+        return next((end for end in self._long() if end.speed > fast), None)
 
     def _long(self) -> list[Plateau]:
         least = max(_SAMPLES, _USUAL * self._samples / self._changes)
@@ -80,14 +103,25 @@ class CutEnds:
         return [end for end in self._ends.values() if end.samples >= least and end.drop > far]
 
 
-def _longest(values: np.ndarray, extreme: float, moved: np.ndarray, reach: int) -> Plateau:
-    """The longest run of `extreme`; `moved` is the speed over `reach` samples from each on."""
-    at = np.concatenate([[False], values == extreme, [False]])
-    borders = np.flatnonzero(at[1:] != at[:-1])
-    starts, ends = borders[::2], borders[1::2]
+def _plateau(values: np.ndarray, sign: int, speed: np.ndarray, reach: int) -> Plateau:
+    """The longest stay at the largest (`sign` 1) or smallest value, with the highest speed at any.
+
+    `speed` is that over `reach` samples from each on. Where time stamps were repaired, the cubic overshoots the ends of a stay.
+    """
+    extreme = float(sign * np.max(sign * values))
+    steps = np.abs(np.diff(values))
+    near = np.abs(values - extreme) <= _OVERSHOOT * (np.quantile(steps, _USUALLY) if len(steps) else 0.0)
+    same = (steps <= _ROUNDING * np.abs(values).max()) & near[1:] & near[:-1]
+    borders = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
+    starts, ends = borders[::2], borders[1::2] + 1
+    if not len(starts):
+        return Plateau(extreme, 1, 0.0, 0.0)
     k = int(np.argmax(ends - starts))
-    before = moved[starts[k] - reach] if starts[k] >= reach else 0.0
-    after = moved[ends[k] - 1] if ends[k] - 1 < len(moved) else 0.0
     count = int(ends[k] - starts[k])
-    around = values[[max(0, starts[k] - count // 2), min(len(values), ends[k] + count // 2) - 1]]
-    return Plateau(extreme, count, float(max(before, after)), float(np.abs(around - extreme).max()))
+    around = values[max(0, starts[k] - count // 2) : ends[k] + count // 2]
+    stays = ends - starts >= _SAMPLES
+    first, last = starts[stays], ends[stays]
+    beside = np.concatenate([first - reach - 1, first - reach, last - 1, last])
+    fastest = float(speed[beside[(beside >= 0) & (beside < len(speed))]].max(initial=0.0))
+    value = float(values[starts[k]])
+    return Plateau(value, count, fastest, float(np.abs(around - value).max()))

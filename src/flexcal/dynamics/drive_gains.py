@@ -24,17 +24,22 @@ _ITERATIONS = 100
 def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
     """`<joint>.drive_gain`: what the torques of each joint must be multiplied by, from the weight of the payload.
 
-    `payloads` (kg, one an experiment) hang on the link that robot.yaml's payload hangs on; of it the mass is taken as known, and its
-    first moments and inertia are estimated beside the robot's base parameters. The equations W χ + W_p χ_p − k τ = −m w_m have the noise of
-    the torque in a column, which least squares would take from the gains; its instrument is the torque that the estimate predicts,
-    renewed until the gains settle. A gain whose 95 % interval reaches zero is not identifiable: the payload's share drowns. Raises
-    `FlexcalError` without a declared payload, where all or no experiments carry one, as `noise_levels` does, and where the gains do
-    not settle.
+    `payloads` (kg, one an experiment, 0 or that of the one payload) hang on the link that robot.yaml's payload hangs on; of it the mass is
+    taken as known, and its first moments and inertia are estimated beside the robot's base parameters. The equations
+    W χ + W_p χ_p − k τ = −m w_m have the noise of the torque in a column, which least squares would take from the gains; its instrument is
+    the torque that the estimate predicts, renewed until the gains settle. A gain whose 95 % interval reaches zero is not identifiable: the
+    payload's share drowns. One below zero turns the sign of what was measured. Raises `FlexcalError` without a declared payload, where
+    all or no experiments carry one, or several, as `noise_levels` and `instrumental_fit` do, and where the gains do not settle.
     """
     held, names = data.observation.model.payload, data.observation.model.joint_names
     if held is None or not any(payloads) or all(payloads):
         raise FlexcalError(
             "drive gains need recordings both with and without the payload that robot.yaml declares."
+        )
+    masses = sorted({mass for mass in payloads if mass > 0})
+    if len(masses) > 1:
+        raise FlexcalError(
+            f"payloads of {masses[0]:g} and {masses[1]:g} kg are two, whose centres of mass and inertias differ; give recordings of one."
         )
     terms = _Terms(data, payloads, held.joint)
     noise = noise_levels(data)
@@ -62,7 +67,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
         iterations=1,
         covariance_freedom=fit.spread.freedom,
     )
-    told = [_positive(estimate.interval(name)) for name in estimate.parameters.names]
+    told = [_without_zero(estimate.interval(name)) for name in estimate.parameters.names]
     return replace(
         estimate,
         rank=sum(told),
@@ -78,8 +83,8 @@ def gain_name(joint: str) -> str:
     return f"{joint}.drive_gain"
 
 
-def _positive(interval: tuple[float, float] | None) -> bool:
-    return interval is not None and interval[0] > 0.0
+def _without_zero(interval: tuple[float, float] | None) -> bool:
+    return interval is not None and interval[0] * interval[1] > 0.0
 
 
 def _settled(terms: _Terms, noise: Sequence[float], kept: Sequence[int]) -> np.ndarray:

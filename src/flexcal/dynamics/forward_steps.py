@@ -66,17 +66,21 @@ class ForwardSteps:
 def forward_steps(
     observation: Observation, experiment: Experiment, window: Window, slowest: np.ndarray
 ) -> Iterator[ForwardSteps]:
-    """The steps of an experiment inside a window, some at a time; a robot slower than `slowest` (n,) at all joints stands."""
+    """The steps of an experiment inside a window, some at a time; a robot slower than `slowest` (n,) at all joints stands.
+
+    Friction that remembers does so from the start of the experiment on.
+    """
     memory: Memory = {}
     held: Motion | None = None
     for block in experiment.blocks():
-        inside = (block.time >= window.start) & (block.time < window.end)
-        if not inside.any():
+        first, last = np.searchsorted(block.time, [window.start, window.end])
+        if first:
+            observation.follow(block.part(0, first), memory)
+        if first == last:
             continue
-        first, last = np.flatnonzero(inside)[[0, -1]]
-        motion = block.part(first, last + 1)
+        motion = block.part(first, last)
         motion = motion if held is None else Motion.joined([held, motion])
-        stride = max(1, round(_STEP / float(motion.time[1] - motion.time[0]))) if len(motion) > 1 else 1
+        stride = max(1, int(_STEP / float(motion.time[1] - motion.time[0]) + 1e-6)) if len(motion) > 1 else 1
         count = (len(motion) - 1) // stride
         for start in range(0, count, _TOGETHER):
             stop = min(start + _TOGETHER, count)

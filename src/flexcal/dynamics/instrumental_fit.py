@@ -52,8 +52,8 @@ def instrumental_fit(
     weakest = float(np.linalg.svd(np.linalg.qr(regressors)[0][:size], compute_uv=False)[-1])
     if not weakest > _WEAKEST:
         raise FlexcalError(
-            "the motion of the model does not show all that the recorded one does; check `controller:` in robot.yaml, or look at these "
-            "data with --estimator wls."
+            f"an instrument hardly follows what it stands for (correlation {weakest:.1g}); record longer and with more excitation, with a "
+            "heavier payload where gains are sought, or check `controller:` in robot.yaml."
         )
     root = scale[size:-1, None] * np.linalg.inv(regressors[:size])
     found = start.copy()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -13,15 +13,13 @@ import numpy as np
 
 from flexcal.data import Recording, read_recording_blocks
 from flexcal.dynamics.carried_weight import CarriedWeight
-from flexcal.dynamics.log_faults import LogFaults
+from flexcal.dynamics.log_faults import MOVES, LogFaults
 from flexcal.dynamics.motion import FilteredPositions, Motion, filtered_positions
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 
 _ROWS = 20_000
 """Rows of the file that are in memory at once."""
-_MOVES = 1e-3
-"""rad or m from end to end, at least, of a joint that moves."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +40,7 @@ class JointLog:
     samples: int
     time_step: float
     top_speed: np.ndarray
+    rest: np.ndarray
     span: tuple[float, float]
     payload: float | None
     weight: CarriedWeight
@@ -51,8 +50,10 @@ class JointLog:
         """One pass over the log at `path`, filtered at `cutoff_hz` into a file of the folder `scratch`: 96 bytes a sample of six joints,
         and 48 for their arm sides.
 
-        Raises `InputError` as `log_blocks` does, and `FlexcalError` as `filtered_positions` does and where the folder cannot take it.
+        Raises `InputError` as `log_blocks` does, for what `LogFaults` finds, and where the log does not suit the filter, and `FlexcalError`
+        where the folder cannot take it.
         """
+        faults = LogFaults(path, model)
         read: list[tuple[float, float, float]] = []
         held: list[float] = []
         carried = [CarriedWeight.empty(model.n)]
@@ -63,7 +64,9 @@ class JointLog:
                 if recording.payload is not None:
                     held.append(float(recording.payload[0]))
                 carried.append(CarriedWeight.of(recording, model))
+                faults.add(recording)
                 yield recording
+            faults.check()
 
         starts, samples, top_speed = [], 0, np.zeros(model.n)
         lowest, highest = np.full(model.n, np.inf), np.full(model.n, -np.inf)
@@ -85,7 +88,12 @@ class JointLog:
                 f"{scratch} cannot take the filtered log ({problem.strerror or problem}); "
                 "set TMPDIR to a folder with room for 144 bytes a sample."
             ) from problem
-        top_speed[highest - lowest < _MOVES] = 0.0
+        except InputError:
+            raise
+        except FlexcalError as problem:
+            raise InputError(f"{path}: {problem}") from problem
+        rests = highest - lowest < MOVES
+        top_speed[rests] = 0.0
         span = (read[0][0], read[-1][1])
         return cls(
             path,
@@ -95,6 +103,7 @@ class JointLog:
             samples,
             read[0][2],
             top_speed,
+            np.where(rests, 0.5 * (lowest + highest), np.nan),
             span,
             held[0] if held else None,
             reduce(add, carried),
@@ -110,18 +119,20 @@ class JointLog:
         with self.filtered.open("rb") as stream:
             for start in self.starts:
                 q, torque = np.load(stream).T, np.load(stream).T
-                motion = FilteredPositions(start, self.time_step, q, torque).motion()
-                motion.dq[:, self.top_speed == 0] = 0.0
-                motion.ddq[:, self.top_speed == 0] = 0.0
-                yield motion
+                yield self.settled(FilteredPositions(start, self.time_step, q, torque).motion())
+
+    def settled(self, motion: Motion) -> Motion:
+        """A motion of this log, with the joints that never move at rest."""
+        moves = np.isnan(self.rest)
+        q = np.where(moves, motion.q, self.rest)
+        return replace(motion, q=q, dq=moves * motion.dq, ddq=moves * motion.ddq)
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
     """The recording of a log in parts that follow each other.
 
-    Raises `InputError` as `read_recording` does, for a gap, and at the end for what `LogFaults` finds.
+    Raises `InputError` as `read_recording` does, and for a gap.
     """
-    faults = LogFaults(path, model)
     for recording in read_recording_blocks(path, model, rows=_ROWS):
         base = recording.time_base
         if base is not None and base.gap > 0:
@@ -129,6 +140,4 @@ def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
                 f"{path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
                 f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
             )
-        faults.add(recording)
         yield recording
-    faults.check()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Memory
@@ -68,10 +70,15 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
 
 
 def _mean_rows(observation: Observation, motion: RepeatedMotion, factor: int) -> np.ndarray:
-    """[W, Y] of the mean period (2 K + 1, n, p + 1); friction that remembers begins as the first period leaves it."""
+    """[W, Y] of the mean motion (2 K + 1, n, p + 1), averaged over the times of all periods: friction remembers, and warms up."""
     memory: Memory = {}
-    observation.follow(motion.periods[0], memory)
-    systems = [_rows(system.T, factor) for system in observation.systems(motion.mean, memory)]
+    again = (replace(motion.mean, time=period.time) for period in motion.periods)
+    return np.mean([_coefficients(observation, each, memory, factor) for each in again], axis=0)
+
+
+def _coefficients(observation: Observation, motion: Motion, memory: Memory, factor: int) -> np.ndarray:
+    """Those of [W, Y] for one period (2 K + 1, n, p + 1)."""
+    systems = [_rows(system.T, factor) for system in observation.systems(motion, memory)]
     found = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
     for joint, (system, members) in enumerate(zip(systems, observation.members, strict=True)):
         found[:, joint, members] = system[:, :-1]

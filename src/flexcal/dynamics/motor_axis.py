@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,6 +26,7 @@ class MotorAxis:
         return sum((ratio * values[:, joint] for joint, ratio in self.shares), np.zeros(len(values)))
 
 
+@lru_cache(maxsize=4)
 def motor_axes(model: RobotModel) -> tuple[MotorAxis, ...]:
     """One axis a joint, with what `drives: coupling:` declares."""
     axes = []

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.motion import Motion
-from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.rows import Experiment, Window, slowest_speeds
 from flexcal.errors import FlexcalError
 
 FEWEST = 4
@@ -16,7 +16,8 @@ _SAME = 1e-4
 """Mean squared difference of positions a period apart, over twice their variance: 1 % of the amplitude."""
 _AWAY = 1e-2
 """What that must have reached before: a slow motion is like itself a sample later."""
-
+_MOMENT = 0.05
+"""s of rest that a period may begin or end with."""
 _STANDS_OUT = 40.0
 """Power of a line over its variance; F(2, 6) exceeds it three times in ten thousand, F(2, 8) less often."""
 
@@ -42,23 +43,31 @@ class RepeatedMotion:
 
     @classmethod
     def of(cls, experiment: Experiment, window: Window) -> RepeatedMotion:
-        """All whole periods of an experiment inside the window, from its start.
+        """All whole periods of an experiment inside the window, from where the robot begins to move there.
 
         The period is the shortest lag after which positions are the same to 1 % of their amplitude. Raises `FlexcalError` for a motion
         that does not repeat, or does so less than four times.
         """
-        whole = Motion.joined(experiment.blocks())
-        inside = np.flatnonzero((whole.time >= window.start) & (whole.time < window.end))
-        motion = whole.part(inside[0], inside[-1] + 1) if len(inside) else whole.part(0, 0)
+        motion = _moving(Motion.joined(experiment.blocks()), window, slowest_speeds(experiment))
         size = _period(motion.q)
         count = len(motion) // size if size else 0
         if count < FEWEST:
             what = f"shows {count} whole periods" if size else "shows no motion that repeats itself"
             raise FlexcalError(
                 f"{experiment.name} {what}; maximum likelihood reads the noise from the scatter between at least {FEWEST}: record the same "
-                "periodic motion again and again, or take --estimator wls."
+                "periodic motion again and again, a little longer for the filters, or take --estimator wls."
             )
         return cls(tuple(motion.part(size * k, size * (k + 1)) for k in range(count)))
+
+
+def _moving(whole: Motion, window: Window, slowest: np.ndarray) -> Motion:
+    """What lies in a window, without the rest of the robot before and after its motion but for a moment."""
+    start, end = np.searchsorted(whole.time, [window.start, window.end])
+    moves = start + np.flatnonzero((np.abs(whole.dq[start:end]) > slowest).any(axis=1))
+    if not len(moves):
+        return whole.part(0, 0)
+    beside = int(np.searchsorted(whole.time, whole.time[0] + _MOMENT))
+    return whole.part(max(start, moves[0] - beside), min(end, moves[-1] + beside + 1))
 
 
 def _standing_out(periods: np.ndarray) -> np.ndarray:

@@ -20,6 +20,8 @@ _PATH = 0.1
 """Cut-off of the path that is tracked, over the rate of the rows: noise enters it by so much less of their band."""
 _LOOP = 0.5
 """Natural frequency of the loop of an unknown controller, over the rate of the rows."""
+_FINE = 0.2
+"""Over 1/ω of an unknown controller's loop, what steps of the simulation are joined to; those of a declared one to its period."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +30,8 @@ class SimulatedExperiment:
 
     The path to track is the recorded one through one more low-pass, at a tenth of the rate of the rows that `decimation` makes of it; the
     torque that a declared controller is given beforehand is the measured one, through the same. Without a controller the loop is
-    critically damped, its natural frequency half that rate. Raises `FlexcalError` as `ClosedLoop.reach` does.
+    critically damped, its natural frequency half that rate. Where samples are denser than the loop needs, accelerations are the same over
+    several. A joint that never moves does not yield to its loads either. Raises `FlexcalError` as `ClosedLoop.reach` does.
     """
 
     observation: Observation
@@ -53,21 +56,35 @@ class SimulatedExperiment:
 
     def blocks(self) -> Iterator[Motion]:
         """The simulated motion in parts that follow each other, with the measured torques."""
-        n = self.observation.model.n
+        n, rests = self.observation.model.n, self.top_speed == 0
         motions = iter(self.experiment.blocks())
         first = next(motions)
         step = float(first.time[1] - first.time[0])
         robot = SimulatedRobot(self.observation, self.parameters, self.name)
         rows_hz = 1.0 / (step * self.decimation.factor)
-        loop = ClosedLoop(robot, step, 2 * math.pi * _LOOP * rows_hz)
+        natural = 2 * math.pi * _LOOP * rows_hz
+        declared = robot.model.controller
+        fine = _FINE / natural if declared is None else 1.0 / declared.rate_hz
+        stride = max(1, int(fine / step + 1e-9))
+        loop = ClosedLoop(robot, stride * step, natural)
 
         def columns() -> Iterator[tuple[np.ndarray, np.ndarray]]:
             for motion in (first, *motions):
                 yield np.hstack([motion.q, motion.torque]), np.column_stack([motion.time, motion.torque])
 
+        done, last = 0, np.zeros((0, 3, n))
         for values, beside in smoothed(columns(), LowPass(step, _PATH * rows_hz)):
             x, dx, ddx = differences(values, step)
             time, torque = beside[:, 0], beside[:, 1:]
-            targets = map(Target, time, x[:, :n], dx[:, :n], ddx[:, :n], x[:, n:])
-            states = np.array([loop.reach(target) for target in targets])
-            yield Motion(time, states[:, 0], states[:, 1], states[:, 2], torque)
+            since = (done + np.arange(len(time))) % stride
+            at = np.flatnonzero(since == 0)
+            targets = map(Target, time[at], x[at, :n], dx[at, :n], ddx[at, :n], x[at, n:])
+            reached = np.array([loop.reach(target) for target in targets]).reshape(-1, 3, n)
+            states = np.concatenate([last, reached])[np.cumsum(since == 0) - 1 + len(last)]
+            done, last = done + len(time), np.concatenate([last, reached])[-1:]
+            later = step * since[:, None]
+            ddq = states[:, 2]
+            dq = states[:, 1] + later * ddq
+            q = states[:, 0] + later * (states[:, 1] + 0.5 * later * ddq)
+            q[:, rests], dq[:, rests], ddq[:, rests] = x[:, :n][:, rests], 0.0, 0.0
+            yield Motion(time, q, dq, ddq, torque)

@@ -42,14 +42,16 @@ class SimulatedRobot:
         at_rest = self._drive(0.0, rest, rest, rest, {})
         pushed = [self._drive(0.0, rest, rest, push, {}) - at_rest for push in np.eye(self.model.n)]
         self.rotors = np.array(pushed).T
+        self._below = np.tril_indices(self.model.n, -1)
 
     def mass_matrix(self, q: np.ndarray) -> np.ndarray:
         """Of links and drives (n, n); raises `FlexcalError` where it is not positive definite."""
         import pinocchio as pin
         from scipy.linalg.lapack import dpotrf  # pyright: ignore[reportAttributeAccessIssue]
 
-        upper = np.triu(pin.crba(self._arm.model, self._arm.data, self._at(q)))
-        mass = upper + np.triu(upper, 1).T + self.rotors
+        mass = pin.crba(self._arm.model, self._arm.data, self._at(q))  # its upper triangle
+        mass[self._below] = mass.T[self._below]
+        mass = mass + self.rotors
         if dpotrf(mass)[1] != 0:
             raise FlexcalError(
                 f"the estimate gives the robot a mass matrix that is not positive definite at q = {np.array2string(q, precision=3)} of "

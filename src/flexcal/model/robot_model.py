@@ -92,7 +92,7 @@ class RobotModel:
         """Number of movable joints."""
         return len(self.joints)
 
-    @property
+    @cached_property
     def joint_names(self) -> tuple[str, ...]:
         """URDF names of the movable joints."""
         return tuple(joint.name for joint in self.joints)

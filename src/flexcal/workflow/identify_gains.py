@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.data.signals import mapped_signals
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
@@ -19,9 +20,11 @@ from flexcal.dynamics import (
     batches_each,
     drive_gains,
 )
+from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.workflow.distinct_logs import require_distinct
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.results import quantities, write_results
@@ -65,9 +68,12 @@ def identify_gains(
     """Drive gains of a robot.yaml from joint logs with and without its payload, whose mass alone is taken as known.
 
     Friction is the classic one. With `out`, results.json goes to that folder; robot.yaml stays as it is. Raises `FlexcalError` where the
-    logs do not fit the robot, a log does not say whether the payload was held, and as `drive_gains` does.
+    logs do not fit the robot, a matrix of `signals:` mixes the torques of several columns, a log does not say whether the payload was
+    held, and as `drive_gains` does.
     """
+    require_distinct(logs)
     model = RobotModel.from_yaml(robot, estimates=False)
+    declared = _declared(model)
     treatment = treatment_of(model, logs)
     observation = Observation(model, CLASSIC)
     with TemporaryDirectory(prefix="flexcal_") as folder:
@@ -78,9 +84,20 @@ def identify_gains(
             parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
         )
     data = RegressionData.of(observation, BaseParameters.of(observation), systems)
-    signal = model.config.signals.get("tau")
-    declared = np.ones(model.n) if signal is None or signal.gain is None else np.array(signal.gain)
     result = IdentifiedGains(drive_gains(data, payloads), declared, tuple(payloads))
     if out is not None:
         write_results(out, result.document())
     return result
+
+
+def _declared(model: RobotModel) -> np.ndarray:
+    """Gains (n,) of `signals: tau:`, one a joint."""
+    config, mapped = model.config.signals.get("tau"), mapped_signals(model).get("tau")
+    matrix = None if mapped is None else mapped.matrix
+    if matrix is not None and (
+        matrix.shape != (model.n, model.n) or np.any(matrix != np.diag(np.diag(matrix)))
+    ):
+        raise InputError(
+            f"{model.path}: the matrix of signals.tau mixes columns, so none has the gain of a joint; drive gains need a column a joint."
+        )
+    return np.ones(model.n) if config is None or config.gain is None else np.array(config.gain)

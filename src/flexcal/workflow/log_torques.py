@@ -10,8 +10,14 @@ from flexcal.model import RobotModel
 
 
 def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
-    """Raises `InputError` for a log of torques that are the motors' own."""
+    """Raises `InputError` for a log of torques that are the motors' own, or of the other sign."""
     for log in logs:
+        joint = log.weight.reversed
+        if joint is not None:
+            raise InputError(
+                f"{log.path}: the torque of {model.joint_names[joint]} pulls with its weight instead of holding it; turn its sign by "
+                "`tau: {gain: […]}` under `signals:`, or correct `gravity:` in robot.yaml."
+            )
         if log.weight.by_motors:
             raise InputError(
                 f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} follows only {log.weight.share:.2%} of what its "
