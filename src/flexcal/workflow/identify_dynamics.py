@@ -179,7 +179,7 @@ def identify_robot_dynamics(
     With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, and
     for a log with a payload; nothing is written then. A cut-off or decimation that robot.yaml lacks is proposed. `flexible`
     tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the drives' springs;
-    friction terms are chosen before that, as if the robot were rigid. `irls`, `iv` and `didim` go through the logs again and
+    friction terms are chosen before that, as if the robot were rigid. `irls`, `iv`, `didim` and learning go through the logs again and
     again, in this process alone. `learn_residual` learns what the estimate misses of the torques, writes it beside the estimates as
     learned_residual.npz where cross-validation finds it worth anything, and changes nothing else; raises `FlexcalError` without
     scikit-learn, and `InputError` for a `flexible` robot.
