@@ -155,6 +155,20 @@ def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     return table
 
 
+def learned_table(motors: Sequence[Mapping[str, Any]]) -> Table:
+    """What each motor's torques are missed by in left-out blocks of the fit, without and with a learned residual."""
+    table = Table(title="learned residual torque", title_justify="left")
+    table.add_column("motor")
+    for heading in ("cross-validation without, %", "with, %"):
+        table.add_column(heading, justify="right")
+    table.add_column("")
+    for row in motors:
+        error = row["cross_validation_percent"]
+        verdict = "learned" if row["learned"] else "not worth it"
+        table.add_row(row["motor"], f"{error['without']:.2f}", f"{error['with']:.2f}", verdict)
+    return table
+
+
 def gain_table(document: Mapping[str, Any]) -> Table:
     """What stage 0 buys both stages: results.json's numbers with the inertials of CAD alone beside those of the run."""
     table = Table(title="what stage 0 buys", title_justify="left")

@@ -78,7 +78,7 @@ STEPS = (
                 "IdentifyDynamics",
                 "joint logs to base parameters with intervals",
                 "flexcal identify dynamics robot.yaml exciting.parquet --hold-out last:0.3",
-                ("results.json", "report.html"),
+                ("results.json", "report.html", "learned_residual.npz"),
             ),
         ),
     ),

@@ -34,9 +34,12 @@ from flexcal.dynamics.friction_library import (
 )
 from flexcal.dynamics.friction_selection import FrictionSelection, select_friction
 from flexcal.dynamics.friction_terms import FRICTION_TERMS
+from flexcal.dynamics.gaussian_process import GaussianProcess, require_scikit_learn
 from flexcal.dynamics.instrumental_variables import instrumental_variables
 from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
+from flexcal.dynamics.learned_residual import LearnedMotor, LearnedResidual
+from flexcal.dynamics.learned_residual_file import LEARNED, read_learned_residual, write_learned_residual
 from flexcal.dynamics.maximum_likelihood import maximum_likelihood
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
@@ -46,6 +49,8 @@ from flexcal.dynamics.power_model import power_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
+from flexcal.dynamics.residual_errors import ResidualErrors, residual_errors
+from flexcal.dynamics.residual_learning import BlockErrors, learn_residual
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 from flexcal.dynamics.tls import total_least_squares
@@ -56,10 +61,12 @@ from flexcal.dynamics.wls import weighted_least_squares
 __all__ = [
     "CLASSIC",
     "FRICTION_TERMS",
+    "LEARNED",
     "ArmSide",
     "AsymmetricCoulomb",
     "BaseParameters",
     "Batch",
+    "BlockErrors",
     "Candidate",
     "Column",
     "Coulomb",
@@ -70,7 +77,10 @@ __all__ = [
     "Experiment",
     "ExperimentSystem",
     "FrictionSelection",
+    "GaussianProcess",
     "JointLog",
+    "LearnedMotor",
+    "LearnedResidual",
     "LoadCoulomb",
     "Motion",
     "MotionBandwidth",
@@ -79,6 +89,7 @@ __all__ = [
     "Presliding",
     "RecordedRows",
     "RegressionData",
+    "ResidualErrors",
     "RotorInertia",
     "SimulatedExperiment",
     "Stribeck",
@@ -104,6 +115,7 @@ __all__ = [
     "identify_with_prior",
     "instrumental_variables",
     "kalman_filter",
+    "learn_residual",
     "log_blocks",
     "maximum_likelihood",
     "motion_bandwidth",
@@ -112,8 +124,12 @@ __all__ = [
     "ordinary_least_squares",
     "power_least_squares",
     "predict_torques",
+    "read_learned_residual",
+    "require_scikit_learn",
+    "residual_errors",
     "select_friction",
     "total_least_squares",
     "weighted_least_squares",
     "with_play",
+    "write_learned_residual",
 ]

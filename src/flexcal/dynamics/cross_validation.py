@@ -21,8 +21,10 @@ _NEW = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Fold:
-    """`train` (·, p + 1) stands for [W, Y] outside the block, each joint by its own noise; `test` for those of the block, in N m."""
+    """`train` (·, p + 1) stands for [W, Y] outside the block of that `number`, each joint by its own noise; `test` for those of the
+    block, in N m."""
 
+    number: int
     train: np.ndarray
     test: np.ndarray
 
@@ -52,7 +54,7 @@ def folds(
                 sigma = _noise(outside, sum(p.rows for p in train), np.isin(numbers, weigh_by))
                 own.append(widened(inside, numbers, columns))
                 other.append(widened(outside / sigma, numbers, columns))
-            result.append(Fold(reduced(other), reduced(own)))
+            result.append(Fold(fold, reduced(other), reduced(own)))
     if not result:
         raise FlexcalError(
             "the recordings are too short to choose friction by cross-validation; record for longer, or declare 'friction: classic'."
@@ -80,6 +82,34 @@ def prediction_errors(
     return [math.sqrt(value / size) for value in missed]
 
 
+def solutions(folds: Sequence[Fold], kept: Sequence[int], start: np.ndarray) -> list[np.ndarray]:
+    """For every block the parameters (p,) that least squares finds outside of it; those that are not `kept`, and directions that are not
+    seen there, stay as in `start` (p,)."""
+    found = []
+    for fold in folds:
+        train = fold.train[:, kept]
+        norms = np.linalg.norm(train, axis=0)
+        scale = np.where(norms > 0, norms, 1.0)
+        left = fold.train[:, -1] - fold.train[:, :-1] @ start
+        values = start.copy()
+        values[kept] += np.linalg.lstsq(train / scale, left, rcond=_RANK)[0] / scale
+        found.append(values)
+    return found
+
+
+def fold_numbers(systems: Sequence[ExperimentSystem]) -> list[dict[int, int]]:
+    """For every system the block in which each of its batches lies, by the batch's number."""
+    total = sum(batch.rows for system in systems for batch in system.batches)
+    done, found = 0, []
+    for system in systems:
+        own = {}
+        for batch in system.batches:
+            own[batch.number] = min(FOLDS - 1, FOLDS * (done + batch.rows // 2) // total)
+            done += batch.rows
+        found.append(own)
+    return found
+
+
 @dataclass(frozen=True, eq=False)
 class _Piece:
     """Rows of one fold that are alike in whether they lie near the fold before or after, of the same recording."""
@@ -99,14 +129,9 @@ class _Piece:
 
 
 def _pieces(systems: Sequence[ExperimentSystem], purge_rows: int) -> list[_Piece]:
-    total = sum(batch.rows for system in systems for batch in system.batches)
     groups: dict[tuple[int, bool, bool], list] = {}
-    done = 0
-    for system in systems:
-        numbered = []
-        for batch in system.batches:
-            numbered.append((min(FOLDS - 1, FOLDS * (done + batch.rows // 2) // total), batch))
-            done += batch.rows
+    for system, own in zip(systems, fold_numbers(systems), strict=True):
+        numbered = [(own[batch.number], batch) for batch in system.batches]
         reach = -(-purge_rows // system.batch_rows)
         for fold, batch in numbered:
             near = {other for other, b in numbered if abs(b.number - batch.number) <= reach}

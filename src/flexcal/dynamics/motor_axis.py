@@ -35,3 +35,12 @@ def motor_axes(model: RobotModel) -> tuple[MotorAxis, ...]:
         shares = ((number, 1.0), *((model.joint_index(entry.joint), entry.ratio) for entry in entries))
         axes.append(MotorAxis(name, number, shares))
     return tuple(axes)
+
+
+def motor_shares(model: RobotModel) -> np.ndarray:
+    """S (n, n) with the motors' positions S q, and the joints' torques Sᵀ τ from the motors' torques τ."""
+    shares = np.zeros((model.n, model.n))
+    for axis in motor_axes(model):
+        for joint, ratio in axis.shares:
+            shares[axis.joint, joint] = ratio
+    return shares

@@ -21,6 +21,7 @@ from flexcal.report.page import Check, Fact, Page, Status, Verdict, tally, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.base_parameters import base_parameters_section
 from flexcal.report.sections.friction import friction_section
+from flexcal.report.sections.learned_residual import learned_section
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.torques import torques_section
 
@@ -71,6 +72,11 @@ def dynamics_page(study: DynamicsStudy) -> Page:
             torques_section(results, study.held_out, study.predictions),
             base_parameters_section(results, study.estimate),
             friction_section(results),
+            *(
+                [learned_section(learned, study.held_out)]
+                if (learned := results.get("learned_residual"))
+                else []
+            ),
             provenance_section("", None, {"identification": results["seconds"]}, study.provenance),
         ],
         document=results,

@@ -23,9 +23,11 @@ from flexcal.dynamics import (
     Window,
     batches_each,
     essential_parameters,
+    require_scikit_learn,
     select_friction,
     with_play,
 )
+from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.pseudo_inertia import is_body
@@ -35,6 +37,7 @@ from flexcal.workflow.distinct_logs import require_distinct
 from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
+from flexcal.workflow.learned_dynamics import LearnedDynamics
 from flexcal.workflow.log_payloads import require_unloaded
 from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
@@ -49,7 +52,7 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
-    whose motors have equations of their own.
+    whose motors have equations of their own. `learned` is what was learned beside the estimate, None where nobody asked for it.
     """
 
     estimate: Estimate
@@ -63,6 +66,7 @@ class RobotDynamics:
     friction: FrictionSelection
     motors: tuple[str, ...]
     treatment: Treatment
+    learned: LearnedDynamics | None
     seconds: float
     estimates: Path
 
@@ -108,6 +112,7 @@ class RobotDynamics:
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
+            "learned_residual": None if self.learned is None else self.learned.document(self.estimates),
             "seconds": self.seconds,
             "estimates": self.estimates,
         }
@@ -162,6 +167,7 @@ def identify_robot_dynamics(
     validate: Sequence[Path] = (),
     estimator: EstimatorName = "wls",
     flexible: bool = False,
+    learn_residual: bool = False,
     out: Path | None = None,
     jobs: int = 1,
     progress: Progress = silent,
@@ -171,12 +177,21 @@ def identify_robot_dynamics(
     Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
     six joints, and 48 for their arm sides. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what
     the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks.
-    With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, for a
+With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, for a
     log with a payload, and for one that is given twice; nothing is written then. A cut-off or decimation that robot.yaml lacks is
     proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the
-    drives' springs; friction terms are chosen before that, as if the robot were rigid. All estimators but `wls`, `ols` and `sdp` go
-    through the logs again, in this process alone.
+    drives' springs; friction terms are chosen before that, as if the robot were rigid. All estimators but `wls`, `ols` and `sdp`, and
+    learning, go through the logs again, in this process alone. `learn_residual` learns what the estimate misses of the torques, writes
+    it beside the estimates as learned_residual.npz where cross-validation finds it worth anything, and changes nothing else; raises
+    `FlexcalError` without scikit-learn, and `InputError` for a `flexible` robot.
     """
+    if learn_residual:
+        require_scikit_learn()
+        if flexible:
+            raise InputError(
+                "a residual torque is learned for rigid joints, as a function of what the motors do; leave out one of --learn-residual and "
+                "--flexible."
+            )
     begun = time.perf_counter()
     require_distinct(logs, validate)
     bare = RobotModel.from_yaml(robot, estimates=False)
@@ -209,9 +224,15 @@ def identify_robot_dynamics(
         friction = select_friction(model, declared, equations, treatment.decimation)
         observation = with_play(Observation(model, friction.terms, springs), equations)
         base = BaseParameters.of(observation)
-        train = RegressionData.of(observation, base, equations(observation))
+        fit = equations(observation)
+        train = RegressionData.of(observation, base, fit)
         held_out = RegressionData.of(observation, base, systems(unseen, observation, 1)) if unseen else None
-        estimate = ESTIMATORS[estimator](train, _recorded(fitted, observation, base, treatment))
+        recorded = _recorded(fitted, observation, base, treatment)
+        estimate = ESTIMATORS[estimator](train, recorded)
+        unseen_rows = _recorded(unseen, observation, base, treatment) if unseen else None
+        learned = (
+            LearnedDynamics.of(recorded, fit, unseen_rows, estimate, progress) if learn_residual else None
+        )
         options = {
             "estimator": estimator,
             "hold_out": hold_out,
@@ -238,10 +259,13 @@ def identify_robot_dynamics(
             friction,
             observation.motors,
             treatment,
+            learned,
             seconds,
             target,
         )
         store_block(source, target, blocks, "dynamics", estimate)
+        if learned is not None:
+            learned.store(target)
         if out is not None:
             from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 
@@ -261,8 +285,8 @@ def identify_robot_dynamics(
 
 
 def _recorded(
-    fitted: Sequence[LogPart], observation: Observation, base: BaseParameters, treatment: Treatment
+    parts: Sequence[LogPart], observation: Observation, base: BaseParameters, treatment: Treatment
 ) -> RecordedRows:
-    """The rows of the fit once more, log after log in this process."""
-    logs, windows = [part.log for part in fitted], [part.window for part in fitted]
+    """The rows of parts of logs once more, log after log in this process."""
+    logs, windows = [part.log for part in parts], [part.window for part in parts]
     return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

@@ -1,0 +1,67 @@
+"""`learned_residual.npz`: what was learned, as plain arrays, and which estimate it belongs to.
+
+`names` (n,), `shares` (n, n), `inputs` (n, m, 3), `values` (n, m), `lengths` (n, 3), `amplitude`, `noise`, `inflation` (n,) are those of
+`LearnedResidual`; `dynamics` is the SHA-256 of the block that it was learned with.
+"""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.atomic import atomic_path
+from flexcal.dynamics.gaussian_process import GaussianProcess
+from flexcal.dynamics.learned_residual import LearnedMotor, LearnedResidual
+from flexcal.errors import InputError
+from flexcal.estimates_file import block_sha256
+
+LEARNED = "learned_residual.npz"
+
+
+def write_learned_residual(path: Path, learned: LearnedResidual, estimates: Path) -> None:
+    """Write it to `path`, atomically, for the block `dynamics` of the file `estimates`; raises `InputError` where it cannot be written."""
+    processes = [motor.process for motor in learned.motors]
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        np.savez(
+            stream,
+            allow_pickle=False,
+            names=np.array([motor.name for motor in learned.motors]),
+            shares=learned.shares,
+            inputs=np.array([p.inputs for p in processes]),
+            values=np.array([p.values for p in processes]),
+            lengths=np.array([p.lengths for p in processes]),
+            amplitude=np.array([p.amplitude for p in processes]),
+            noise=np.array([p.noise for p in processes]),
+            inflation=np.array([motor.inflation for motor in learned.motors]),
+            dynamics=np.array(block_sha256(estimates, "dynamics")),
+        )
+
+
+def read_learned_residual(path: str | Path, estimates: str | Path) -> LearnedResidual:
+    """What `identify dynamics --learn-residual` left; needs no scikit-learn.
+
+    Raises `InputError` where the file cannot be read, and where it was learned with other dynamics than those of the file `estimates`.
+    """
+    path, again = Path(path), "run 'flexcal identify dynamics --learn-residual' again"
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            arrays = {name: stored[name] for name in stored.files}
+        processes = [
+            GaussianProcess(x, y, lengths, float(amplitude), float(noise))
+            for x, y, lengths, amplitude, noise in zip(
+                *(arrays[key] for key in ("inputs", "values", "lengths", "amplitude", "noise")), strict=True
+            )
+        ]
+        motors = zip(arrays["names"], processes, arrays["inflation"], strict=True)
+        learned = LearnedResidual(
+            tuple(LearnedMotor(str(name), process, float(factor)) for name, process, factor in motors),
+            arrays["shares"],
+        )
+        belongs_to = str(arrays["dynamics"])
+    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as problem:
+        raise InputError(f"{path} cannot be read ({type(problem).__name__}); {again}.") from problem
+    if belongs_to != block_sha256(estimates, "dynamics"):
+        raise InputError(f"{path} was learned with other dynamics than those of {estimates}; {again}.")
+    return learned
