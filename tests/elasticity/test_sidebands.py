@@ -17,7 +17,7 @@ from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.equilibrium import elastic_axes
 from flexcal.model.linearisation import Linearisation, linearise
 
-STEPS = 1200
+STEPS = 600
 FREQUENCIES = np.array([7.25, 19.25, 33.75])
 Change = Callable[[float], tuple[np.ndarray, np.ndarray, np.ndarray]]
 
@@ -106,11 +106,11 @@ def test_moving_arm_and_open_gaps(tx90l, poses, motion):
     twists = [k for k, (_, component) in enumerate(elastic_axes(tx90l)) if component == 2]
     rest = arm_matrices(arm, next(replace(motion, amplitude=0.0).states(tx90l, arm, q, 1)))
     states = list(motion.states(tx90l, arm, q, 2 * STEPS))[1::2]
+    moved = np.array([arm_matrices(arm, state) for state in states]) - rest
 
     def change(phase: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         more = np.zeros((3, *system.mass.shape))
-        state = states[int(STEPS * phase / (2 * np.pi))]
-        more[:, 3:, 3:] = np.array(arm_matrices(arm, state)) - rest
+        more[:, 3:, 3:] = moved[int(STEPS * phase / (2 * np.pi))]
         for axis in (1, 2):
             open_more = np.interp(phase, phases, share[:, axis], period=2 * np.pi) - share[:, axis].mean()
             pull = np.zeros(len(system.mass))
