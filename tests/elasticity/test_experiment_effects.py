@@ -34,7 +34,7 @@ def test_very_slow_motion_averages_the_frozen_responses(tx90l, poses):
     """In the quasi-static limit with free motors the response is the mean of the responses along the motion."""
     q, frequencies, size = poses["default"][1], np.linspace(5, 60, 23), np.deg2rad(0.5)
     motion = ReferenceMotion(size, 1e-5, FREE, FREE, STILL)
-    shift = reference_shift(tx90l, q, None, frequencies, motion, sidebands=4)
+    shift = reference_shift(tx90l, q, None, frequencies, motion)
     still = transfer_matrix(linearise(tx90l, q), frequencies).response
     frozen = []
     for angle in 2 * np.pi * np.arange(8) / 8:

@@ -1,4 +1,4 @@
-"""What the way of measuring adds to a frequency response: the slow motion under the excitation, and friction at its reversals."""
+"""What the way of measuring adds to a frequency response: the slow motion, the gaps that it opens, and friction at its reversals."""
 
 from __future__ import annotations
 
@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.elasticity.friction_pulses import FrictionPulses
-from flexcal.elasticity.gap import gap_shift
+from flexcal.elasticity.periodic_response import reference_shift
 from flexcal.elasticity.prediction import PoseModel, ResponseModel
-from flexcal.elasticity.reference_motion import ReferenceMotion, reference_shift
+from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.frequency import FrequencyResponse
 from flexcal.model.linearisation import linearise
 
@@ -53,10 +53,8 @@ def _effect(
     system = linearise(robot, pose.q, payload)
     pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)
     share = pose.open_share(natural)
-    opening = gap_shift(robot, system, pose.frequencies_hz, reference, share / (1.0 - share.mean(axis=0)))
-    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference)
+    opening = share / (1.0 - share.mean(axis=0))
+    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening)
     late = np.array([natural[number] if number >= 0 else 0.0 for number in pose.delays])
     phase = np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]
-    return ExperimentEffect(
-        (moving + opening + pulses.shift) * phase, pulses.shift_by_form() * phase[..., None]
-    )
+    return ExperimentEffect((moving + pulses.shift) * phase, pulses.shift_by_form() * phase[..., None])

@@ -1,4 +1,4 @@
-"""Backlash in a frequency experiment: how much softer a gap makes a drive, from the torque that its spring carries, and what that does."""
+"""Backlash in a frequency experiment: how much softer a gap makes a drive, from the torque that its spring carries."""
 
 from __future__ import annotations
 
@@ -11,9 +11,6 @@ from flexcal.model import RobotModel
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.equilibrium import elastic_axes
 from flexcal.model.linearisation import Linearisation, linearise
-
-SIDEBANDS = 6
-"""Multiples of the reference frequency that are balanced on either side of the excited line."""
 
 PHASES = 64
 """Instants of the reference motion at which gaps are looked at."""
@@ -41,62 +38,20 @@ def gap_compliance(
     return 2 * stiffness * np.exp(-0.5 * (slow / size) ** 2) / (np.sqrt(2 * np.pi) * size)
 
 
-def gap_shift(
-    robot: RobotModel,
-    system: Linearisation,
-    frequencies_hz: np.ndarray,
-    motion: ReferenceMotion,
-    share: np.ndarray,
-) -> np.ndarray:
-    """G with gaps that open at their phase of the motion less G with their mean softening, (L, E, E) rad/s² per N m.
-
-    `share` (phases, E) of the stiffness and damping of every drive of `robot` is missing at that phase, with their mean put back; `system`
-    is that robot, whose drives have their mean softness.
-    """
-    count, size = system.inputs, len(system.mass)
-    gaps = np.flatnonzero(share.any(axis=0))
-    if not len(gaps):
-        return np.zeros((len(frequencies_hz), count, count), dtype=complex)
-    orders = np.arange(-SIDEBANDS, SIDEBANDS + 1)
-    bands = Sidebands.of(system, frequencies_hz, motion, orders)
-    pull = _pull(robot, system)[:, gaps]
-    drives = [robot.elastic[k] for k in gaps]
-    stiffness, damping = (np.array([getattr(d, key)[2] for d in drives]) for key in ("stiffness", "damping"))
-    impedance = stiffness + bands.s[:, :, None] * damping  # (L, k, g)
-    phases = 2 * np.pi * np.arange(len(share)) / len(share)
-    apart = orders[:, None] - orders[None, :]
-    pulses = np.exp(-1j * apart[:, :, None] * phases) @ share[:, gaps] / len(share)
-    pulses[apart == 0] = 0.0  # (k, l, g)
-    released = pulses * impedance[:, None]  # (L, k, l, g): torque at order k by the twist at order l
-    by_motors = bands.response(np.eye(size, count))[:, bands.middle]
-    by_pull = bands.response(pull)
-    width = len(orders) * len(gaps)
-    coupled = np.einsum("di,Lkdj,Lklj->Lkilj", pull, by_pull, released).reshape(-1, width, width)
-    driven = np.zeros((len(bands.s), len(orders), len(gaps), count), dtype=complex)
-    driven[:, bands.middle] = pull.T @ by_motors
-    twist = np.linalg.solve(np.eye(width) - coupled, driven.reshape(-1, width, count))
-    twist = twist.reshape(driven.shape)
-    torque = np.einsum("Llg,Llgc->Lgc", released[:, bands.middle], twist)
-    line = bands.s[:, bands.middle, None, None]
-    still = line * by_motors[:, :count]
-    moved = still + line * by_pull[:, bands.middle, :count] @ torque
-    return bands.acceleration(moved) - bands.acceleration(still)
-
-
 def multisine_torque(
     robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan
 ) -> np.ndarray:
     """Standard deviation (E,) N m of the torque in each elastic drive's spring under the multisine, position loop closed."""
     system, motion = linearise(robot, q, payload), ReferenceMotion.of(plan)
     bands = Sidebands.of(system, plan.frequencies_hz, motion, np.array([0]))
-    pull = _pull(robot, system)
+    pull = drive_pull(robot, system)
     moved = bands.response(np.eye(len(system.mass), system.inputs))[:, 0]
     stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
     power = np.abs(stiffness[:, None] * (pull.T @ moved)) ** 2 * motion.excitation.T[:, None, :] ** 2
     return np.sqrt(0.5 * power.sum(axis=(0, 2)))
 
 
-def _pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
+def drive_pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
     """Direction (d, E) in which each drive's spring is stretched: its twist less its motor."""
     twists = [k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
     pull = np.zeros((len(system.mass), system.inputs))

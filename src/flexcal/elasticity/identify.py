@@ -13,6 +13,7 @@ from flexcal.elasticity.model_error import ModelError, Tolerances
 from flexcal.elasticity.naming import spring_names
 from flexcal.elasticity.parameters import stage_one_parameters
 from flexcal.elasticity.prediction import ResponseModel
+from flexcal.elasticity.profile import profile_stretch
 from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
 from flexcal.elasticity.search import MultiStart, Search
@@ -25,6 +26,9 @@ from flexcal.progress import Progress, silent
 
 ROUNDS = 2
 """How often model error and reference motion are evaluated about the last estimate and the fit is repeated."""
+
+FINE, COARSE = 1e-7, 1e-3
+"""Tolerances of the last fit, and of those before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +73,9 @@ def identify_stiffness(
     the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link and payload inertias at the model's.
 
     The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
-    neighbouring lines, the first inflated by the reduced χ² where it exceeds 1. The damping of a spring whose stiffness is not
-    identifiable is not either. Raises `FlexcalError` where responses do not fit the robot.
+    neighbouring lines, the first inflated by the reduced χ² where it exceeds 1; a badly known stiffness has the width of its profile
+    likelihood. The damping of a spring whose stiffness is not identifiable is not either. Raises `FlexcalError` where responses do
+    not fit the robot.
     """
     parameters, prior = model.posterior.prior(
         stage_one_parameters(model, responses, inertias_known=inertias_known, gaps=plan is not None)
@@ -83,8 +88,7 @@ def identify_stiffness(
     predicting = ResponseModel.of(model, responses, parameters)
     measured = StageOneResidual.of(predicting, responses, weighting)
     effects = [ExperimentEffect.none(response) for response in responses]
-    estimate = None
-    inflation = tolerances.inflation(responses)
+    problem = fitted = None
     rounds = ROUNDS if tolerances.any or plan is not None else 1
     progress("fitting", 0.0)
     for number in range(rounds):
@@ -94,11 +98,13 @@ def identify_stiffness(
             effects = experiment_effects(predicting, x, reference)
         residual = measured.shifted(predicting, [effect.shift for effect in effects])
         error = ModelError.of(residual, responses, x, effects, tolerances) if tolerances.any else None
-        last = number == rounds - 1
-        estimate = _fit(residual, error, parameters, prior, x, inflation, 1e-7 if last else 1e-3)
-        x = estimate.parameters.coordinates()
-        progress("fitting", (number + 1) / rounds)
-    assert estimate is not None
+        problem = _problem(residual, error, parameters, prior)
+        fitted = solve(problem, starts=x[None], tolerance=FINE if number == rounds - 1 else COARSE)
+        x = fitted.parameters.coordinates()
+        progress("fitting", (number + 1) / (rounds + 1))
+    assert problem is not None and fitted is not None
+    estimate = _widened(problem, fitted, tolerances.inflation(responses))
+    progress("fitting", 1.0)
     predicted = tuple(g + e.shift for g, e in zip(predicting.responses(x), effects, strict=True))
     pairs = list(zip(measured.poses, predicted, strict=True))
     errors = tuple(pose.errors(g) for pose, g in pairs)
@@ -111,15 +117,9 @@ def identify_stiffness(
     return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
 
 
-def _fit(
-    residual: StageOneResidual,
-    error: ModelError | None,
-    parameters: Parameters,
-    prior: np.ndarray,
-    x: np.ndarray,
-    inflation: float,
-    tolerance: float,
-) -> Estimate:
+def _problem(
+    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, prior: np.ndarray
+) -> Problem:
     def whiten(rows: np.ndarray) -> np.ndarray:
         return rows if error is None else error.whiten(rows)
 
@@ -127,40 +127,35 @@ def _fit(
         rows, jacobian = residual.linearise(at)
         return whiten(rows), whiten(jacobian)
 
-    problem = Problem(
+    return Problem(
         parameters,
         linearise,
         lambda at: whiten(residual.residual(at)),
         prior_covariance=prior,
         groups=residual.clusters(CLUSTER_LINES),
     )
-    fitted = solve(problem, starts=x[None], tolerance=tolerance)
-    clusters = int(residual.clusters(CLUSTER_LINES)[-1]) + 1
-    robust = None
-    if clusters > len(parameters) + 1:
-        robust = solve(
-            problem, starts=fitted.parameters.coordinates()[None], covariance="sandwich", tolerance=tolerance
-        )
-    return _widened(fitted, robust, inflation, problem.prior_rows())
 
 
-def _widened(fitted: Estimate, robust: Estimate | None, inflation: float, prior_rows: np.ndarray) -> Estimate:
+def _widened(problem: Problem, fitted: Estimate, inflation: float) -> Estimate:
     """The covariance for measurements whose variance is `inflation` times what weighs them.
 
     That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L. Every standard deviation
-    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say.
+    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say, and by the profile likelihood's.
     """
     posterior = fitted.covariance
-    from_prior = prior_rows @ posterior
+    from_prior = problem.prior_rows() @ posterior
     from_data = posterior - from_prior.T @ from_prior
     covariance = posterior + (inflation - 1.0) * from_data
     std = np.sqrt(np.diag(posterior))
     factor = np.full(
         std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0))
     )
-    if robust is not None:
+    if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
+        start = fitted.parameters.coordinates()[None]
+        robust = solve(problem, starts=start, covariance="sandwich", tolerance=FINE)
         wider = np.sqrt(np.diag(robust.covariance))
         factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
+    factor *= profile_stretch(problem, fitted)
     covariance = covariance * np.outer(factor, factor)
     sized = known_to_a_factor_of_two(fitted.parameters, covariance)
     small = {

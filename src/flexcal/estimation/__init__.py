@@ -5,6 +5,7 @@ from flexcal.estimation.identifiability import Identifiability, analyse, name_di
 from flexcal.estimation.loss import Cauchy, Huber, Loss, Squares
 from flexcal.estimation.parameter import Parameter, Parameters
 from flexcal.estimation.problem import Problem
+from flexcal.estimation.profile import profile_rise
 from flexcal.estimation.sensitivity import Sensitivity
 from flexcal.estimation.solve import solve
 
@@ -22,5 +23,6 @@ __all__ = [
     "Squares",
     "analyse",
     "name_direction",
+    "profile_rise",
     "solve",
 ]

@@ -1,0 +1,21 @@
+"""The profile likelihood of one parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.estimation.estimate import Estimate
+from flexcal.estimation.levenberg_marquardt import minimise
+from flexcal.estimation.loss import Squares
+from flexcal.estimation.objective import Objective
+from flexcal.estimation.problem import Problem
+
+
+def profile_rise(problem: Problem, fitted: Estimate, x: np.ndarray, number: int) -> float:
+    """Rise of the cost above that of `fitted` where parameter `number` is held as in `x` (p,) and the others are fitted from there.
+
+    Twice the rise is χ² with one degree of freedom at the true value (Wilks 1938). Where no fit is found it is infinite.
+    """
+    objective = Objective.of(problem, Squares(), problem.linearise(x)[0].size)
+    free = np.arange(len(x)) != number
+    return minimise(objective, x, free, max_iterations=50, tolerance=1e-6).cost - fitted.cost
