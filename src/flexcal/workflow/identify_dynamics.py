@@ -177,7 +177,7 @@ def identify_robot_dynamics(
     Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
     six joints, and 48 for their arm sides. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what
     the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks.
-With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, for a
+    With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, for a
     log with a payload, and for one that is given twice; nothing is written then. A cut-off or decimation that robot.yaml lacks is
     proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the
     drives' springs; friction terms are chosen before that, as if the robot were rigid. All estimators but `wls`, `ols` and `sdp`, and
