@@ -12,7 +12,7 @@ import pytest
 from flexcal.cell import CellConfig, VirtualCell, draw_truth
 from flexcal.data import Recording, TrajectoryPlan
 from flexcal.design import design_trajectories
-from flexcal.dynamics import identify_with_prior
+from flexcal.dynamics import identify_with_prior, trajectory_error
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
@@ -101,6 +101,21 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, sin
     np.testing.assert_allclose(found.coulomb, truth.coulomb, rtol=1e-3)
 
 
+def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
+    """Nothing with the true robot; with rotors that are a tenth too large, a tenth of what they need: the lines up to 5 Hz hold it all."""
+    truth = drawn(tx90l, np.random.default_rng(8))
+    recordings = list(synthetic(truth, single, STILL))
+    assert trajectory_error(truth, single, recordings) < 1e-6
+    heavier = replace(truth, rotor_inertia=1.1 * truth.rotor_inertia)
+    size = single.samples_per_period
+    acceleration = single.motion(0, np.arange(size) / single.rate_hz)[2]
+    spectrum = np.fft.rfft(recordings[0].torque[:size], axis=0)[:26] / size
+    spectrum[1:] *= np.sqrt(2.0)
+    missed = np.linalg.norm(0.1 * truth.rotor_inertia * acceleration) / np.sqrt(size)
+    expected = missed / np.linalg.norm(spectrum)
+    assert trajectory_error(heavier, single, recordings) == pytest.approx(expected, rel=1e-6)
+
+
 def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     """A robot.yaml that lets no link be off has no unknown link."""
     exact = PriorConfig(mass=0.0, com=0.0, rotor_inertia=0.05)
@@ -166,7 +181,14 @@ def test_what_does_not_fit_is_said(tx90l: RobotModel, plan: TrajectoryPlan) -> N
         identify_with_prior(tx90l, plan, [short])
     with pytest.raises(FlexcalError, match="no recording"):
         identify_with_prior(tx90l, plan, [])
+    still = Recording(time_step=1 / 400, q=np.zeros((6000, 6)), torque=np.zeros((6000, 6)))
+    with pytest.raises(FlexcalError, match=r"q\d is up to .* from trajectory 1 of its plan"):
+        identify_with_prior(tx90l, plan, [still])
+    full = next(synthetic(tx90l, plan, STILL))
+    with pytest.raises(FlexcalError, match="from trajectory 2 of its plan"):
+        identify_with_prior(tx90l, plan, [full, full])
+    with pytest.raises(FlexcalError, match="torque of joint_1 is zero"):
+        identify_with_prior(tx90l, plan, [replace(full, torque=0.0 * full.torque)])
     lacking = replace(tx90l, rotor_inertia=np.full(6, np.nan))
-    full = Recording(time_step=1 / 400, q=np.zeros((6000, 6)), torque=np.zeros((6000, 6)))
     with pytest.raises(FlexcalError, match="joint_1 no rotor inertia"):
         identify_with_prior(lacking, plan, [full])

@@ -37,6 +37,7 @@ from flexcal.dynamics.friction_terms import FRICTION_TERMS
 from flexcal.dynamics.instrumental_variables import instrumental_variables
 from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
+from flexcal.dynamics.log_faults import LogFaults
 from flexcal.dynamics.maximum_likelihood import maximum_likelihood
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
@@ -50,6 +51,7 @@ from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 from flexcal.dynamics.tls import total_least_squares
 from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
+from flexcal.dynamics.trajectory_error import trajectory_error
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 
@@ -72,6 +74,7 @@ __all__ = [
     "FrictionSelection",
     "JointLog",
     "LoadCoulomb",
+    "LogFaults",
     "Motion",
     "MotionBandwidth",
     "Observation",
@@ -114,6 +117,7 @@ __all__ = [
     "predict_torques",
     "select_friction",
     "total_least_squares",
+    "trajectory_error",
     "weighted_least_squares",
     "with_play",
 ]
