@@ -63,9 +63,9 @@ def test_the_verbs_are_stage_zero_of_the_demo(
     assert verb.parameters.names == demo.parameters.names
     std = np.sqrt(np.diag(demo.covariance))
     np.testing.assert_allclose(
-        (verb.parameters.coordinates() - demo.parameters.coordinates()) / std, 0.0, atol=1e-4
+        (verb.parameters.coordinates() - demo.parameters.coordinates()) / std, 0.0, atol=1e-9
     )
-    np.testing.assert_allclose(np.sqrt(np.diag(verb.covariance)), std, rtol=1e-4)
+    np.testing.assert_allclose(np.sqrt(np.diag(verb.covariance)), std, rtol=1e-9)
 
 
 def test_intervals_hold_the_truth(recorded: Path, identified: Path) -> None:
