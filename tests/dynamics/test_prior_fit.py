@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
+from itertools import repeat
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ import pytest
 from flexcal.cell import CellConfig, VirtualCell, draw_truth
 from flexcal.data import Recording, TrajectoryPlan
 from flexcal.design import design_trajectories
-from flexcal.dynamics import identify_with_prior
+from flexcal.dynamics import identify_with_prior, trajectory_error
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
@@ -40,10 +41,14 @@ def drawn(model: RobotModel, rng: np.random.Generator) -> RobotModel:
     return replace(robot, viscous=model.viscous * rng.uniform(0.9, 1.1, model.n), coulomb=model.coulomb * 1.1)
 
 
-def synthetic(truth: RobotModel, plan: TrajectoryPlan, noise: np.ndarray) -> Iterator[Recording]:
-    """Recordings of a true robot that follows the plan exactly; `noise` (samples, n) N m is on its torques."""
+STILL = repeat(np.zeros((1, 6)))
+"""No noise in any recording."""
+
+
+def synthetic(truth: RobotModel, plan: TrajectoryPlan, noises: Iterable[np.ndarray]) -> Iterator[Recording]:
+    """Recordings of a true robot that follows the plan exactly; each has the next of `noises` (samples, n) N m on its torques."""
     size = plan.samples_per_period
-    for number in range(len(plan)):
+    for number, noise in zip(range(len(plan)), noises, strict=False):
         q, dq, ddq = plan.motion(number, np.arange(size) / plan.rate_hz)
         torque = periodic_torque(truth, q, dq, ddq, 1 / plan.base_frequency_hz, 0.0)
         torque += truth.rotor_inertia * ddq + truth.viscous * dq + truth.coulomb * np.sign(dq)
@@ -54,13 +59,14 @@ def synthetic(truth: RobotModel, plan: TrajectoryPlan, noise: np.ndarray) -> Ite
         )
 
 
-def coloured(plan: TrajectoryPlan, rng: np.random.Generator) -> np.ndarray:
-    """Noise (samples, n) of 0.3 N m that holds for a fifth of a second."""
+def coloured(plan: TrajectoryPlan, rng: np.random.Generator) -> Iterator[np.ndarray]:
+    """Noise (samples, n) of 0.3 N m that holds for a fifth of a second, for every recording its own."""
     from scipy.signal import lfilter
 
     decay = np.exp(-5.0 / plan.rate_hz)
-    white = rng.standard_normal((plan.periods * plan.samples_per_period + 1000, plan.joint_count))
-    return 0.3 * np.sqrt(1 - decay**2) * lfilter([1.0], [1.0, -decay], white, axis=0)[1000:]
+    while True:
+        white = rng.standard_normal((plan.periods * plan.samples_per_period + 1000, plan.joint_count))
+        yield 0.3 * np.sqrt(1 - decay**2) * lfilter([1.0], [1.0, -decay], white, axis=0)[1000:]
 
 
 def errors(estimate: Estimate, truth: RobotModel) -> tuple[np.ndarray, float]:
@@ -77,9 +83,7 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, sin
     rng = np.random.default_rng(5)
     truth = drawn(tx90l, rng)
     truth = replace(truth, geometry=tx90l.geometry, stiffness=tx90l.stiffness)
-    found = tx90l.with_estimate(
-        identify_with_prior(tx90l, single, synthetic(truth, single, np.zeros((1, 6))))
-    )
+    found = tx90l.with_estimate(identify_with_prior(tx90l, single, synthetic(truth, single, STILL)))
     q, dq, ddq = rng.uniform(-1, 1, (3, 50, 6)) * np.array([2.0, 2.0, 5.0])[:, None, None]
 
     def torque(robot: RobotModel) -> np.ndarray:
@@ -97,6 +101,21 @@ def test_without_noise_the_torques_of_the_robot_come_back(tx90l: RobotModel, sin
     np.testing.assert_allclose(found.coulomb, truth.coulomb, rtol=1e-3)
 
 
+def test_what_torques_miss(tx90l: RobotModel, single: TrajectoryPlan) -> None:
+    """Nothing with the true robot; with rotors that are a tenth too large, a tenth of what they need: the lines up to 5 Hz hold it all."""
+    truth = drawn(tx90l, np.random.default_rng(8))
+    recordings = list(synthetic(truth, single, STILL))
+    assert trajectory_error(truth, single, recordings) < 1e-6
+    heavier = replace(truth, rotor_inertia=1.1 * truth.rotor_inertia)
+    size = single.samples_per_period
+    acceleration = single.motion(0, np.arange(size) / single.rate_hz)[2]
+    spectrum = np.fft.rfft(recordings[0].torque[:size], axis=0)[:26] / size
+    spectrum[1:] *= np.sqrt(2.0)
+    missed = np.linalg.norm(0.1 * truth.rotor_inertia * acceleration) / np.sqrt(size)
+    expected = missed / np.linalg.norm(spectrum)
+    assert trajectory_error(heavier, single, recordings) == pytest.approx(expected, rel=1e-6)
+
+
 def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: TrajectoryPlan) -> None:
     """A robot.yaml that lets no link be off has no unknown link."""
     exact = PriorConfig(mass=0.0, com=0.0, rotor_inertia=0.05)
@@ -112,21 +131,22 @@ def test_exact_links_leave_rotors_and_friction(tx90l: RobotModel, single: Trajec
 
 
 def test_covariance_is_true_under_coloured_noise(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
-    inside, together = coverage(tx90l, plan, range(2))
+    inside, together, _ = coverage(tx90l, plan, range(2))
     assert 0.90 < inside < 0.99
     assert 0.75 < together < 1.4
 
 
 @pytest.mark.slow
 def test_covariance_is_true_on_many_robots(tx90l: RobotModel, plan: TrajectoryPlan) -> None:
-    inside, together = coverage(tx90l, plan, range(100, 160))
+    inside, together, offsets = coverage(tx90l, plan, range(100, 160))
     assert 0.93 < inside < 0.97
     assert 0.9 < together < 1.2
+    assert 0.92 < offsets < 0.98
 
 
-def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[float, float]:
-    """Share of the 95 % intervals that hold the truth, and the mean square of decorrelated errors."""
-    normalised, together = [], []
+def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[float, float, float]:
+    """Share of the 95 % intervals that hold the truth, the mean square of decorrelated errors, and that share of the offsets alone."""
+    normalised, together, names = [], [], ()
     for seed in seeds:
         rng = np.random.default_rng([2024, seed])
         truth = drawn(model, rng)
@@ -134,7 +154,10 @@ def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[flo
         one, both = errors(estimate, truth)
         normalised.append(one)
         together.append(both)
-    return float(np.mean(np.abs(normalised) < 1.96)), float(np.mean(together))
+        names = estimate.parameters.names
+    inside = np.abs(normalised) < 1.96
+    offsets = inside[:, [name.endswith(".torque_offset") for name in names]]
+    return float(np.mean(inside)), float(np.mean(together)), float(np.mean(offsets))
 
 
 def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
@@ -158,7 +181,14 @@ def test_what_does_not_fit_is_said(tx90l: RobotModel, plan: TrajectoryPlan) -> N
         identify_with_prior(tx90l, plan, [short])
     with pytest.raises(FlexcalError, match="no recording"):
         identify_with_prior(tx90l, plan, [])
+    still = Recording(time_step=1 / 400, q=np.zeros((6000, 6)), torque=np.zeros((6000, 6)))
+    with pytest.raises(FlexcalError, match=r"q\d is up to .* from trajectory 1 of its plan"):
+        identify_with_prior(tx90l, plan, [still])
+    full = next(synthetic(tx90l, plan, STILL))
+    with pytest.raises(FlexcalError, match="from trajectory 2 of its plan"):
+        identify_with_prior(tx90l, plan, [full, full])
+    with pytest.raises(FlexcalError, match="torque of joint_1 is zero"):
+        identify_with_prior(tx90l, plan, [replace(full, torque=0.0 * full.torque)])
     lacking = replace(tx90l, rotor_inertia=np.full(6, np.nan))
-    full = Recording(time_step=1 / 400, q=np.zeros((6000, 6)), torque=np.zeros((6000, 6)))
     with pytest.raises(FlexcalError, match="joint_1 no rotor inertia"):
         identify_with_prior(lacking, plan, [full])

@@ -14,7 +14,7 @@ from flexcal.cli.options import Json, require_at_least
 
 @dataclass(frozen=True)
 class Measure:
-    """Carry out a plan of 'design frequency' or 'design poses': in the virtual cell, or by taking over files that were recorded before."""
+    """Carry out a plan of 'design': in the virtual cell, or by taking over files that were recorded before."""
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN", help="the plan (YAML)")]
     cell: Annotated[str, arg(metavar="virtual|DIR")]
@@ -59,7 +59,7 @@ class Measure:
             )
         if found.kind == "trajectory":
             console.say(f"wrote {found.recordings} recordings to {self.out}")
-            following = f"flexcal identify dynamics {robot} {self.out}/*.parquet"
+            following = f"flexcal identify inertials {robot} {self.out}"
         elif found.recordings:
             console.say(f"wrote {found.recordings} recordings of {found.poses} poses to {self.out}")
             following = f"flexcal identify response {robot} {self.out} --out responses"

@@ -65,6 +65,21 @@ STEPS = (
         "Before that, where CAD does not know the masses well: inertias and friction, from recordings of exciting motion",
         (
             Verb(
+                ("design", "trajectory"),
+                "design_trajectory",
+                "DesignTrajectory",
+                "plan exciting motions of the whole robot",
+                "flexcal design trajectory robot.yaml --out trajectory.yaml",
+            ),
+            Verb(
+                ("identify", "inertials"),
+                "identify_inertials",
+                "IdentifyInertials",
+                "recordings of these to masses and friction, with CAD as the prior",
+                "flexcal identify inertials robot.yaml exciting",
+                ("results.json",),
+            ),
+            Verb(
                 ("identify", "gains"),
                 "identify_gains",
                 "IdentifyGains",

@@ -40,6 +40,7 @@ from flexcal.dynamics.irls import huber_least_squares
 from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.learned_residual import LearnedMotor, LearnedResidual
 from flexcal.dynamics.learned_residual_file import LEARNED, read_learned_residual, write_learned_residual
+from flexcal.dynamics.log_faults import LogFaults
 from flexcal.dynamics.maximum_likelihood import maximum_likelihood
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
@@ -55,6 +56,7 @@ from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 from flexcal.dynamics.tls import total_least_squares
 from flexcal.dynamics.torque_prediction import TorquePrediction, predict_torques
+from flexcal.dynamics.trajectory_error import trajectory_error
 from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 
@@ -82,6 +84,7 @@ __all__ = [
     "LearnedMotor",
     "LearnedResidual",
     "LoadCoulomb",
+    "LogFaults",
     "Motion",
     "MotionBandwidth",
     "Observation",
@@ -129,6 +132,7 @@ __all__ = [
     "residual_errors",
     "select_friction",
     "total_least_squares",
+    "trajectory_error",
     "weighted_least_squares",
     "with_play",
     "write_learned_residual",

@@ -10,6 +10,9 @@ from flexcal.data import Recording, TrajectoryPlan
 from flexcal.errors import FlexcalError
 from flexcal.frequency.spectrum import torque_hold
 
+_FOLLOWS = 0.1
+"""A motion farther than this from its planned one (rad or m) is another motion."""
+
 
 @dataclass(frozen=True, eq=False)
 class PeriodicMotion:
@@ -21,10 +24,10 @@ class PeriodicMotion:
     samples: int
 
     @classmethod
-    def of(cls, recording: Recording, plan: TrajectoryPlan, cutoff_hz: float) -> PeriodicMotion:
-        """The mean of the periods after the settling ones, up to `cutoff_hz`; the torque as it acts, with its hold.
+    def of(cls, recording: Recording, plan: TrajectoryPlan, number: int, cutoff_hz: float) -> PeriodicMotion:
+        """The mean of the periods of trajectory `number` after the settling ones, up to `cutoff_hz`; the torque as it acts, with its hold.
 
-        Raises `FlexcalError` where the recording is not as long or as fast as planned.
+        Raises `FlexcalError` where the recording is not as long or as fast as planned, or of another motion.
         """
         size, periods = plan.samples_per_period, plan.periods
         if len(recording) != size * periods or not np.isclose(
@@ -34,15 +37,23 @@ class PeriodicMotion:
                 f"{recording.name} has {len(recording)} samples every {recording.time_step:g} s; its plan asks for {size * periods} every "
                 f"{1 / plan.rate_hz:g} s."
             )
+        mean_q, mean_torque = (
+            values.reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
+            for values in (recording.q, recording.torque)
+        )
+        apart = np.abs(mean_q - plan.motion(number, np.arange(size) / plan.rate_hz)[0]).max(axis=0)
+        if apart.max() > _FOLLOWS:
+            joint = int(np.argmax(apart))
+            raise FlexcalError(
+                f"{recording.name}: q{joint + 1} is up to {apart[joint]:.3g} from trajectory {number + 1} of its plan; record the planned "
+                "trajectories in their order."
+            )
         lines = int(cutoff_hz / plan.base_frequency_hz) + 1
         omega = 2 * np.pi * plan.base_frequency_hz * np.arange(lines)
 
-        def coefficients(values: np.ndarray) -> np.ndarray:
-            kept = values.reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
-            return np.fft.rfft(kept, axis=0)[:lines] / size
-
-        torque = coefficients(recording.torque) * torque_hold(plan, omega, recording.time_step)[:, None]
-        return cls(coefficients(recording.q), torque, plan.base_frequency_hz, size)
+        position, torque = (np.fft.rfft(mean, axis=0)[:lines] / size for mean in (mean_q, mean_torque))
+        torque = torque * torque_hold(plan, omega, recording.time_step)[:, None]
+        return cls(position, torque, plan.base_frequency_hz, size)
 
     @property
     def lines(self) -> int:

@@ -31,14 +31,17 @@ def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Ite
 
     The rows are Fourier coefficients of the motor torques of one mean period (Swevers 1997). The prior is that of robot.yaml; beside the
     parameters, springs and geometry are unknown to their tolerances and marginalised. The weights are from the residual's own
-    spectrum, joint by joint, so that its autocorrelation is accounted for. Raises `FlexcalError` where a rotor inertia is missing or a
-    recording does not fit the plan.
+    spectrum, joint by joint, so that its autocorrelation is accounted for. Raises `FlexcalError` where a rotor inertia is missing, a
+    recording does not fit the plan, or a torque is zero throughout.
     """
-    motions = [PeriodicMotion.of(recording, plan, CUTOFF_HZ) for recording in recordings]
+    motions = [PeriodicMotion.of(log, plan, number, CUTOFF_HZ) for number, log in enumerate(recordings)]
     if not motions:
         raise FlexcalError("there is no recording of a trajectory to identify from; give at least one.")
     parameters, own = unknowns(model)
     rows = TrajectoryRows.about(model, parameters, motions, plan.payload)
+    silent = [name for name, size in zip(model.joint_names, rows.size, strict=True) if not size > 0]
+    if silent:
+        raise FlexcalError(f"the torque of {silent[0]} is zero in all recordings; record it.")
     estimate = _fit(rows, rows.first_sigma())
     sigma = noise(rows, estimate, rows.first_sigma())
     for _ in range(ROUNDS):

@@ -74,7 +74,8 @@ class TrajectoryRows:
         for motion in motions:
             measured.append(real_rows(motion.torque))
             torque, jacobian = _links(model, parameters, x, motion, payload)
-            for number, joint, rows in _drives(model, parameters, motion):
+            for name, joint, rows in (*drive_rows(model, motion), *_reversals(model, motion)):
+                number = parameters.index(name)
                 torque[:, joint] += rows * parameters[number].value
                 jacobian[:, joint, number] += rows * parameters.natural_slope(x)[number]
             predicted.append(torque)
@@ -118,18 +119,21 @@ def _links(
     return torque, jacobian
 
 
-def _drives(
-    model: RobotModel, parameters: Parameters, motion: PeriodicMotion
-) -> Iterator[tuple[int, int, np.ndarray]]:
+def drive_rows(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
     """Parameter, joint and rows (2 K + 1,) of every column of the drives, evaluated at the full rate."""
     q, dq, ddq = motion.states(motion.samples)
     full = Motion(np.arange(motion.samples), q, dq, ddq, np.zeros_like(q))
     for term in CLASSIC:
         for column in term.columns(model, full, {}):
-            yield parameters.index(column.name), column.joint, motion.rows(column.values)
+            yield column.name, column.joint, motion.rows(column.values)
+
+
+def _reversals(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
+    """The same of what friction does at a reversal."""
+    dq = motion.states(motion.samples)[1]
     rounded = np.nan_to_num(model.coulomb) * (np.tanh(dq / _REVERSAL_VELOCITY) - np.sign(dq))
     for joint, name in enumerate(model.joint_names):
-        yield parameters.index(_reversal(name)), joint, motion.rows(rounded[:, joint])
+        yield _reversal(name), joint, motion.rows(rounded[:, joint])
 
 
 def _drive_names(model: RobotModel) -> tuple[str, ...]:

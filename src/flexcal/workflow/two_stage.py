@@ -86,7 +86,7 @@ def run_two_stage(
         believed = nominal.with_values(_inertias(read_truth(hidden)))
     else:
         with watch.stage("dynamics"):
-            dynamics = run_stage_zero(cell, nominal, out, seed=seed, progress=progress)[1]
+            dynamics = run_stage_zero(cell, nominal, out, seed=seed, progress=progress)
         believed = nominal.with_estimate(dynamics)
 
     frequency = frequency_plan(nominal, robot.parent / "frequency_poses.csv", plan, seed)

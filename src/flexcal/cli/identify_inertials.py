@@ -1,0 +1,50 @@
+"""`flexcal identify inertials`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot, require_robot
+
+
+@dataclass(frozen=True)
+class IdentifyInertials:
+    """Fit masses, centres of mass, rotor inertias and friction to the recordings of 'design trajectory', with CAD as the prior.
+
+    Writes estimates.yaml beside robot.yaml, for 'identify stiffness' and 'calibrate' to start from. What the torques do not tell stays as
+    uncertain as the `prior:` of robot.yaml says; springs and geometry are taken to be as uncertain as before they are identified.
+    """
+
+    robot: Robot
+    folder: Annotated[
+        Positional[Path], arg(metavar="DIR", help="folder with plan.yaml and one joint log per trajectory")
+    ]
+    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the parameters and the error of the torques."""
+        from flexcal.cli.tables import quantity_table
+        from flexcal.workflow.identify_inertials import identify_robot_inertials
+
+        require_robot(self.robot, self.folder)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_inertials(self.robot, self.folder, out=self.out, progress=progress)
+        document = found.document()
+        units = {item.name: item.unit for item in found.estimate.parameters}
+        console.show(quantity_table("links and drives", document["parameters"], units))
+        error = document["error_percent"]
+        console.say(
+            f"torques missed by {error['train']:.2f} % of their norm in the fit, by {error['nominal']:.2f} % with the values of robot.yaml"
+        )
+        console.say(f"wrote {found.estimates}")
+        springs = f"flexcal design frequency {self.robot} --out frequency.yaml"
+        poses = f"flexcal design poses {self.robot} --count 40 --out poses.yaml"
+        console.finish(document, springs if found.nominal.elastic else poses)

@@ -1,0 +1,37 @@
+"""What a robot's torques miss on exciting trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from flexcal.data import Recording, TrajectoryPlan
+from flexcal.dynamics.periodic_motion import PeriodicMotion, real_rows
+from flexcal.dynamics.prior_fit import CUTOFF_HZ
+from flexcal.dynamics.trajectory_rows import SAMPLES_PER_LINE, drive_rows
+from flexcal.model import RobotModel
+from flexcal.model.periodic_torque import periodic_torque
+
+
+def trajectory_error(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> float:
+    """Norm of what the torques of `model` miss of the recorded ones over the norm of these, as `identify_with_prior` sees them.
+
+    Friction that robot.yaml does not know counts as none. Raises `FlexcalError` where a recording does not fit the plan.
+    """
+    measured, missed = 0.0, 0.0
+    for number, recording in enumerate(recordings):
+        motion = PeriodicMotion.of(recording, plan, number, CUTOFF_HZ)
+        seen = real_rows(motion.torque)
+        left = seen - _torque(model, motion, plan.payload)
+        measured, missed = measured + np.sum(seen**2), missed + np.sum(left**2)
+    return float(np.sqrt(missed / measured))
+
+
+def _torque(model: RobotModel, motion: PeriodicMotion, payload: float | None) -> np.ndarray:
+    """Rows (2 K + 1, n) of the motor torques that a motion needs."""
+    states = motion.states(SAMPLES_PER_LINE * motion.lines)
+    torque = motion.rows(periodic_torque(model, *states, 1 / motion.base_frequency_hz, payload))
+    for name, joint, rows in drive_rows(model, motion):
+        torque[:, joint] += rows * np.nan_to_num(model.value(name))
+    return torque

@@ -1,0 +1,107 @@
+"""Recordings of exciting trajectories to link inertials, rotors and friction with CAD as the prior, and estimates.yaml."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from flexcal.data import FolderCell, Recording, TrajectoryPlan, labels, provenance, read_estimates
+from flexcal.data.experiment_folder import PLAN, existing_file
+from flexcal.dynamics import LogFaults, identify_with_prior, trajectory_error
+from flexcal.errors import InputError
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.workflow.results import quantities, write_results
+from flexcal.workflow.stored_block import ESTIMATES, store_block
+
+_SENSELESS = 0.5
+"""Share of the torques that no robot misses whose torques they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotInertials:
+    """The robot before, the estimate, what the torques of either miss (shares of their norm), and where the estimate was written."""
+
+    nominal: RobotModel
+    estimate: Estimate
+    trajectories: int
+    nominal_error: float
+    error: float
+    estimates: Path
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+        return {
+            "trajectories": self.trajectories,
+            "error_percent": {"nominal": 100 * self.nominal_error, "train": 100 * self.error},
+            "parameters": quantities(self.estimate),
+            "estimates": self.estimates,
+        }
+
+
+def identify_robot_inertials(
+    robot: Path, folder: Path, *, out: Path | None = None, progress: Progress = silent
+) -> RobotInertials:
+    """Fit link inertials, rotors and friction of a robot.yaml to the trajectories in `folder`, and store the block `dynamics`.
+
+    `folder` holds the plan and its logs, as 'measure' leaves them. The robot starts from nominal with the tolerances of its `prior:`: the
+    other blocks began from this one, and are kept. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where
+    the folder does not hold trajectories of this robot; nothing is written then.
+    """
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    cell = FolderCell(folder, nominal)
+    plan = cell.plan
+    if not isinstance(plan, TrajectoryPlan):
+        verb = "identify response" if plan.kind == "multisine" else "calibrate"
+        raise InputError(
+            f"{folder / PLAN} is a plan of kind '{plan.kind}', not of trajectories; give the folder to 'flexcal {verb}'."
+        )
+    files = [existing_file(folder, label.name) for label in labels(plan)]
+    recordings, estimate = identify_recorded(
+        nominal, plan, _checked(cell.record(plan), files, nominal), progress
+    )
+    error = trajectory_error(nominal.with_estimate(estimate), plan, recordings)
+    if error > _SENSELESS:
+        raise InputError(
+            f"{folder}: the fit misses {100 * error:.0f} % of the torques, so they are not those of this robot's joints in N m; check "
+            "signs, units and gear ratios under `signals:`."
+        )
+    origin = provenance([robot, nominal.urdf, folder / PLAN, *files], {})
+    estimate = replace(estimate, provenance=origin)
+    source = nominal.path.parent / nominal.config.estimates
+    target = source if out is None else out / ESTIMATES
+    before = trajectory_error(nominal, plan, recordings)
+    found = RobotInertials(nominal, estimate, len(plan), before, error, target)
+    others = read_estimates(source, without="dynamics") if source.exists() else {}
+    store_block(source, target, others, "dynamics", estimate)
+    if out is not None:
+        write_results(out, found.document())
+    return found
+
+
+def identify_recorded(
+    nominal: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording], progress: Progress
+) -> tuple[Sequence[Recording], Estimate]:
+    """The recordings of a plan as they come, and what they tell of a robot with its own prior."""
+    progress("dynamics", 0.0)
+    recorded = []
+    for number, recording in enumerate(recordings, start=1):
+        recorded.append(recording)
+        progress("dynamics", 0.7 * number / len(plan))
+    estimate = identify_with_prior(nominal, plan, recorded)
+    progress("dynamics", 1.0)
+    return recorded, estimate
+
+
+def _checked(
+    recordings: Iterable[Recording], files: Sequence[Path], model: RobotModel
+) -> Iterator[Recording]:
+    """The recordings of some files; raises `InputError` for the first that lies."""
+    for recording, file in zip(recordings, files, strict=True):
+        faults = LogFaults(file, model)
+        faults.add(recording)
+        faults.check()
+        yield recording

@@ -1,0 +1,176 @@
+"""`design trajectory`, `measure` and `identify inertials`: stage 0 of the demonstration, verb by verb."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from cli_files import copied
+from test_bad_input import refused
+
+from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth
+from flexcal.cli.main import main
+from flexcal.data import TrajectoryPlan, read_estimates, read_plan_of, write_plan
+from flexcal.model import RobotModel
+from flexcal.progress import silent
+from flexcal.workflow import stage_zero
+from flexcal.workflow.design_trajectory import exciting_plan
+from flexcal.yaml_reader import read_yaml
+
+LOG = "pose_1_realisation_1_experiment_1_plus.parquet"
+
+
+@pytest.fixture(scope="module")
+def recorded(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The TX90L's folder with one trajectory and what the virtual cell recorded by it."""
+    folder = copied(examples / "tx90l", tmp_path_factory.mktemp("cli") / "tx90l")
+    plan = folder / "trajectory.yaml"
+    design = ("design", "trajectory", folder / "robot.yaml", "--count", 1, "--seed", 5, "--out", plan)
+    measure = ("measure", plan, "--cell", "virtual", "--seed", 5, "--out", folder / "exciting")
+    for arguments in (design, measure):
+        assert main([str(a) for a in arguments]) == 0
+    return folder
+
+
+@pytest.fixture(scope="module")
+def identified(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What the verb leaves with --out."""
+    out = tmp_path_factory.mktemp("cli") / "inertials"
+    arguments = ("identify", "inertials", recorded / "robot.yaml", recorded / "exciting", "--out", out)
+    assert main([str(a) for a in arguments]) == 0
+    assert not (recorded / "estimates.yaml").exists()
+    return out
+
+
+def test_the_verbs_are_stage_zero_of_the_demo(
+    recorded: Path, identified: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The same plan, byte by byte, and the same estimate from recordings that went through files."""
+    monkeypatch.setattr(stage_zero, "exciting_plan", partial(exciting_plan, count=1))
+    nominal = RobotModel.from_yaml(recorded / "robot.yaml", estimates=False)
+    config = read_yaml(recorded / "cell.yaml", CellConfig)
+    truth = draw_truth(nominal, config.spread, np.random.default_rng([5, 0]))
+    cell = VirtualCell(nominal.with_values(truth), config, 5, controller_model=nominal)
+    demo = stage_zero.run_stage_zero(cell, nominal, tmp_path, seed=5, progress=silent)
+    assert (tmp_path / "trajectory_plan.yaml").read_bytes() == (recorded / "trajectory.yaml").read_bytes()
+    verb = read_estimates(identified / "estimates.yaml")["dynamics"]
+    assert verb.parameters.names == demo.parameters.names
+    std = np.sqrt(np.diag(demo.covariance))
+    np.testing.assert_allclose(
+        (verb.parameters.coordinates() - demo.parameters.coordinates()) / std, 0.0, atol=1e-9
+    )
+    np.testing.assert_allclose(np.sqrt(np.diag(verb.covariance)), std, rtol=1e-9)
+
+
+def test_intervals_hold_the_truth(recorded: Path, identified: Path) -> None:
+    truth = read_truth(recorded / "exciting" / "truth.yaml")
+    document = json.loads((identified / "results.json").read_text())
+    known = {name: q for name, q in document["parameters"].items() if name in truth}
+    inside = [q["low"] < truth[name] < q["high"] for name, q in known.items()]
+    assert len(inside) == 30 and np.mean(inside) > 0.85
+    assert known["link_2.com_x"]["std"] < 1e-3
+    assert document["trajectories"] == 1
+    assert 0 < document["error_percent"]["train"] < 0.5 < 2 < document["error_percent"]["nominal"]
+
+
+def test_the_robot_has_it_and_running_again_changes_nothing(
+    run, recorded: Path, identified: Path, tmp_path: Path
+) -> None:
+    """`identify stiffness` starts from this block as from the demo's."""
+    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
+    page = run("identify", "inertials", robot, recorded / "exciting")
+    assert page.status == 0
+    assert "link_6.com_z" in page.out and "flexcal design frequency" in page.out
+    estimates = robot.parent / "estimates.yaml"
+    assert estimates.read_bytes() == (identified / "estimates.yaml").read_bytes()
+    found = read_estimates(estimates)["dynamics"]
+    name = "joint_2.rotor_inertia"
+    assert RobotModel.from_yaml(robot).value(name) == pytest.approx(found.values[name])
+    inputs = {key.removeprefix("input.") for key in found.provenance if key.startswith("input.")}
+    assert inputs == {"robot.yaml", "tx90l.urdf", "plan.yaml", LOG}
+
+
+def test_every_verb_says_what_follows(run, recorded: Path, tmp_path: Path) -> None:
+    plan = tmp_path / "trajectory.yaml"
+    design = run("design", "trajectory", recorded / "robot.yaml", "--count", 1, "--out", plan, "--json")
+    assert design.document["seconds_on_the_robot"] == pytest.approx(15.0)
+    assert design.document["payload"] == 0.0
+    assert f"flexcal measure {plan}" in design.err
+    taken = (
+        "measure",
+        recorded / "trajectory.yaml",
+        "--cell",
+        recorded / "exciting",
+        "--out",
+        tmp_path / "a",
+    )
+    assert f"flexcal identify inertials {recorded / 'robot.yaml'} {tmp_path / 'a'}" in run(*taken).out
+
+
+def scaled(factor: float) -> Callable[[pl.DataFrame], pl.DataFrame]:
+    return lambda log: log.with_columns(pl.col("^tau.$") * factor)
+
+
+def saturated(log: pl.DataFrame) -> pl.DataFrame:
+    return log.with_columns(tau2=pl.col("tau2").clip(-0.6 * log["tau2"].abs().max(), None))
+
+
+BAD = {
+    "other sign": (scaled(-1.0), ["the fit misses", "signs, units and gear ratios"]),
+    "no torque": (scaled(0.0), [LOG, "joint_1 is the same throughout"]),
+    "one torque missing": (lambda f: f.drop("tau2"), ["'tau2' is missing"]),
+    "saturated": (saturated, [LOG, "joint_2", "stays at its extreme"]),
+    "standstill": (lambda f: f.with_columns(pl.col("^q.$").first()), [LOG, "trajectory 1 of its plan"]),
+    "too short": (lambda f: f[:-20], [LOG, "59980 samples", "60000"]),
+}
+
+
+@pytest.mark.parametrize(("change", "words"), BAD.values(), ids=BAD.keys())
+def test_bad_logs(
+    run, recorded: Path, tmp_path: Path, change: Callable[[pl.DataFrame], pl.DataFrame], words: list[str]
+) -> None:
+    folder = copied(recorded / "exciting", tmp_path / "exciting")
+    change(pl.read_parquet(folder / LOG)).write_parquet(folder / LOG)
+    out = ("--out", tmp_path / "out")
+    sentence = refused(run, tmp_path, "identify", "inertials", recorded / "robot.yaml", folder, *out)
+    for word in words:
+        assert word in sentence
+
+
+def test_folders_of_other_plans(run, recorded: Path, tmp_path: Path) -> None:
+    robot, folder = recorded / "robot.yaml", copied(recorded / "exciting", tmp_path / "exciting")
+    inertials = ("identify", "inertials", robot, folder)
+    sentence = refused(run, tmp_path, "identify", "response", robot, folder, "--out", tmp_path / "out")
+    assert "trajectories" in sentence and "flexcal identify inertials" in sentence
+    (folder / LOG).unlink()
+    assert LOG.removesuffix(".parquet") in refused(run, tmp_path, *inertials)
+    for verb, following in (("poses", "calibrate"), ("frequency", "identify response")):
+        plan = folder / "plan.yaml"
+        plan.unlink()
+        options = ("--random", "--count", 3) if verb == "poses" else ()
+        assert run("design", verb, robot, *options, "--out", plan).status == 0
+        assert f"'flexcal {following}'" in refused(run, tmp_path, *inertials)
+
+
+def test_what_cannot_be_designed(run, recorded: Path, tmp_path: Path) -> None:
+    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
+    arguments = ("design", "trajectory", robot, "--out", tmp_path / "plan.yaml")
+    assert "--count is 0" in refused(run, tmp_path, *arguments, "--count", 0)
+    text = robot.read_text().splitlines(keepends=True)
+    robot.write_text("".join(line for line in text if not line.startswith("controller:")))
+    assert "declares no controller" in refused(run, tmp_path, *arguments)
+
+
+def test_a_plan_of_more_trajectories_needs_all_logs(run, recorded: Path, tmp_path: Path) -> None:
+    folder = copied(recorded / "exciting", tmp_path / "exciting")
+    plan = read_plan_of(folder / "plan.yaml", TrajectoryPlan)
+    twice = {name: np.repeat(getattr(plan, name), 2, axis=0) for name in ("centre", "sine", "cosine")}
+    write_plan(folder / "plan.yaml", replace(plan, **twice))
+    arguments = ("identify", "inertials", recorded / "robot.yaml", folder)
+    assert "realisation_2_experiment_1_plus" in refused(run, tmp_path, *arguments)
