@@ -75,6 +75,28 @@ def test_urdf_that_does_not_parse(run, ur5_folder: Path, content: str) -> None:
     assert "ur5.urdf" in sentence
 
 
+def test_measurements_that_count_twice(run, ur5_folder: Path) -> None:
+    robot, poses = ur5_folder / "robot.yaml", ur5_folder / "random.csv"
+    (ur5_folder / "copy.csv").write_bytes(poses.read_bytes())
+    for verb in ("calibrate", "verify"):
+        assert f"{poses} is given twice" in refused(run, ur5_folder, verb, robot, poses, poses)
+        assert "copy.csv holds the same as" in refused(
+            run, ur5_folder, verb, robot, poses, ur5_folder / "copy.csv"
+        )
+
+
+def test_files_of_another_kind(run, tx90l_folder: Path) -> None:
+    """Settings in the place of a plan, a file in that of a folder, a robot in that of responses."""
+    robot, out = tx90l_folder / "robot.yaml", tx90l_folder / "out"
+    sentence = refused(
+        run, tx90l_folder, "measure", tx90l_folder / "cell.yaml", "--cell", "virtual", "--out", out
+    )
+    assert "this is no plan" in sentence and "flexcal design" in sentence
+    assert "tx90l.urdf is no folder" in refused(run, tx90l_folder, "report", tx90l_folder / "tx90l.urdf")
+    sentence = refused(run, tx90l_folder, "identify", "stiffness", robot, tx90l_folder / "tx90l.urdf")
+    assert "identify response" in sentence and "pickle" not in sentence
+
+
 # ---- pose files -------------------------------------------------------------------------------------------------------------------
 
 

@@ -234,11 +234,17 @@ def test_two_ways_to_validate_exclude_each_other(tx40: Path, capsys: pytest.Capt
 
 
 def test_a_log_that_counts_twice(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Also under another name of its folder; what was fitted is not unseen."""
+    """Also under another name of its folder, and as a copy; what was fitted is not unseen."""
     robot, log = str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")
     again = str(tx40 / ".." / "tx40" / "exciting.parquet")
     assert "exciting.parquet is given twice" in refusal([robot, log, again], capsys)
     assert "is fitted and stands under --validate too" in refusal([robot, log, "--validate", again], capsys)
+    copy = str(tx40 / "copy.parquet")
+    (tx40 / "copy.parquet").write_bytes((tx40 / "exciting.parquet").read_bytes())
+    assert f"{copy} holds the same as {log}; it would count" in refusal([robot, log, copy], capsys)
+    assert f"{copy} holds the same as {log}, which is fitted" in refusal(
+        [robot, log, "--validate", copy], capsys
+    )
     assert not (tx40 / "estimates.yaml").exists()
 
 
@@ -275,10 +281,15 @@ def test_bodies_that_could_be_built(
     assert linear["bodiless_links"] and found["bodiless_links"] == []
     assert found["error_percent"]["held_out"] < linear["error_percent"]["held_out"] + 0.05
     arguments = [str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")]
-    assert main(["identify", "dynamics", *arguments, "--estimator", "wls"]) == 0
-    assert "no body can have the inertials of link_1" in capsys.readouterr().out
+    again = f"next: flexcal identify dynamics {' '.join(arguments)}"
+    assert main(["identify", "dynamics", *arguments, "--hold-out", "last:0.3"]) == 0
+    told = capsys.readouterr().out
+    assert "no body can have the inertials of link_1" in told
+    assert told.splitlines()[-1] == f"{again} --estimator sdp --hold-out last:0.3"
     assert main(["identify", "dynamics", *arguments, "--estimator", "sdp"]) == 0
-    assert "no body can have" not in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "no body can have" not in told
+    assert told.splitlines()[-1] == f"{again} --validate other.parquet --estimator sdp"
     urdf = tmp_path / "identified.urdf"
     assert main(["export", "urdf", str(tx40 / "robot.yaml"), "--out", str(urdf), "--json"]) == 0
     remarks = json.loads(capsys.readouterr().out)["remarks"]

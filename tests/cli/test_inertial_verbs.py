@@ -48,6 +48,26 @@ def identified(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     return out
 
 
+def test_what_is_said_leads_on(
+    recorded: Path, identified: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """The command line after a plan that is not beside its robot finds the robot; so do later verbs estimates that are elsewhere."""
+    robot, plan = recorded / "robot.yaml", tmp_path / "plan.yaml"
+    assert main(["design", "trajectory", str(robot), "--count", "1", "--out", str(plan)]) == 0
+    following = capsys.readouterr().out.splitlines()[-1]
+    words = following.partition("next: flexcal ")[2].partition(", or ")[0].split()
+    words[words.index("exciting")] = str(tmp_path / "exciting")
+    assert main(words) == 0
+    out = tmp_path / "inertials"
+    assert main(["identify", "inertials", str(robot), str(tmp_path / "exciting"), "--out", str(out)]) == 0
+    line = capsys.readouterr().out.partition("write '")[2].partition("'")[0]
+    (recorded / "elsewhere.yaml").write_text(f"{robot.read_text()}\n{line}\n")
+    found = read_estimates(out / "estimates.yaml")["dynamics"]
+    model = RobotModel.from_yaml(recorded / "elsewhere.yaml")
+    (recorded / "elsewhere.yaml").unlink()
+    assert model.value("link_2.mass") == found.quantity("link_2.mass")["estimate"]
+
+
 def test_the_verbs_are_stage_zero_of_the_demo(
     recorded: Path, identified: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -102,4 +102,4 @@ def test_columns_of_signals_that_are_missing(
 def test_matrix(tmp_path: Path, fault: Callable[..., str], text: str, words: str) -> None:
     (tmp_path / "m.csv").write_text(text)
     assert words in fault(read_matrix, tmp_path / "m.csv")
-    assert "none.csv cannot be read" in fault(read_matrix, tmp_path / "none.csv")
+    assert "none.csv cannot be read (No such file or directory)" in fault(read_matrix, tmp_path / "none.csv")

@@ -26,7 +26,7 @@ from flexcal.dynamics import (
     weighted_least_squares,
     write_learned_residual,
 )
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Estimate
 
 SHARES = np.array([[1.0, 0.0], [0.5, 1.0]])
@@ -63,6 +63,9 @@ def test_joints_feel_what_was_learned_of_the_motors(
     np.testing.assert_allclose(mean, np.stack([own, np.zeros(5)], axis=1), atol=1e-14)
     np.testing.assert_allclose(std[:, 0], np.sqrt((1.5 * spread) ** 2 + (0.5 * 0.3) ** 2))
     np.testing.assert_allclose(std[:, 1], 0.3)
+    for wrong in ((q[:, :1], dq, predicted), (q, dq[:4], predicted), (q[0], dq[0], predicted[0])):
+        with pytest.raises(FlexcalError, match=r"give \(samples, 2\) of each"):
+            learned.torque(*wrong)
 
 
 def test_what_was_written_predicts_the_same_without_scikit_learn(

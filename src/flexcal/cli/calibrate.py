@@ -78,6 +78,8 @@ class Calibrate:
             console.say(remark)
         where = "" if self.out is None else f" --estimates {self.out}"
         console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
         console.finish(
             document, f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw"
         )

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 
 
@@ -55,6 +56,4 @@ class DesignFrequency:
             f"{document['highest_hz']:g} Hz, {document['recordings']} recordings, "
             f"{document['seconds_on_the_robot'] / 60:.0f} minutes on a real robot"
         )
-        console.finish(
-            document, f"flexcal measure {self.out} --cell virtual --out frequency, or record it on the robot"
-        )
+        console.finish(document, f"{measuring(self.out, self.robot, 'frequency')}, or record it on the robot")

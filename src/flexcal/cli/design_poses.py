@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 from flexcal.errors import InputError
 
@@ -58,7 +59,10 @@ class DesignPoses:
                 self.robot, self.out, self.count, payload=self.payload, seed=self.seed
             )
             console.say(f"wrote {self.out}: {self.count} random poses")
-            console.finish(drawn.document(), f"measure them, then flexcal verify {self.robot} MEASURED.csv")
+            console.finish(
+                drawn.document(),
+                f"{measuring(self.out, self.robot, 'unseen')}, or measure them on the robot",
+            )
             return
         with console.progress() as progress:
             found = plan_calibration_poses(
@@ -96,5 +100,5 @@ class DesignPoses:
         console.say(f"wrote {self.out}: {self.count} poses")
         console.finish(
             document,
-            f"flexcal measure {self.out} --cell virtual --out measured, or measure them on the robot",
+            f"{measuring(self.out, self.robot, 'measured')}, or measure them on the robot",
         )

@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 
 
@@ -39,6 +40,4 @@ class DesignTrajectory:
             f"wrote {self.out}: {document['trajectories']} trajectories of {document['periods']} periods of "
             f"{1 / document['base_frequency_hz']:g} s{without}, {document['seconds_on_the_robot']:.0f} s on a real robot"
         )
-        console.finish(
-            document, f"flexcal measure {self.out} --cell virtual --out exciting, or record it on the robot"
-        )
+        console.finish(document, f"{measuring(self.out, self.robot, 'exciting')}, or record it on the robot")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
@@ -13,7 +13,25 @@ from flexcal.cli.console import Console
 from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
+if TYPE_CHECKING:
+    from flexcal.workflow.robot_dynamics import RobotDynamics
+
 _SPRINGS = (".drive.stiffness", ".drive.damping")
+_ESTIMATORS = """wls: every joint and log by its own noise.
+ols: every equation alike.
+sdp: as wls, among robots that can be built.
+irls: as wls, with single rows that miss by far held back.
+iv: as wls, without the bias of noisy velocities (simulates the robot under the `controller:` of robot.yaml).
+didim: from torques alone (simulates it too).
+energy, power: all joints together in one equation a row.
+tls: as wls, knowing the noise of the positions.
+ml: from the scatter between four or more periods of one motion.
+ekf: in one go with positions and velocities, as a Kalman filter."""
+_LEARNING = (
+    "Learn what the estimate misses of the torques as a function of what each motor does (needs scikit-learn). "
+    "Written to learned_residual.npz beside the estimates where left-out blocks of time are predicted better with it; "
+    "the estimates stay as they are."
+)
 
 
 @dataclass(frozen=True)
@@ -32,21 +50,15 @@ class IdentifyDynamics:
     ]
     hold_out: Annotated[str, arg(metavar="last:SHARE", help_behavior_hint="(for example last:0.3)")] = ""
     """Keep the last share of every log's time out of the fit, and predict its torques."""
-    validate: Annotated[tuple[Path, ...], arg(metavar="LOG", help_behavior_hint="")] = ()
+    validate: Annotated[tuple[Path, ...], arg(metavar="LOG...", help_behavior_hint="")] = ()
     """Logs that the fit does not see, whose torques it predicts."""
-    estimator: Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"] = (
-        "wls"
-    )
-    """wls: every joint and log by its own noise; ols: every equation alike; sdp: as wls, among robots that can be built;
-    irls: as wls, with single rows that miss by far held back; iv: as wls, without the bias of noisy velocities; didim: from torques
-    alone (both simulate the robot under the `controller:` of robot.yaml); energy, power: all joints together in one equation a row;
-    tls: as wls, knowing the noise of the positions; ml: from the scatter between four or more periods of one motion;
-    ekf: in one go with positions and velocities, as a Kalman filter."""
+    estimator: Annotated[
+        Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"],
+        arg(help=_ESTIMATORS),
+    ] = "wls"
     flexible: bool = False
     """Tell motors and arm of elastic joints apart, by logs that have the arm side (qa1…), and find the stiffness of the drives."""
-    learn_residual: bool = False
-    """Learn what the estimate misses of the torques as a function of what each motor does (needs scikit-learn). Written to
-    learned_residual.npz beside the estimates where left-out blocks of time are predicted better with it; the estimates stay as they are."""
+    learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
     out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
@@ -120,11 +132,22 @@ class IdentifyDynamics:
         console.say(f"wrote {found.estimates}")
         if learned and learned["file"]:
             console.say(f"wrote {learned['file']}")
-        again = f"flexcal identify dynamics {self.robot} {self.logs[0]} --validate other.parquet"
-        elastic = found.train.observation.model.elastic
-        console.finish(
-            document, f"flexcal design frequency {self.robot} --out frequency.yaml" if elastic else again
-        )
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+        console.finish(document, self._next(found))
+
+    def _next(self, found: RobotDynamics) -> str:
+        """Frequency responses for an elastic robot; else torques that the fit never saw, and then a URDF, if links are bodies."""
+        if found.train.observation.model.elastic:
+            return f"flexcal design frequency {self.robot} --out frequency.yaml"
+        verb = f"flexcal identify dynamics {self.robot} {' '.join(map(str, self.logs))}"
+        if not (self.hold_out or self.validate):
+            kept = "" if self.estimator == "wls" else f" --estimator {self.estimator}"
+            return f"{verb} --validate other.parquet{kept}"
+        if found.bodiless:
+            return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
+        where = "" if self.out is None else f" --estimates {self.out}"
+        return f"flexcal export urdf {self.robot}{where} --out identified.urdf"
 
 
 def _share(text: str) -> float:

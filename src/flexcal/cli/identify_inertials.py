@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import reading_elsewhere
 from flexcal.cli.options import Json, Robot, require_robot
 
 
@@ -45,6 +46,8 @@ class IdentifyInertials:
             f"torques missed by {error['train']:.2f} % of their norm in the fit, by {error['nominal']:.2f} % with the values of robot.yaml"
         )
         console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(reading_elsewhere(self.robot, found.estimates))
         springs = f"flexcal design frequency {self.robot} --out frequency.yaml"
         poses = f"flexcal design poses {self.robot} --count 40 --out poses.yaml"
         console.finish(document, springs if found.nominal.elastic else poses)

@@ -9,6 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import reading_elsewhere
 from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
 
 
@@ -79,4 +80,6 @@ class IdentifyStiffness:
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"
             )
         console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(reading_elsewhere(self.robot, found.estimates))
         console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

@@ -35,7 +35,7 @@ class Measure:
     ] = None
     """Hidden truth of the virtual cell."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the virtual cell's hidden truth and noise."""
+    """Of the virtual cell's hidden truth and noise: the same robot has the same seed in every measurement."""
     json: Json = False
 
     def run(self) -> None:

@@ -10,11 +10,12 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json
+from flexcal.errors import InputError
 
 
 @dataclass(frozen=True)
 class Report:
-    """Write report.html of a folder that demo, identify, calibrate or verify left with --out, from the numbers stored there.
+    """Write report.html of a folder that demo, identify dynamics or stiffness, calibrate or verify left with --out, from stored numbers.
 
     Figures that need the fit itself are not in it; the verb that made the folder writes them all.
     """
@@ -24,7 +25,9 @@ class Report:
 
     @property
     def out(self) -> Path:
-        """The file that is written."""
+        """The file that is written; raises `InputError` where DIR is a file."""
+        if self.folder.is_file():
+            raise InputError(f"{self.folder} is no folder; give the folder that holds results.json.")
         return self.folder / "report.html"
 
     def run(self) -> None:

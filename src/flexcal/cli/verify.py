@@ -49,5 +49,7 @@ class Verify:
         )
         for remark in document["remarks"]:
             console.say(remark)
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
         where = "" if self.estimates is None else f" --estimates {self.estimates}"
         console.finish(document, f"flexcal export urdf {self.robot}{where} --out calibrated.urdf")

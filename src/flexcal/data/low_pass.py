@@ -30,7 +30,8 @@ class LowPass:
     def __post_init__(self) -> None:
         if not 0 < self.cutoff_hz < 0.5 / self.time_step:
             raise FlexcalError(
-                f"a cut-off of {self.cutoff_hz:g} Hz is not between 0 and {0.5 / self.time_step:g} Hz, half the sampling rate."
+                f"a cut-off of {self.cutoff_hz:g} Hz is not between 0 and {0.5 / self.time_step:g} Hz, half the sampling rate; "
+                "correct `cutoff_hz:` in robot.yaml, or the time, which is in seconds."
             )
 
     @property

@@ -29,7 +29,8 @@ def read_plan(path: str | Path) -> Plan:
     if kind not in _KINDS:
         raise file.error(
             ("kind",),
-            f"the plan's kind must be one of {', '.join(_KINDS)}; add for example 'kind: multisine'.",
+            f"this is no plan, whose kind is one of {', '.join(_KINDS)}; give what 'flexcal design' wrote, "
+            "or add for example 'kind: multisine'.",
         )
     return file.structure(_KINDS[kind])
 

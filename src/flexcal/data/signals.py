@@ -144,7 +144,8 @@ def _choose(file: TableFile, quantity: str, n: int, mapped: Signal | None, requi
     if len(missing) < len(standard.columns) or required:
         instead = f" (or {', '.join(mapped.columns)} of `signals:`)" if mapped is not None else ""
         near = suggestion(missing[0], [name for name in file.columns if name not in standard.columns])
-        raise file.error(f"the column '{missing[0]}'{instead} is missing{near or '; add it.'}")
+        elsewhere = ", or map it under `signals:`" if quantity in JOINT_QUANTITIES and mapped is None else ""
+        raise file.error(f"the column '{missing[0]}'{instead} is missing{near or f'; add it{elsewhere}.'}")
     return None
 
 
@@ -208,7 +209,8 @@ def read_matrix(path: str | Path) -> np.ndarray:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as problem:
-        raise InputError(f"{path} cannot be read ({problem}); check the name and the folder.") from problem
+        reason = getattr(problem, "strerror", None) or str(problem)
+        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
     rows: list[list[float]] = []
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.lstrip().startswith("#"):

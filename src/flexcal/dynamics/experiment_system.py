@@ -97,7 +97,8 @@ def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: 
         raise FlexcalError(f"the equations of {name} are not finite.")
     if not found:
         raise FlexcalError(
-            f"no equation is left of {name}: it is too short for its filters, or the robot stands still in it."
+            f"no equation is left of {name}: it, or the part that is fitted or held out, is too short for its filters, "
+            "or the robot stands still in it."
         )
     return ExperimentSystem(tuple(found), length, last - first, masked)
 

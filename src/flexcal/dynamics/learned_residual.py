@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.gaussian_process import GaussianProcess
+from flexcal.errors import FlexcalError
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,7 +44,12 @@ class LearnedResidual:
 
     def torque(self, q: np.ndarray, dq: np.ndarray, predicted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """What to add to the torques `predicted` (N, n), N m, by the estimate at `q`, `dq` (N, n), and the standard deviation (N, n) of
-        what is measured then, noise and all."""
+        what is measured then, noise and all. Raises `FlexcalError` where the shapes differ or do not fit the motors."""
+        shapes = {values.shape for values in (q, dq, predicted)}
+        if len(shapes) > 1 or q.shape[1:] != (len(self.motors),):
+            raise FlexcalError(
+                f"q, dq and predicted have shapes {q.shape}, {dq.shape} and {predicted.shape}; give (samples, {len(self.motors)}) of each."
+            )
         position, velocity = q @ self.shares.T, dq @ self.shares.T
         return self.of_motors(position, velocity, predicted @ np.linalg.inv(self.shares))
 

@@ -94,7 +94,7 @@ class FrequencyResponse:
                 values = {name: stored[name] for name in names}
         except (OSError, KeyError, ValueError, zipfile.BadZipFile) as problem:
             raise InputError(
-                f"{path} is not a frequency response written by flexcal ({problem})."
+                f"{path} is not a frequency response; give what 'flexcal identify response' wrote."
             ) from problem
         payload = float(values["payload"])
         return cls(

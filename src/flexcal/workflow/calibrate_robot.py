@@ -29,6 +29,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
+from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.results import identifiability_block, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -102,6 +103,7 @@ def calibrate_robot(
     changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
     progress("reading", 0.0)
+    require_distinct(files)
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="calibration") if source.exists() else {}

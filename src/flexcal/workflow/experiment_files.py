@@ -11,6 +11,7 @@ from flexcal.data.plan_files import Plan
 from flexcal.errors import InputError
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.workflow.distinct_files import require_distinct
 from flexcal.yaml_writer import to_plain
 
 _PLANS = (PLAN, "frequency_plan.yaml")
@@ -58,6 +59,7 @@ def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyRes
                 f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first."
             )
         files += found
+    require_distinct(files)
     responses = [FrequencyResponse.load(file) for file in files]
     order = sorted(range(len(files)), key=lambda i: responses[i].pose)
     return [files[i] for i in order], [responses[i] for i in order]

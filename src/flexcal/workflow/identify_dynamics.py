@@ -23,7 +23,7 @@ from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
-from flexcal.workflow.distinct_logs import require_distinct
+from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.divided_logs import DividedLogs
 from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName

@@ -24,7 +24,7 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.workflow.distinct_logs import require_distinct
+from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.results import quantities, write_results

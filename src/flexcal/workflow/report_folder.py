@@ -27,7 +27,8 @@ def report_folder(folder: Path) -> Path:
     """
     if not (folder / RESULTS).is_file():
         raise InputError(
-            f"{folder} holds no {RESULTS}; give the folder that demo, identify, calibrate or verify left with --out."
+            f"{folder} holds no {RESULTS}; give the folder that demo, identify dynamics or stiffness, calibrate or verify left "
+            "with --out."
         )
     results = read_results(folder)
     if not any(key in results for key in (*_REPORTED, _DYNAMICS)):

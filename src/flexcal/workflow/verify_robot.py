@@ -17,6 +17,7 @@ from flexcal.model.stored import with_blocks
 from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
+from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.results import write_results
 
@@ -77,6 +78,7 @@ def verify_robot(
     report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no calibration pose was
     measured, or a file does not fit.
     """
+    require_distinct(files)
     bare = RobotModel.from_yaml(robot, estimates=False)
     stored = _estimates_file(bare, estimates)
     blocks = read_estimates(stored)

@@ -1,0 +1,25 @@
+"""What several verbs say at their end about the one that comes next."""
+
+from __future__ import annotations
+
+from os.path import relpath
+from pathlib import Path
+
+from flexcal.errors import InputError
+
+
+def measuring(plan: Path, robot: Path, folder: str) -> str:
+    """The command line that carries out a plan in the virtual cell, with --robot where that verb would not find the robot by itself."""
+    from flexcal.workflow.experiment_files import robot_file
+
+    try:
+        near = robot_file(plan, None).samefile(robot)
+    except InputError:
+        near = False
+    named = "" if near else f" --robot {robot}"
+    return f"flexcal measure {plan}{named} --cell virtual --out {folder}"
+
+
+def reading_elsewhere(robot: Path, estimates: Path) -> str:
+    """How the verbs that come next find estimates that are not beside robot.yaml."""
+    return f"for the next verbs to start from it, write 'estimates: {relpath(estimates, robot.parent)}' into {robot}"

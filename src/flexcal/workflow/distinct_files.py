@@ -1,0 +1,37 @@
+"""Measurements that are told apart: one that counts twice makes intervals too narrow, and one that was fitted is not unseen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from filecmp import cmp
+from pathlib import Path
+
+from flexcal.errors import InputError
+
+
+def require_distinct(files: Sequence[Path], unseen: Sequence[Path] = ()) -> None:
+    """Raises `InputError` for a file, or a copy of it, that stands twice among the `files` of a fit or those `unseen` by it, or in both."""
+    for given in (files, unseen):
+        for k, file in enumerate(given):
+            if twin := _twin(file, given[:k]):
+                told = "is given twice" if _same_place(file, twin) else f"holds the same as {twin}"
+                raise InputError(f"{file} {told}; it would count as two recordings: name it once.")
+    for file in unseen:
+        if twin := _twin(file, files):
+            told = "is fitted" if _same_place(file, twin) else f"holds the same as {twin}, which is fitted,"
+            raise InputError(
+                f"{file} {told} and stands under --validate too; the fit must not have seen what it is validated with."
+            )
+
+
+def _twin(file: Path, others: Sequence[Path]) -> Path | None:
+    """The first of the `others` that is this file or has its content."""
+    return next((other for other in others if _same_place(file, other) or _same_content(file, other)), None)
+
+
+def _same_place(file: Path, other: Path) -> bool:
+    return file.resolve() == other.resolve()
+
+
+def _same_content(file: Path, other: Path) -> bool:
+    return file.is_file() and other.is_file() and cmp(file, other, shallow=False)
