@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 import pytest
 from outline import Outline
 
@@ -91,7 +92,7 @@ def test_figures_have_traces_for_every_joint(outline: Outline) -> None:
 def test_recordings_are_chosen_by_name(folder: Path, tmp_path: Path) -> None:
     """One of the fit and one that only validates: the second is unseen as a whole, and its hash is told too."""
     fresh = tmp_path / "fresh.parquet"
-    shutil.copy(folder.parent / "exciting.parquet", fresh)
+    pl.read_parquet(folder.parent / "exciting.parquet").head(200_000).write_parquet(fresh)
     log, out = folder.parent / "exciting.parquet", tmp_path / "out"
     identify_robot_dynamics(folder.parent / "robot.yaml", [log], validate=[fresh], out=out)
     page = Outline((out / "report.html").read_text("utf-8"))
