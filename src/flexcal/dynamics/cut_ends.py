@@ -20,6 +20,8 @@ _HARD = 2.0
 """How many times the usual changes of speed within `_APPROACH` such a stop is, at least; real robots reach a third of that."""
 _USUALLY = 0.99
 """Share of the samples of a block that count as usual."""
+_EVERY = 4
+"""Which samples of a block are enough to say what is usual."""
 _STEPS = 8.0
 """Steps of its resolution by which the signal leaves its extreme within half the stay; a peak that is quantised leaves it by four."""
 _OVERSHOOT = 0.1
@@ -65,15 +67,17 @@ class CutEnds:
         change = np.abs(speed[reach:] - speed[:-reach])
         self._top_speed = max(self._top_speed, float(np.abs(speed).max(initial=0.0)))
         if len(change):
-            self._usual_change = max(self._usual_change, float(np.quantile(change, _USUALLY)))
+            self._usual_change = max(self._usual_change, float(np.quantile(change[::_EVERY], _USUALLY)))
         self._samples += len(values)
         steps = np.abs(np.diff(values))
-        steps = steps[steps > 0]
-        self._changes += len(steps)
-        if len(steps):
-            self._resolution = min(self._resolution, float(np.quantile(steps, _FINEST)))
+        moving = steps[steps > 0]
+        self._changes += len(moving)
+        if len(moving):
+            self._resolution = min(self._resolution, float(np.quantile(moving, _FINEST)))
+        large = float(np.quantile(steps[::_EVERY], _USUALLY)) if len(steps) else 0.0
+        same = steps <= _ROUNDING * np.abs(values).max()
         for sign in (-1, 1):
-            found = _plateau(values, sign, np.abs(speed), reach)
+            found = _plateau(values, sign, same, _OVERSHOOT * large, np.abs(speed), reach)
             known = self._ends.get(sign, found)
             if np.isclose(found.value, known.value, rtol=_ROUNDING, atol=0.0):
                 self._ends[sign] = found.merged(known)
@@ -103,15 +107,17 @@ class CutEnds:
         return [end for end in self._ends.values() if end.samples >= least and end.drop > far]
 
 
-def _plateau(values: np.ndarray, sign: int, speed: np.ndarray, reach: int) -> Plateau:
+def _plateau(
+    values: np.ndarray, sign: int, same: np.ndarray, overshoot: float, speed: np.ndarray, reach: int
+) -> Plateau:
     """The longest stay at the largest (`sign` 1) or smallest value, with the highest speed at any.
 
-    `speed` is that over `reach` samples from each on. Where time stamps were repaired, the cubic overshoots the ends of a stay.
+    `same` (N - 1,) are the samples followed by their like, `speed` is that over `reach` samples from each on. Where time stamps were
+    repaired, the cubic overshoots the ends of a stay by up to `overshoot`.
     """
     extreme = float(sign * np.max(sign * values))
-    steps = np.abs(np.diff(values))
-    near = np.abs(values - extreme) <= _OVERSHOOT * (np.quantile(steps, _USUALLY) if len(steps) else 0.0)
-    same = (steps <= _ROUNDING * np.abs(values).max()) & near[1:] & near[:-1]
+    near = np.abs(values - extreme) <= overshoot
+    same = same & near[1:] & near[:-1]
     borders = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
     starts, ends = borders[::2], borders[1::2] + 1
     if not len(starts):
