@@ -19,7 +19,7 @@ from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
 
-SIDEBANDS = {False: 2, True: 6}
+ARM_SIDEBANDS, GAP_SIDEBANDS = 2, 6
 """Multiples of the reference frequency that are balanced on either side of the excited line, without and with open gaps."""
 
 ARM_PHASES = 8
@@ -47,7 +47,7 @@ def reference_shift(
     if motion.amplitude == 0.0:
         return np.zeros_like(still)
     count, size = rest.inputs, len(rest.mass)
-    sidebands = SIDEBANDS[opening is not None and bool(opening.any())]
+    sidebands = ARM_SIDEBANDS if opening is None or not opening.any() else GAP_SIDEBANDS
     mass, damping, stiffness = _arm_changes(robot, q, payload, motion, size, sidebands)
     mass[2 * sidebands] += rest.mass
     damping[2 * sidebands] += rest.damping

@@ -14,7 +14,8 @@ from flexcal.estimation.problem import Problem
 def profile_rise(problem: Problem, fitted: Estimate, x: np.ndarray, number: int) -> float:
     """Rise of the cost above that of `fitted` where parameter `number` is held as in `x` (p,) and the others are fitted from there.
 
-    Twice the rise is χ² with one degree of freedom at the true value (Wilks 1938). Where no fit is found it is infinite.
+    Twice the rise is χ² with one degree of freedom at the true value (Wilks 1938). Raises FlexcalError where the model cannot be
+    evaluated at `x`.
     """
     objective = Objective.of(problem, Squares(), problem.linearise(x)[0].size)
     free = np.arange(len(x)) != number
