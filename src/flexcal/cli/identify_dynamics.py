@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -45,12 +45,12 @@ class IdentifyDynamics:
 
     robot: Robot
     logs: Annotated[
-        Positional[tuple[Path, ...]],
+        Positional[Paths],
         arg(metavar="LOGS...", help="joint logs (CSV or Parquet), one or several", help_behavior_hint=""),
     ]
     hold_out: Annotated[str, arg(metavar="last:SHARE", help_behavior_hint="(for example last:0.3)")] = ""
     """Keep the last share of every log's time out of the fit, and predict its torques."""
-    validate: Annotated[tuple[Path, ...], arg(metavar="LOG...", help_behavior_hint="")] = ()
+    validate: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
     """Logs that the fit does not see, whose torques it predicts."""
     estimator: Annotated[
         Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"],

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class IdentifyGains:
 
     robot: Robot
     logs: Annotated[
-        Positional[tuple[Path, ...]],
+        Positional[Paths],
         arg(
             metavar="LOGS...",
             help="joint logs (CSV or Parquet), with and without payload",

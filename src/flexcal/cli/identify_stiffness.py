@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere
-from flexcal.cli.options import Json, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class IdentifyStiffness:
 
     robot: Robot
     responses: Annotated[
-        Positional[tuple[Path, ...]],
+        Positional[Paths],
         arg(
             metavar="RESPONSES...",
             help="files of 'identify response', or their folder",

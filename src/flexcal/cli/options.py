@@ -6,12 +6,22 @@ from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, arg
+from tyro.constructors import PrimitiveConstructorSpec
 
 from flexcal.errors import InputError
 
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
+_PATHS = PrimitiveConstructorSpec(
+    nargs="*",
+    metavar="FILE...",
+    instance_from_str=lambda texts: tuple(Path(text) for text in texts),
+    is_instance=lambda value: isinstance(value, tuple),
+    str_from_instance=lambda paths: [str(path) for path in paths],
+)
+Paths = Annotated[tuple, _PATHS]
+"""Any number of paths; `tuple[Path, ...]` would make tyro load a type checker, which takes longer than some fits."""
 PoseFiles = Annotated[
-    Positional[tuple[Path, ...]],
+    Positional[Paths],
     arg(
         metavar="POSES...",
         help="files of measured poses (CSV or Parquet), one or several",
