@@ -27,7 +27,7 @@ from flexcal.report.sections.torques import torques_section
 
 _TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Identified, and the torques can be trusted"),
-    "care": ("With care", "Identified; read the remarks before relying on it"),
+    "care": ("With care", "Identified; read what is not sure below before relying on it"),
     "bad": ("No", "Do not rely on these dynamics yet"),
 }
 

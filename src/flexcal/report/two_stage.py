@@ -29,7 +29,7 @@ from flexcal.report.study import TwoStageStudy
 
 TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Calibrated, and the numbers can be trusted"),
-    "care": ("With care", "Calibrated; read the remarks before relying on it"),
+    "care": ("With care", "Calibrated; read what is not sure below before relying on it"),
     "bad": ("No", "Do not rely on this calibration yet"),
     "unknown": ("Unknown", "Calibrated; nothing could be checked"),
 }

@@ -26,7 +26,7 @@ from flexcal.report.sections.provenance import provenance_section
 
 _TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Verified on fresh poses"),
-    "care": ("With care", "Verified; read the remarks before relying on it"),
+    "care": ("With care", "Verified; read what is not sure below before relying on it"),
     "bad": ("No", "Less accurate than predicted"),
     "unknown": ("Unknown", "Measured; nothing could be checked"),
 }

@@ -8,6 +8,9 @@ from typing import Any
 from flexcal.report.notation import significant
 from flexcal.report.page import Block, Section, Table, Text
 
+LONG = 12
+"""Rows from which the table of what was tried is folded away: the terms taken are said above it."""
+
 
 def friction_section(results: Mapping[str, Any]) -> Section:
     """The terms in the model and, where some were chosen from the recordings, everything that was tried."""
@@ -35,6 +38,7 @@ def friction_section(results: Mapping[str, Any]) -> Section:
                 "Errors are of parts of the training data that were left out in turn, as a share of the norm of the torques. In bold: "
                 f"what was taken; {rule}.",
                 strong=(taken,),
+                folded=len(rows) > LONG,
             )
         )
     else:
