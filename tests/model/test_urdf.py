@@ -85,14 +85,14 @@ def test_one_sentence_with_line_and_name(tmp_path: Path, right: str, wrong: str,
     assert ARM.count(right) == 1
     (tmp_path / "arm.urdf").write_text(ARM.replace(right, wrong))
     with pytest.raises(InputError) as caught:
-        read_urdf(tmp_path / "arm.urdf")
+        read_urdf(tmp_path / "arm.urdf", {})
     assert str(caught.value).startswith(f"{tmp_path / 'arm.urdf'} {sentence}")
     assert "\n" not in str(caught.value) and str(caught.value).endswith(".")
 
 
 def test_the_sound_file(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(ARM)
-    found = read_urdf(tmp_path / "arm.urdf")
+    found = read_urdf(tmp_path / "arm.urdf", {})
     (joint,) = found.joints
     assert (joint.name, joint.link, joint.lower, joint.upper) == ("shoulder", "boom", -2.0, 2.0)
     np.testing.assert_array_equal(joint.axis, [0, 1, 0])
@@ -102,7 +102,7 @@ def test_the_sound_file(tmp_path: Path) -> None:
 def test_what_only_the_parser_sees_is_said_in_its_words(tmp_path: Path) -> None:
     (tmp_path / "arm.urdf").write_text(ARM.replace('<robot name="arm">', "<robot>"))
     with pytest.raises(InputError, match=r"not a valid URDF \(No name given for the robot") as caught:
-        read_urdf(tmp_path / "arm.urdf")
+        read_urdf(tmp_path / "arm.urdf", {})
     assert "\n" not in str(caught.value)
 
 
@@ -110,4 +110,4 @@ def test_what_only_the_parser_sees_is_said_in_its_words(tmp_path: Path) -> None:
 def test_files_that_are_no_robot(tmp_path: Path, text: str) -> None:
     (tmp_path / "arm.urdf").write_text(text)
     with pytest.raises(InputError, match=r"no link|not <robot>|no movable joint"):
-        read_urdf(tmp_path / "arm.urdf")
+        read_urdf(tmp_path / "arm.urdf", {})

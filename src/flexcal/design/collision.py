@@ -12,6 +12,7 @@ from flexcal.design.joint_space import even_configurations
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.model.kinematics import joint_batch
+from flexcal.model.urdf import locked_joints
 
 _SAMPLES = 200
 _FLOOR = "floor"
@@ -33,11 +34,11 @@ class CollisionChecker:
 
     `margin` (m): bodies nearer than this count as touching. `floor` is the height (m, along z of the base frame) below which nothing
     but the base and the first link may reach: the surface on which the robot stands; None for no such surface. Shapes of one link
-    (fixed joints belong to the link that carries them) and of neighbouring links are never compared. Nor are pairs that overlap in each
-    of 200 configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names them. Pairs that never
-    come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull. A payload, the
-    reflector's mount and cables have no shape and are not seen. Without collision shapes in the URDF nothing collides. Raises
-    `InputError` where shapes or obstacles cannot be read.
+    (those on fixed and locked joints belong to the link that carries them) and of neighbouring links are never compared. Nor are pairs
+    that overlap in each of 200 configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names
+    them. Pairs that never come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull;
+    `package://name/` is looked for in every folder above the URDF. A payload, the reflector's mount and cables have no shape and are
+    not seen. Without collision shapes in the URDF nothing collides. Raises `InputError` where shapes or obstacles cannot be read.
     """
 
     def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
@@ -47,8 +48,12 @@ class CollisionChecker:
         self.model = model
         self.margin = margin
         self.floor = floor
-        self._model: Any = pin.buildModelFromUrdf(str(model.urdf))
-        self._geometry = _shapes(self._model, model.urdf)
+        whole = pin.buildModelFromUrdf(str(model.urdf))
+        shapes = _shapes(whole, model.urdf)
+        self._model: Any
+        self._model, self._geometry = pin.buildReducedModel(
+            whole, shapes, *locked_joints(whole, model.config.locked)
+        )
         own = self._geometry.ngeoms
         for name in model.config.obstacles:
             _add_obstacle(self._geometry, model.path.parent / name)
@@ -164,12 +169,16 @@ def _shapes(pin_model: Any, urdf: Path) -> Any:
 
     try:
         geometry = pin.buildGeomFromUrdf(
-            pin_model, str(urdf), pin.GeometryType.COLLISION, package_dirs=[str(urdf.parent)]
+            pin_model,
+            str(urdf),
+            pin.GeometryType.COLLISION,
+            package_dirs=[str(above) for above in urdf.absolute().parents],
         )
     except (ValueError, RuntimeError) as problem:
         reason = str(problem).strip().splitlines()[0]
         raise InputError(
-            f"{urdf}: its collision shapes cannot be read ({reason}); put the meshes beside it or use primitives."
+            f"{urdf}: its collision shapes cannot be read ({reason}); put the meshes beside it, or the package into a folder "
+            "above it, or use primitives."
         ) from problem
     for item in geometry.geometryObjects:
         if isinstance(item.geometry, coal.BVHModelBase):

@@ -193,10 +193,11 @@ class SignalConfig:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """The whole of robot.yaml."""
+    """The whole of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and where (rad or m)."""
 
     robot: str
     points: dict[str, PointConfig] = field(default_factory=dict)
+    locked: dict[str, float] = field(default_factory=dict)
     payload: PayloadConfig | None = None
     gravity: Triple = (0.0, 0.0, -9.81)
     prior: PriorConfig = PriorConfig()

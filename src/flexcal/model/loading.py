@@ -25,7 +25,7 @@ def load_robot(path: Path, *, estimates: bool) -> RobotModel:
     file = read_yaml_file(path)
     config = file.structure(RobotConfig)
     urdf = path.parent / config.robot
-    description = read_urdf(urdf)
+    description = read_urdf(urdf, config.locked)
     model = _assemble(file, config, urdf, description)
     stored = path.parent / config.estimates
     if estimates and stored.exists():

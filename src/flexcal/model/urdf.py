@@ -5,11 +5,11 @@ from __future__ import annotations
 import os
 import sys
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class Frame:
 
 @dataclass(frozen=True, eq=False)
 class Description:
-    """What flexcal takes from a URDF: movable joints, the inertia each carries (fixed children merged), all frames.
+    """What flexcal takes from a URDF: movable joints, the inertia each carries (fixed and locked children merged), all frames.
 
     Joints stand depth first, branches in the order of the file; Pinocchio sorts them by name.
     """
@@ -42,22 +42,24 @@ class Description:
     frames: dict[str, Frame]
 
 
-def read_urdf(path: Path) -> Description:
-    """Read a URDF of revolute, continuous, prismatic and fixed joints.
+def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
+    """Read a URDF of revolute, continuous, prismatic and fixed joints; those `locked` at a position (rad or m) count as fixed.
 
     Raises `InputError`, with line and link or joint, where the file is missing, incomplete or unreadable, where it has no movable joint,
-    and for other joint types.
+    for other joint types, and where a joint cannot be locked.
     """
     import pinocchio as pin
 
     if not path.is_file():
         raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
-    links = carried_links(read_elements(path))
+    links = carried_links(read_elements(path), locked)
     with _silenced() as said:
         try:
             model = pin.buildModelFromUrdf(str(path))
         except (ValueError, RuntimeError) as problem:
             raise InputError(f"{path}: not a valid URDF ({_first_complaint(said)}); correct it.") from problem
+    _check_locked(path, model, locked)
+    model = pin.buildReducedModel(model, *locked_joints(model, locked))
     if model.njoints < 2:
         raise InputError(f"{path}: the URDF has no movable joint; a robot needs at least one.")
     order = [model.getJointId(name) for name in links if model.existJointName(name)]
@@ -94,6 +96,35 @@ def read_urdf(path: Path) -> Description:
         for f in model.frames
     }
     return Description(model.name, tuple(joints), inertias, frames)
+
+
+def locked_joints(model: Any, locked: Mapping[str, float]) -> tuple[list[int], np.ndarray]:
+    """What Pinocchio's `buildReducedModel` needs to lock joints at positions (rad or m): their numbers, and a configuration (nq,)."""
+    import pinocchio as pin
+
+    q = pin.neutral(model)
+    for name, position in locked.items():
+        joint = model.joints[model.getJointId(name)]
+        q[joint.idx_q : joint.idx_q + joint.nq] = (
+            position if joint.nq == 1 else (np.cos(position), np.sin(position))
+        )
+    return [model.getJointId(name) for name in locked], q
+
+
+def _check_locked(path: Path, model: Any, locked: Mapping[str, float]) -> None:
+    for name, position in locked.items():
+        if not model.existJointName(name):
+            raise InputError(
+                f"{path}: there is no movable joint '{name}' to lock; there are {', '.join(model.names[1:])}; "
+                "correct `locked:` in robot.yaml."
+            )
+        joint = model.joints[model.getJointId(name)]
+        lower, upper = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+        if joint.nq == 1 and not lower <= position <= upper:
+            raise InputError(
+                f"{path}: '{name}' is locked at {position:g}, but its limits are {lower:g} and {upper:g}; "
+                "correct `locked:` in robot.yaml."
+            )
 
 
 def _kind_and_axis(joint) -> tuple[str, np.ndarray]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 
 import numpy as np
 
@@ -14,10 +14,11 @@ _ROUNDING = 1e-9
 """Share of its largest moment by which an inertia may fail to be positive."""
 
 
-def carried_links(robot: Element) -> dict[str, str]:
+def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
     """The link that each joint carries, of a URDF that is complete; depth first, branches in the order of the file.
 
-    Raises `InputError` with file, line and link or joint where it is incomplete, unreadable or asks for what flexcal does not have.
+    Raises `InputError` with file, line and link or joint where it is incomplete, unreadable or asks for what flexcal does not have; of
+    joints that mimic others, the `locked` ones are none of that.
     """
     if robot.tag != "robot":
         raise robot.error(f"the root element is <{robot.tag}>, not <robot>; give a URDF file.")
@@ -35,6 +36,10 @@ def carried_links(robot: Element) -> dict[str, str]:
     carried: dict[str, str] = {}
     parents: dict[str, str] = {}
     for name, joint in joints.items():
+        if joint.find("mimic") is not None and name not in locked:
+            raise joint.error(
+                f"joint '{name}' mimics another one, which flexcal does not handle; say where it stands under `locked:` in robot.yaml."
+            )
         parent, child = _check_joint(joint, name, links)
         if child in parents:
             other = next(joint for joint, link in carried.items() if link == child)
@@ -104,10 +109,6 @@ def _check_joint(joint: Element, name: str, links: dict[str, Element]) -> tuple[
     if kind not in KINDS:
         what = f"is of the type '{kind}'" if kind else "has no type"
         raise joint.error(f"{owner} {what}, which flexcal does not handle; use {', '.join(KINDS)}.")
-    if joint.find("mimic") is not None:
-        raise joint.error(
-            f"{owner} mimics another one, which flexcal does not handle; make it fixed, or free."
-        )
     ends = []
     for tag in ("parent", "child"):
         end = joint.find(tag)
