@@ -17,7 +17,7 @@ from flexcal.design.criteria import (
     TraceOptimal,
     observability,
 )
-from flexcal.design.exchange import Selection, exchange
+from flexcal.design.exchange import Selection
 from flexcal.design.pose_sensitivity import (
     BaseSensitivity,
     base_sensitivity,
@@ -26,6 +26,7 @@ from flexcal.design.pose_sensitivity import (
 )
 from flexcal.design.preload import preload_joints, preloaded
 from flexcal.design.setup import STANDARD, MeasuringSetup
+from flexcal.design.shortlist import choose
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability
 from flexcal.model import RobotModel, gravity_torque
@@ -151,7 +152,7 @@ def design_poses(
         working = random_candidates(checker, WORKING_POSES, rng, anywhere)
     weight = tool_weight(base, model, working, setup)
     wanted = criterion_named(criterion, weight)
-    selection = exchange(base.sensitivity, count, wanted, progress=progress)
+    selection = choose(base.sensitivity, count, wanted, progress=progress)
     chosen = pool.q[selection.chosen]
     loose = list(preload_joints(model))
     return PoseDesign(
