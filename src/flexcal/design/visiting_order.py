@@ -49,7 +49,9 @@ def visiting_order(checker: CollisionChecker, q: np.ndarray, *, point: str | Non
             break
         order = short_tour(cost, start=order)
     ways = _moves(order)
-    touching = [known[move] if move in known else blocked(checker, q[move[0]], q[move[1]]) for move in ways]
+    touching = [
+        known[a, b] if (a, b) in known else blocked(checker, q[a], q[b], point=point) for a, b in ways
+    ]
     return VisitingOrder(order, seconds[order[:-1], order[1:]], np.array(touching, dtype=bool))
 
 
