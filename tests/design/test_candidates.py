@@ -2,7 +2,6 @@ import numpy as np
 import pytest
 
 from flexcal.design import (
-    Acceptance,
     CollisionChecker,
     MeasuringSetup,
     joint_ranges,
@@ -13,6 +12,7 @@ from flexcal.design import (
 from flexcal.design.joint_space import LIMIT_MARGIN
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
+from flexcal.model.config import AcceptanceConfig
 from flexcal.units import DEGREE
 
 
@@ -44,6 +44,6 @@ def test_the_same_seed_gives_the_same_poses(tx90l):
 
 def test_an_impossible_wish_says_what_threw_the_poses_out(tx90l, rng):
     checker = CollisionChecker(tx90l)
-    narrow = Acceptance(np.array([1.0, 0, 0]), 0.001 * DEGREE)
+    narrow = AcceptanceConfig((1.0, 0.0, 0.0), 0.001 * DEGREE)
     with pytest.raises(FlexcalError, match=r"only 0 of the wanted 20 .* visibility threw out"):
         random_candidates(checker, 20, rng, MeasuringSetup(acceptance=narrow))

@@ -56,7 +56,7 @@ def test_29_directions_are_kept(design):
 
 
 def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design, rng):
-    from flexcal.design.poses import tool_weight
+    from flexcal.design.pose_candidates import tool_weight
 
     fresh = tool_weight(design.base, tx90l, random_poses(tx90l, 400, rng).q)
     chosen = tool_error(design.base, fresh, design.selection.chosen)

@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from flexcal.design import (
-    Acceptance,
     CollisionChecker,
     MeasuringSetup,
     link_frames,
@@ -14,6 +13,7 @@ from flexcal.design import (
 from flexcal.design.visibility import blocked, station_position
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
+from flexcal.model.config import AcceptanceConfig
 from flexcal.model.rotations import rpy_rotation
 from flexcal.units import DEGREE
 
@@ -71,7 +71,7 @@ def test_acceptance_is_an_angle_about_the_axis(tx90l, rng):
     q = rng.uniform(-2, 2, (400, 6))
     free = visible(checker, q)
     narrow = visible(
-        checker, q, MeasuringSetup(acceptance=Acceptance(np.array([0.0, 0.0, 2.0]), 40 * DEGREE))
+        checker, q, MeasuringSetup(acceptance=AcceptanceConfig((0.0, 0.0, 2.0), 40 * DEGREE))
     )
     motion = point_kinematics(tx90l, q, jacobians=False)
     towards = np.array([2.5, 0, 1]) - motion.position
@@ -89,4 +89,4 @@ def test_bad_input(tx90l):
     with pytest.raises(FlexcalError, match="no station 'x'"):
         station_position(tx90l, "x")
     with pytest.raises(FlexcalError, match="not all zero"):
-        Acceptance(np.zeros(3))
+        AcceptanceConfig((0.0, 0.0, 0.0))

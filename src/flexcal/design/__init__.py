@@ -20,22 +20,27 @@ from flexcal.design.pose_sensitivity import (
     geometry_jacobian,
     pose_sensitivity,
 )
+from flexcal.design.next_poses import NextPoses, next_poses
+from flexcal.design.pose_candidates import PoseCandidates, pose_candidates
 from flexcal.design.poses import CriterionName, PoseDesign, design_poses, random_poses
 from flexcal.design.preload import preloaded
-from flexcal.design.setup import Acceptance, MeasuringSetup, TrackerNoise
+from flexcal.design.setup import MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
 from flexcal.design.trajectories import design_trajectories
 from flexcal.design.visibility import visible
+from flexcal.design.visiting_order import VisitingOrder, visiting_order
+from flexcal.design.working_volume import WorkingVolume, working_box, working_points
 
 __all__ = [
-    "Acceptance",
     "BaseSensitivity",
     "CollisionChecker",
     "Criterion",
     "CriterionName",
     "DOptimal",
     "MeasuringSetup",
+    "NextPoses",
     "Observability",
+    "PoseCandidates",
     "PoseCurve",
     "PoseDesign",
     "Selection",
@@ -43,6 +48,8 @@ __all__ = [
     "Tolerances",
     "TraceOptimal",
     "TrackerNoise",
+    "VisitingOrder",
+    "WorkingVolume",
     "base_sensitivity",
     "design_poses",
     "design_trajectories",
@@ -52,11 +59,16 @@ __all__ = [
     "joint_origins",
     "joint_ranges",
     "link_frames",
+    "next_poses",
     "observability",
+    "pose_candidates",
     "pose_curve",
     "pose_sensitivity",
     "preloaded",
     "random_candidates",
     "random_poses",
     "visible",
+    "visiting_order",
+    "working_box",
+    "working_points",
 ]

@@ -35,7 +35,7 @@ def random_candidates(
     model = checker.model
     lower, upper = joint_ranges(model)
     checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-        "floor": lambda q: _above_floor(checker, q, setup.point)
+        "floor": lambda q: above_floor(checker, q, setup.point)
     }
     if preload:
         checks["flank preload"] = lambda q: preloaded(model, q, setup.payload)
@@ -65,7 +65,8 @@ def random_candidates(
     return np.concatenate(found or [np.zeros((0, model.n))])[:count]
 
 
-def _above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None) -> np.ndarray:
+def above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None = None) -> np.ndarray:
+    """Whether the target is above the floor, by the checker's margin, at each configuration of `q` (samples, n), as (samples,) of bool."""
     if checker.floor is None:
         return np.ones(len(q), dtype=bool)
     position = point_kinematics(checker.model, q, point=point, jacobians=False).position

@@ -24,6 +24,8 @@ class Tolerances:
     station: float = 10 * MILLIMETRE
 
 
+BLOCK = 512
+"""Poses whose rows are found together: what they need stays in the processor's cache."""
 TYPICAL = Tolerances()
 """A well-made industrial robot, and an instrument whose place was measured with a tape."""
 
@@ -63,14 +65,18 @@ def pose_sensitivity(
 
     Where robot.yaml does not say where the instrument stands, its distance is taken as twice the robot's reach.
     """
-    names, jacobian = geometry_jacobian(model, q, setup)
+    names, _ = geometry_jacobian(model, q[:1], setup)
     origin = station_position(model, setup.station)
     position = point_kinematics(model, q, point=setup.point, jacobians=False).position
     apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
+    std = setup.noise.std(apart)
     parameters = Parameters(
         Parameter(name, unit_of(name), 0.0, prior_std=_tolerance(name, tolerances)) for name in names
     )
-    whitened = jacobian / setup.noise.std(apart)[:, None, None]
+    whitened = np.empty((len(q), 3, len(names)))
+    for first in range(0, len(q), BLOCK):
+        part = slice(first, first + BLOCK)
+        whitened[part] = geometry_jacobian(model, q[part], setup)[1] / std[part, None, None]
     return Sensitivity(whitened, parameters, parameters.prior_information())
 
 
@@ -111,8 +117,7 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
         )
     # σ_min has a meaning in declared units only: the station is scaled like any other length
     scale = np.where([p.unit == "rad" for p in full.parameters], tolerance, _length_scale(full.parameters))
-    rows = full.jacobian.reshape(-1, len(full.parameters))
-    found = analyse(rows, full.parameters.names, scale=scale)
+    found = analyse(_triangle(full.jacobian), full.parameters.names, scale=scale)
     kept = list(found.kept)
     spread = found.regrouping * tolerance / scale[kept][:, None]
     factor = np.linalg.qr(spread.T, mode="r")
@@ -120,6 +125,17 @@ def base_sensitivity(full: Sensitivity) -> BaseSensitivity:
     parameters = Parameters(Parameter(name, "1", 0.0) for name in found.kept_names)
     sensitivity = Sensitivity(full.jacobian[:, :, kept] * scale[kept], parameters, root @ root.T)
     return BaseSensitivity(sensitivity, found, scale[kept])
+
+
+def _triangle(jacobian: np.ndarray) -> np.ndarray:
+    """The rows of a `jacobian` (candidates, r, p) where they are few, else an R (p, p) with the same RᵀR, found block by block."""
+    if len(jacobian) <= 16 * BLOCK:
+        return jacobian.reshape(-1, jacobian.shape[2])
+    factor = np.zeros((0, jacobian.shape[2]))
+    for first in range(0, len(jacobian), BLOCK):
+        rows = jacobian[first : first + BLOCK].reshape(-1, jacobian.shape[2])
+        factor = np.linalg.qr(np.vstack([factor, rows]), mode="r")
+    return factor
 
 
 def _length_scale(parameters: Parameters) -> float:

@@ -17,23 +17,18 @@ from flexcal.design.criteria import (
     TraceOptimal,
     observability,
 )
-from flexcal.design.exchange import Selection, exchange
-from flexcal.design.pose_sensitivity import (
-    BaseSensitivity,
-    base_sensitivity,
-    geometry_jacobian,
-    pose_sensitivity,
-)
-from flexcal.design.preload import preload_joints, preloaded
+from flexcal.design.exchange import Selection
+from flexcal.design.pose_candidates import PoseCandidates, pose_candidates
+from flexcal.design.pose_sensitivity import BaseSensitivity
+from flexcal.design.preload import preload_joints
 from flexcal.design.setup import STANDARD, MeasuringSetup
+from flexcal.design.shortlist import choose
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability
 from flexcal.model import RobotModel, gravity_torque
 from flexcal.progress import Progress, silent
 
 CriterionName = Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"]
-WORKING_POSES = 300
-"""Random poses over the whole workspace for which c-optimal design predicts the tool error, unless others are given."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +48,33 @@ class PoseDesign:
     tool_weight: np.ndarray
     flank_joints: tuple[str, ...]
     flank: np.ndarray
+
+    @classmethod
+    def of(
+        cls, found: PoseCandidates, criterion: Criterion, selection: Selection, rng: np.random.Generator
+    ) -> PoseDesign:
+        """The design that takes this `selection` of the candidates; `rng` draws the plan's seed."""
+        chosen = found.pool.q[selection.chosen]
+        loose = list(preload_joints(found.model))
+        return cls(
+            plan=_plan(chosen, found.setup, rng),
+            criterion=criterion,
+            candidates=found.pool,
+            selection=selection,
+            base=found.base,
+            tool_weight=found.tool_weight,
+            flank_joints=tuple(found.model.joint_names[i] for i in loose),
+            flank=np.sign(gravity_torque(found.model, chosen, found.setup.payload))[:, loose],
+        )
+
+    def in_order(self, order: np.ndarray) -> PoseDesign:
+        """The same poses in this order (N,)."""
+        return replace(
+            self,
+            plan=replace(self.plan, q=self.plan.q[order]),
+            selection=replace(self.selection, chosen=self.selection.chosen[order]),
+            flank=self.flank[order],
+        )
 
     @property
     def identifiability(self) -> Identifiability:
@@ -116,54 +138,32 @@ def design_poses(
 ) -> PoseDesign:
     """Choose `count` of many random poses, or of a pool of given ones, by exchange (P1 §5.2).
 
-    Random candidates keep to the joint limits, collide with nothing (`checker`, by default with 10 mm of margin and a floor at the base)
-    and show the target to the instrument; those of a pool are taken to. In all of them gravity must surely preload every backlash:
-    others are left out. Their sensitivities to the geometric errors are reduced to what can be identified. Criteria: `c` the tool
-    error predicted over the `working` poses (W, n), by default random ones over the whole workspace; `A` the sum of the
-    variances in units of the tolerances; `D` the volume of the confidence ellipsoid; `E` σ_min of ΘᵀΘ; `O1`-`O5` the
-    observability indices. A pool's payload counts for it where `setup` has none.
+    What counts as a candidate, and `working`, are as in `pose_candidates`. Their sensitivities to the geometric errors are reduced to
+    what can be identified. Criteria: `c` the tool error predicted over the working poses; `A` the sum of the variances in units of the
+    tolerances; `D` the volume of the confidence ellipsoid; `E` σ_min of ΘᵀΘ; `O1`-`O5` the observability indices.
 
     Raises `FlexcalError` for an unknown criterion, where the poses are fewer than the parameters need, where too few candidates pass the
     checks, and where all of them press a backlash onto one flank.
     """
-    checker = CollisionChecker(model) if checker is None else checker
-    if isinstance(candidates, PosePool):
-        if setup.payload is None:
-            setup = replace(setup, payload=candidates.payload)
-        pool = candidates.subset(preloaded(model, candidates.q, setup.payload))
-        if len(pool) < count:
-            raise FlexcalError(
-                f"the pool holds {len(candidates)} poses, and gravity surely settles the flank of every backlash in {len(pool)} of them; "
-                f"{count} cannot be chosen."
-            )
-    else:
-        q = random_candidates(checker, candidates, rng, setup, preload=True, progress=progress)
-        pool = PosePool(q, np.arange(1, len(q) + 1))
-    _check_flanks(model, pool.q, setup.payload)
-    base = base_sensitivity(pose_sensitivity(model, pool.q, setup))
-    if 3 * count < base.identifiability.rank:
-        raise FlexcalError(
-            f"{count} poses cannot determine {base.identifiability.rank} geometric parameters of {model.name}; "
-            f"choose at least {-(-base.identifiability.rank // 3)}, better twice as many."
-        )
-    if working is None:
-        anywhere = replace(setup, acceptance=None)
-        working = random_candidates(checker, WORKING_POSES, rng, anywhere)
-    weight = tool_weight(base, model, working, setup)
-    wanted = criterion_named(criterion, weight)
-    selection = exchange(base.sensitivity, count, wanted, progress=progress)
-    chosen = pool.q[selection.chosen]
-    loose = list(preload_joints(model))
-    return PoseDesign(
-        plan=_plan(chosen, setup, rng),
-        criterion=wanted,
-        candidates=pool,
-        selection=selection,
-        base=base,
-        tool_weight=weight,
-        flank_joints=tuple(model.joint_names[i] for i in loose),
-        flank=np.sign(gravity_torque(model, chosen, setup.payload))[:, loose],
+    found = pose_candidates(
+        model,
+        rng=rng,
+        candidates=candidates,
+        least=count,
+        setup=setup,
+        working=working,
+        checker=checker,
+        progress=progress,
     )
+    rank = found.base.identifiability.rank
+    if 3 * count < rank:
+        raise FlexcalError(
+            f"{count} poses cannot determine {rank} geometric parameters of {model.name}; "
+            f"choose at least {-(-rank // 3)}, better twice as many."
+        )
+    wanted = criterion_named(criterion, found.tool_weight)
+    selection = choose(found.base.sensitivity, count, wanted, progress=progress)
+    return PoseDesign.of(found, wanted, selection, rng)
 
 
 def random_poses(
@@ -180,16 +180,6 @@ def random_poses(
     """
     checker = CollisionChecker(model) if checker is None else checker
     return _plan(random_candidates(checker, count, rng, setup), setup, rng)
-
-
-def tool_weight(
-    base: BaseSensitivity, model: RobotModel, working: np.ndarray, setup: MeasuringSetup = STANDARD
-) -> np.ndarray:
-    """W = mean over the `working` poses (W, n) of JᵀJ (rank, rank), m²: tr(W Σ) is the mean square error of the tool position."""
-    names, jacobian = geometry_jacobian(model, working, setup)
-    assert names == base.identifiability.names
-    rows = base.columns(jacobian).reshape(-1, len(base.scale))
-    return rows.T @ rows / len(jacobian)
 
 
 def criterion_named(name: CriterionName, weight: np.ndarray) -> Criterion:
@@ -209,13 +199,3 @@ def criterion_named(name: CriterionName, weight: np.ndarray) -> Criterion:
 def _plan(q: np.ndarray, setup: MeasuringSetup, rng: np.random.Generator) -> PosePlan:
     masses = None if setup.payload is None else np.full(len(q), setup.payload)
     return PosePlan(q=q, payload=masses, seed=int(rng.integers(2**31)))
-
-
-def _check_flanks(model: RobotModel, q: np.ndarray, payload: float | None) -> None:
-    torque = gravity_torque(model, q, payload)
-    for i in preload_joints(model):
-        if np.all(torque[:, i] > 0) or np.all(torque[:, i] < 0):
-            raise FlexcalError(
-                f"gravity presses {model.joint_names[i]} onto the same flank in all {len(q)} usable poses, so its backlash cannot be "
-                "told from its offset; loosen what restricts the poses, or take it from `geometry: backlash:`."
-            )

@@ -13,6 +13,9 @@ LEAST_TORQUE = 10.0
 LEAST_SHARE = 0.05
 """Share of the largest gravity torque of the joint below which a backlash does not count as preloaded."""
 
+BLOCK = 512
+"""Poses whose torques are judged together: what they need stays in the processor's cache."""
+
 
 def preload_joints(model: RobotModel) -> tuple[int, ...]:
     """The revolute joints that are declared to have backlash."""
@@ -27,8 +30,12 @@ def preloaded(model: RobotModel, q: np.ndarray, payload: float | None = None) ->
     joints = list(preload_joints(model))
     if not joints or not len(q):
         return np.ones(len(q), dtype=bool)
-    torque = gravity_torque(model, q, payload)
-    certain = certain_flank(model, q, torque, payload)[:, joints]
     largest = np.abs(gravity_torque(model, even_configurations(model, 1000), payload))[:, joints].max(axis=0)
     least = np.maximum(LEAST_TORQUE, LEAST_SHARE * largest)
-    return np.all(certain & (np.abs(torque[:, joints]) > least), axis=1)
+    torque = gravity_torque(model, q, payload)
+    sure = np.all(np.abs(torque[:, joints]) > least, axis=1)
+    large = np.flatnonzero(sure)
+    for first in range(0, len(large), BLOCK):
+        part = large[first : first + BLOCK]
+        sure[part] = np.all(certain_flank(model, q[part], torque[part], payload)[:, joints], axis=1)
+    return sure

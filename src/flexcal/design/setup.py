@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.errors import FlexcalError
-from flexcal.units import DEGREE
+from flexcal.model import RobotModel
+from flexcal.model.config import AcceptanceConfig
 
 
 @dataclass(frozen=True)
@@ -22,25 +22,6 @@ class TrackerNoise:
         return self.constant + self.proportional * distance
 
 
-@dataclass(frozen=True, eq=False)
-class Acceptance:
-    """A reflector fixed to the tool sees within `half_angle` (rad) of `axis` (3,), given in the frame of its point.
-
-    A spherically mounted reflector accepts ±30°. One that the user turns towards the instrument by hand needs none of this.
-    """
-
-    axis: np.ndarray
-    half_angle: float = 30 * DEGREE
-
-    def __post_init__(self) -> None:
-        axis = np.asarray(self.axis, dtype=float)
-        if axis.shape != (3,) or not np.linalg.norm(axis) > 0 or not 0 < self.half_angle <= np.pi:
-            raise FlexcalError(
-                "an acceptance needs an axis of three numbers, not all zero, and a half angle between 0 and π."
-            )
-        object.__setattr__(self, "axis", axis / np.linalg.norm(axis))
-
-
 @dataclass(frozen=True)
 class MeasuringSetup:
     """How poses are measured: the target `point` and the instrument's `station` by name (None: the first declared ones).
@@ -53,7 +34,13 @@ class MeasuringSetup:
     station: str | None = None
     payload: float | None = None
     noise: TrackerNoise = TrackerNoise()
-    acceptance: Acceptance | None = None
+    acceptance: AcceptanceConfig | None = None
+
+    @classmethod
+    def declared(cls, model: RobotModel, payload: float | None = None) -> MeasuringSetup:
+        """The first point as robot.yaml declares it, with the acceptance of its reflector."""
+        point = next(iter(model.config.points), None)
+        return cls(payload=payload, acceptance=None if point is None else model.config.points[point].acceptance)
 
 
 STANDARD = MeasuringSetup()

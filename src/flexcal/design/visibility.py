@@ -44,7 +44,8 @@ def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = ST
     seen = np.ones(len(q), dtype=bool)
     if setup.acceptance is not None:
         towards = origin - target.position
-        cosine = np.einsum("sij,j,si->s", target.orientation, setup.acceptance.axis, towards)
+        axis = np.array(setup.acceptance.axis) / np.linalg.norm(setup.acceptance.axis)
+        cosine = np.einsum("sij,j,si->s", target.orientation, axis, towards)
         seen = cosine >= np.cos(setup.acceptance.half_angle) * np.linalg.norm(towards, axis=1)
     if model.config.stations[setup.station or model.stations[0]].line_of_sight:
         left = np.flatnonzero(seen)

@@ -4,6 +4,7 @@ from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.energy_regressor import energy_regressor
 from flexcal.model.equilibrium import Equilibrium, gravity_torque, static_equilibrium
 from flexcal.model.inertia import Inertia
+from flexcal.model.inverse_kinematics import reach_points
 from flexcal.model.joint import Joint
 from flexcal.model.kinematics import PointKinematics, point_kinematics
 from flexcal.model.point import Payload, Point
@@ -25,6 +26,7 @@ __all__ = [
     "inertial_names",
     "inertial_parameters",
     "point_kinematics",
+    "reach_points",
     "static_equilibrium",
     "torque_regressor",
     "torque_regressor_adjoint",

@@ -11,11 +11,26 @@ Triple = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
+class AcceptanceConfig:
+    """A reflector fixed to the tool is seen within `half_angle` (rad) of its `axis`, in the frame of the point: ±30° if not said."""
+
+    axis: Triple
+    half_angle: float = 0.5236
+
+    def __post_init__(self) -> None:
+        if not any(self.axis) or not 0 < self.half_angle <= 3.1416:
+            raise FlexcalError(
+                "an acceptance needs an axis of three numbers, not all zero, and a half_angle between 0 and 3.1416 rad."
+            )
+
+
+@dataclass(frozen=True)
 class PointConfig:
-    """A reflector: nominal position `xyz` (m) in the URDF frame `frame`."""
+    """A reflector: nominal position `xyz` (m) in the URDF frame `frame`; `acceptance` where it does not turn towards the instrument."""
 
     frame: str
     xyz: Triple
+    acceptance: AcceptanceConfig | None = None
 
 
 @dataclass(frozen=True)
@@ -166,6 +181,18 @@ class StationConfig:
 
 
 @dataclass(frozen=True)
+class WorkingVolumeConfig:
+    """The box in which the robot will work: smallest and largest coordinates of the target (m), in the robot's base frame."""
+
+    lower: Triple
+    upper: Triple
+
+    def __post_init__(self) -> None:
+        if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
+            raise FlexcalError("every coordinate of a working volume's lower corner must be below the upper one's.")
+
+
+@dataclass(frozen=True)
 class ControllerConfig:
     """Joint-side PD gains (N m/rad, N m s/rad) and the rate (Hz) of the position controller."""
 
@@ -207,6 +234,7 @@ class RobotConfig:
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
     obstacles: tuple[str, ...] = ()
+    working_volume: WorkingVolumeConfig | None = None
     controller: ControllerConfig | None = None
     signals: dict[str, SignalConfig] = field(default_factory=dict)
     estimates: str = "estimates.yaml"

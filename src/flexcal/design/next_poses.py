@@ -1,0 +1,115 @@
+"""What to measure next, given what has been measured, and when to stop."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data import PoseSet
+from flexcal.design.best_possible import least_trace
+from flexcal.design.criteria import SpectralCriterion, TraceOptimal
+from flexcal.design.exchange import greedy
+from flexcal.design.pose_candidates import PoseCandidates
+from flexcal.design.pose_sensitivity import geometry_jacobian
+from flexcal.design.poses import CriterionName, PoseDesign, criterion_named, tool_error
+from flexcal.design.setup import MeasuringSetup
+from flexcal.design.visibility import station_position
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Sensitivity
+from flexcal.model import RobotModel, point_kinematics
+
+AVERAGING = 0.1
+"""Where no choice of as many poses could predict a tool error smaller by more than this share, more poses only average."""
+
+
+@dataclass(frozen=True, eq=False)
+class NextPoses:
+    """The K poses of `design`, the best first, each the best after those before it and the `measured` ones (their number).
+
+    `tool_error` (K + 1,), m, is predicted after none, one, ... of them; `possible` (K + 1,) is what no choice of as many poses in all
+    could be below. The `base` of the design counts the measured poses as known before.
+    """
+
+    design: PoseDesign
+    measured: int
+    tool_error: np.ndarray
+    possible: np.ndarray
+
+    def enough(self, wanted: float | None = None) -> int | None:
+        """After how many of these poses to stop: the tool error is at most `wanted` (m), or averaging is all that is left; None for never."""
+        limit = (1 + AVERAGING) * self.possible if wanted is None else wanted
+        good = np.flatnonzero(self.tool_error <= limit)
+        return int(good[0]) if len(good) else None
+
+
+def next_poses(
+    found: PoseCandidates,
+    measured: PoseSet,
+    count: int,
+    *,
+    rng: np.random.Generator,
+    criterion: CriterionName = "c",
+) -> NextPoses:
+    """The `count` candidates that, one after the other, add most to what the `measured` poses and the tolerances tell.
+
+    `criterion` is c, A or D. Measured noise counts where the poses have it, else that of the setup. Raises `FlexcalError` for another
+    criterion, for fewer candidates, and for poses measured with another target, from another station, or with a draw-wire.
+    """
+    merit = criterion_named(criterion, found.tool_weight)
+    if isinstance(merit, SpectralCriterion):
+        raise FlexcalError(f"the next poses are chosen by c, A or D, not by {criterion}.")
+    prior = found.base.sensitivity.prior_information
+    information = prior + measured_information(found, measured)
+    known = Sensitivity(found.base.sensitivity.jacobian, found.base.sensitivity.parameters, information)
+    base = replace(found.base, sensitivity=known)
+    selection = greedy(known, count, merit)
+    trace = TraceOptimal(found.tool_weight, "c")
+    done = len(np.unique(measured.pose))
+    errors, least = [], []
+    for number in range(count + 1):
+        errors.append(tool_error(base, found.tool_weight, selection.chosen[:number]))
+        least.append(least_trace(known, information, trace, prior, done + number) ** 0.5)
+        if number < count:
+            rows = known.jacobian[selection.chosen[number]]
+            information = information + rows.T @ rows
+    design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
+    return NextPoses(design, done, np.array(errors), np.array(least))
+
+
+def measured_information(found: PoseCandidates, measured: PoseSet) -> np.ndarray:
+    """Information (rank, rank) of measured poses on the combinations that the candidates tell apart."""
+    model, setup = found.model, found.setup
+    _check(model, measured, setup)
+    rank = len(found.base.scale)
+    total = np.zeros((rank, rank))
+    payload = np.full(len(measured), np.nan) if measured.payload is None else measured.payload
+    for mass in np.unique(payload):
+        held = np.isnan(payload) if np.isnan(mass) else payload == mass
+        q = measured.q[held]
+        own = replace(setup, payload=setup.payload if np.isnan(mass) else float(mass))
+        jacobian = found.base.columns(geometry_jacobian(model, q, own)[1])
+        rows = (jacobian / _noise(model, measured.subset(held), own)[:, :, None]).reshape(-1, rank)
+        total += rows.T @ rows
+    return total
+
+
+def _noise(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> np.ndarray:
+    """1σ (N, 3), m, of the measured coordinates."""
+    if measured.sigma_given:
+        return measured.sigma
+    origin = station_position(model, setup.station)
+    position = point_kinematics(model, measured.q, point=setup.point, jacobians=False).position
+    apart = np.full(len(position), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
+    return np.repeat(setup.noise.std(apart)[:, None], 3, axis=1)
+
+
+def _check(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> None:
+    target, station = model.point(setup.point).name, setup.station or model.stations[0]
+    if measured.length is not None:
+        raise FlexcalError("the next poses are chosen after measured points, not after lengths of a wire.")
+    for word, names, own in (("target", measured.targets, target), ("station", measured.stations, station)):
+        if names != (own,):
+            raise FlexcalError(
+                f"the measured poses hold the {word} {', '.join(names)}, but the next ones are chosen for {own}; give those with {own} only."
+            )
