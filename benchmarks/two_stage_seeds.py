@@ -1,6 +1,6 @@
 """The whole demonstration on many hidden truths: how large the errors are, and whether the intervals tell the truth about them.
 
-`python -m benchmarks.two_stage_seeds --first 1000 --count 20 [--plan paper] [--inertias-known] [--half-gap 1.5e-4]`
+`python -m benchmarks.two_stage_seeds --first 1000 --count 20 [--plan designed] [--inertias-known] [--half-gap 1.5e-4]`
 """
 
 from __future__ import annotations
@@ -15,7 +15,7 @@ import tempfile
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, get_args
 
 import numpy as np
 
@@ -27,15 +27,13 @@ from flexcal.elasticity.residual import StageOneResidual
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
 from flexcal.report.study import TwoStageStudy
-from flexcal.workflow.two_stage import run_two_stage
+from flexcal.workflow.two_stage import PlanName, run_two_stage
 from flexcal.yaml_reader import read_yaml
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
 
 
-def one_seed(
-    seed: int, plan: Literal["default", "paper"], inertias_known: bool, half_gap: float | None
-) -> dict[str, Any]:
+def one_seed(seed: int, plan: PlanName, inertias_known: bool, half_gap: float | None) -> dict[str, Any]:
     """Run one hidden truth and keep the numbers."""
     with tempfile.TemporaryDirectory() as folder:
         truth = None
@@ -199,7 +197,7 @@ def run() -> list[tuple[str, float, str]]:
 
 
 def collect(
-    seeds: range, plan: Literal["default", "paper"], inertias_known: bool, half_gap: float | None
+    seeds: range, plan: PlanName, inertias_known: bool, half_gap: float | None
 ) -> list[dict[str, Any]]:
     """All seeds, one process a core."""
     with ProcessPoolExecutor(os.cpu_count()) as pool:
@@ -212,7 +210,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--first", type=int, default=1000)
     parser.add_argument("--count", type=int, default=20)
-    parser.add_argument("--plan", choices=("default", "paper"), default="default")
+    parser.add_argument("--plan", choices=get_args(PlanName), default="default")
     parser.add_argument("--inertias-known", action="store_true")
     parser.add_argument("--half-gap", type=float)
     parser.add_argument("--save", type=Path)

@@ -9,9 +9,11 @@ import pytest
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity import ReferenceMotion, Tolerances, reference_shift
-from flexcal.elasticity.gap import gap_compliance, multisine_torque
-from flexcal.elasticity.model_error import LowRank, over_frequency
+from flexcal.elasticity.gap import gap_compliance
+from flexcal.elasticity.model_error import LowRank
+from flexcal.model.closed_loop import multisine_torque
 from flexcal.model.linearisation import linearise
+from flexcal.model.motor_impedance import over_frequency
 from flexcal.model.transfer import transfer_matrix
 
 FREE = np.zeros(3)
@@ -60,7 +62,9 @@ def test_compliance_of_a_gap(tx90l, poses, rng):
     """That of the twist against a Gaussian torque through zero; a drive held far from zero torque never opens its gap."""
     q, plan = poses["default"][0], plan_of(tx90l, poses["default"][:1])
     added = gap_compliance(tx90l, q, None, plan).mean(axis=0)
-    torque = multisine_torque(tx90l, q, None, plan)[0] * rng.standard_normal(400_000)
+    motion, system = ReferenceMotion.of(plan), linearise(tx90l, q)
+    size = multisine_torque(tx90l, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
+    torque = size[0] * rng.standard_normal(400_000)
     stiffness, half_gap = tx90l.stiffness[0, 2], 5e-5
     twist = torque / stiffness + half_gap * np.sign(torque)
     compliance = (twist @ torque) / (torque @ torque)

@@ -20,6 +20,19 @@ def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     return table
 
 
+def predicted_table(std: Mapping[str, float]) -> Table:
+    """One row a spring: predicted standard deviations of stiffness and damping, relative, by parameter name."""
+    table = Table(title="predicted standard deviation", title_justify="left")
+    table.add_column("")
+    for heading in ("stiffness %", "damping %"):
+        table.add_column(heading, justify="right")
+    for name in std:
+        spring, _, kind = name.rpartition(".")
+        if kind == "stiffness":
+            table.add_row(spring, f"{100 * std[name]:.2f}", f"{100 * std[f'{spring}.damping']:.1f}")
+    return table
+
+
 def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
     """The parameters that could not be told apart, and the `most` largest of what absorbed each."""
     title = f"identifiability: {found['rank']} of {found['parameters']} parameters"

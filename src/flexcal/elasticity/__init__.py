@@ -2,13 +2,13 @@
 
 from flexcal.elasticity.identify import StiffnessResult, identify_stiffness
 from flexcal.elasticity.model_error import Tolerances
-from flexcal.elasticity.naming import spring_names
 from flexcal.elasticity.parameters import stage_one_parameters
 from flexcal.elasticity.periodic_response import reference_shift
 from flexcal.elasticity.prediction import ResponseModel
 from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.elasticity.search import MultiStart, PopulationSearch, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
+from flexcal.model.names import spring_names
 
 __all__ = [
     "CovarianceWeighting",

@@ -6,11 +6,10 @@ import numpy as np
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.reference_motion import ReferenceMotion
-from flexcal.elasticity.sidebands import Sidebands
 from flexcal.model import RobotModel
+from flexcal.model.closed_loop import multisine_torque
 from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.equilibrium import elastic_axes
-from flexcal.model.linearisation import Linearisation, linearise
+from flexcal.model.linearisation import linearise
 
 PHASES = 64
 """Instants of the reference motion at which gaps are looked at."""
@@ -29,32 +28,12 @@ def gap_compliance(
 
     arm = ElasticArm(robot, payload)
     axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
-    states = ReferenceMotion.of(plan).states(robot, arm, q, PHASES)
+    motion = ReferenceMotion.of(plan)
+    states = motion.states(robot, arm, q, PHASES)
     slow = np.array(
         [pin.rnea(arm.model, arm.data, s.configuration, s.velocity, s.acceleration)[axes] for s in states]
     )
-    size = multisine_torque(robot, q, payload, plan)
+    system = linearise(robot, q, payload)
+    size = multisine_torque(robot, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
     stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
     return 2 * stiffness * np.exp(-0.5 * (slow / size) ** 2) / (np.sqrt(2 * np.pi) * size)
-
-
-def multisine_torque(
-    robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan
-) -> np.ndarray:
-    """Standard deviation (E,) N m of the torque in each elastic drive's spring under the multisine, position loop closed."""
-    system, motion = linearise(robot, q, payload), ReferenceMotion.of(plan)
-    bands = Sidebands.of(system, plan.frequencies_hz, motion, np.array([0]))
-    pull = drive_pull(robot, system)
-    moved = bands.response(np.eye(len(system.mass), system.inputs))[:, 0]
-    stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
-    power = np.abs(stiffness[:, None] * (pull.T @ moved)) ** 2 * motion.excitation.T[:, None, :] ** 2
-    return np.sqrt(0.5 * power.sum(axis=(0, 2)))
-
-
-def drive_pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
-    """Direction (d, E) in which each drive's spring is stretched: its twist less its motor."""
-    twists = [k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
-    pull = np.zeros((len(system.mass), system.inputs))
-    pull[range(system.inputs), range(system.inputs)] = -1.0
-    pull[system.inputs + np.array(twists), range(system.inputs)] = 1.0
-    return pull

@@ -10,7 +10,6 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.experiment_effect import ExperimentEffect, experiment_effects
 from flexcal.elasticity.model_error import ModelError, Tolerances
-from flexcal.elasticity.naming import spring_names
 from flexcal.elasticity.parameters import stage_one_parameters
 from flexcal.elasticity.prediction import ResponseModel
 from flexcal.elasticity.profile import profile_stretch
@@ -22,6 +21,7 @@ from flexcal.estimation import Estimate, Parameters, Problem, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.names import spring_names
 from flexcal.progress import Progress, silent
 
 ROUNDS = 2

@@ -12,7 +12,13 @@ from flexcal.elasticity.naming import pose_labels, viscous_name
 from flexcal.elasticity.prediction import Prediction, ResponseModel
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.frequency import FrequencyResponse
-from flexcal.model.declared import ANGLE_TOLERANCE, LENGTH_TOLERANCE
+from flexcal.model.declared import (
+    ANGLE_TOLERANCE,
+    FRICTION_TOLERANCE,
+    LENGTH_TOLERANCE,
+    SHARED_DISTORTION,
+)
+from flexcal.model.motor_impedance import KNOT_OCTAVES, friction_shifts, over_frequency
 from flexcal.model.names import GEOMETRY
 
 
@@ -32,10 +38,10 @@ class Tolerances:
     angle: float = ANGLE_TOLERANCE
     strength: float = 0.2
     width: float = 0.3
-    friction: float = 0.05
+    friction: float = FRICTION_TOLERANCE
     backlash: float = 0.3
-    distortion: float = 0.2
-    octave: float = 0.5
+    distortion: float = SHARED_DISTORTION
+    octave: float = KNOT_OCTAVES
 
     @classmethod
     def none(cls) -> Tolerances:
@@ -147,22 +153,3 @@ def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances
             for k, response in enumerate(moved.responses(x)):
                 shifts[k].append(response - base[k])
     return [np.stack(columns, axis=-1) for columns in shifts]
-
-
-def friction_shifts(
-    response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float
-) -> np.ndarray:
-    """∂G (L, E, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω."""
-    s = 2j * np.pi * frequencies_hz[:, None, None, None]
-    change = -np.einsum("lia,laj->lija", response, response) * size / s
-    return over_frequency(change, frequencies_hz, octave)
-
-
-def over_frequency(change: np.ndarray, frequencies_hz: np.ndarray, octave: float) -> np.ndarray:
-    """Changes (L, E, E, k) that may come in any complex proportion that varies over frequency, (L, E, E, 2 k knots)."""
-    position = np.log2(frequencies_hz / frequencies_hz[0]) / octave
-    knots = np.arange(int(np.ceil(position[-1])) + 1)
-    hats = np.maximum(0.0, 1.0 - np.abs(position[:, None] - knots))
-    spread = change[..., None] * hats[:, None, None, None, :]
-    spread = spread.reshape(*change.shape[:3], -1)
-    return np.concatenate([spread, 1j * spread], axis=-1)

@@ -5,18 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
-from flexcal.model.names import SPRINGS
-
-
-def spring_names(model: RobotModel) -> tuple[str, ...]:
-    """Names of the stiffness, then of the damping of every spring, joint by joint: drive, bearing_x, bearing_y."""
-    springs = [
-        f"{joint.name}.{SPRINGS[c]}"
-        for joint in model.elastic
-        for c in ((2, 0, 1) if joint.bearings else (2,))
-    ]
-    return tuple(f"{spring}.{kind}" for kind in ("stiffness", "damping") for spring in springs)
 
 
 def pose_labels(responses: Sequence[FrequencyResponse]) -> tuple[str, ...]:

@@ -6,19 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.elasticity.naming import half_gap_name, pose_labels, spring_names, viscous_name
+from flexcal.elasticity.naming import half_gap_name, pose_labels, viscous_name
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.declared import declared, uncertain_inertials
-from flexcal.model.names import unit_of
-
-SPRING_LOG_STD = 1.5
-"""Prior of every stiffness and damping, 1σ of the logarithm about robot.yaml (a factor of 4.5): it only keeps the posterior proper."""
-
-FRICTION_LOG_STD = 1.5
-"""Prior of the motor's viscous coefficient in one pose, 1σ of the logarithm about what the lowest lines show."""
+from flexcal.model.declared import FRICTION_LOG_STD, elastic_inertials, springs_and_rotors
 
 HALF_GAP_STD = 1e-4
 """Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
@@ -41,16 +34,10 @@ def stage_one_parameters(
     the robot.
     """
     check_responses(model, responses)
-    items = [
-        Parameter(name, unit_of(name), _positive(model, name), prior_std=SPRING_LOG_STD, scale="log")
-        for name in spring_names(model)
-    ]
-    for joint in model.elastic:
-        name = f"{joint.name}.rotor_inertia"
-        _positive(model, name)
-        items.append(declared(model, name))
+    loaded = any(r.payload != 0 for r in responses)
+    items = [*springs_and_rotors(model)]
     if not inertias_known:
-        items += _inertial(model, responses)
+        items += elastic_inertials(model, loaded=loaded)
     for joint in model.elastic:
         name = f"{joint.name}.delay"
         items.append(Parameter(name, "s", 0.0, prior_std=max(r.sample_time for r in responses)))
@@ -110,25 +97,3 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
             raise FlexcalError(
                 f"The frequency response of pose {response.pose} holds a NaN or an infinite number."
             )
-
-
-def _inertial(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list[Parameter]:
-    elastic = {joint.index for joint in model.elastic}
-    moved = []
-    for i in range(model.n):
-        at = i
-        while at >= 0 and at not in elastic:
-            at = model.joints[at].parent
-        moved += [i] if at >= 0 else []
-    items = [declared(model, name) for name in uncertain_inertials(model, moved)]
-    held = model.payload
-    if held is not None and held.mass > 0 and held.mass_std > 0 and any(r.payload != 0 for r in responses):
-        items.append(declared(model, "payload.mass"))
-    return items
-
-
-def _positive(model: RobotModel, name: str) -> float:
-    value = model.value(name)
-    if not value > 0:
-        raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")
-    return value

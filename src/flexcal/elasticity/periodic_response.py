@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.elasticity.gap import drive_pull
 from flexcal.elasticity.reference_motion import ArmState, ReferenceMotion
 from flexcal.model import RobotModel
+from flexcal.model.closed_loop import drive_pull
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix

@@ -8,13 +8,13 @@ from typing import Protocol
 
 import numpy as np
 
-from flexcal.elasticity.naming import spring_names
 from flexcal.elasticity.prediction import ResponseModel
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameters, Problem, solve
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.names import spring_names
 from flexcal.progress import Progress, silent
 
 

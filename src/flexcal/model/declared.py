@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter
-from flexcal.model.names import GEOMETRY, unit_of
+from flexcal.model.names import GEOMETRY, spring_names, unit_of
 from flexcal.model.robot_model import RobotModel
 
 UNIDENTIFIED_STIFFNESS = 0.3
@@ -15,6 +16,17 @@ LENGTH_TOLERANCE = 3e-4
 ANGLE_TOLERANCE = 5e-4
 """1σ of an uncalibrated offset or misalignment, rad."""
 
+SPRING_LOG_STD = 1.5
+"""Prior of every stiffness and damping that a frequency response is to find, 1σ of the logarithm (a factor of 4.5): it only keeps the
+posterior proper."""
+FRICTION_LOG_STD = 1.5
+"""Prior of the motor's viscous coefficient in one pose of a frequency response, 1σ of the logarithm about what is seen or predicted."""
+FRICTION_TOLERANCE = 0.05
+"""1σ of the deviation of a motor's impedance from a viscous coefficient, relative to that, at any frequency."""
+SHARED_DISTORTION = 0.2
+"""Share of the nonlinear distortion of a frequency response that all realisations have in common, for reference motion and friction are
+the same in all: averaging over realisations does not lower it."""
+
 _POSITIVE = ("mass", "rotor_inertia", "stiffness")
 
 
@@ -23,6 +35,39 @@ def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
     keys = ["mass"] if model.prior.mass > 0 else []
     keys += ["com_x", "com_y", "com_z"] if model.prior.com > 0 else []
     return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.mass[i] > 0 for key in keys]
+
+
+def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
+    """Stiffness and damping of every spring, almost free, and the rotor inertias of the elastic joints with robot.yaml's prior.
+
+    Raises `FlexcalError` for one without a positive value.
+    """
+    names = spring_names(model)
+    rotors = [f"{joint.name}.rotor_inertia" for joint in model.elastic]
+    for name in (*names, *rotors):
+        if not model.value(name) > 0:
+            raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")
+    springs = (
+        Parameter(name, unit_of(name), model.value(name), prior_std=SPRING_LOG_STD, scale="log")
+        for name in names
+    )
+    return (*springs, *(declared(model, name) for name in rotors))
+
+
+def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
+    """What robot.yaml leaves uncertain of the links that an elastic joint moves and, where `loaded`, the payload's mass."""
+    elastic = {joint.index for joint in model.elastic}
+    moved = []
+    for i in range(model.n):
+        at = i
+        while at >= 0 and at not in elastic:
+            at = model.joints[at].parent
+        moved += [i] if at >= 0 else []
+    items = [declared(model, name) for name in uncertain_inertials(model, moved)]
+    held = model.payload
+    if loaded and held is not None and held.mass > 0 and held.mass_std > 0:
+        items.append(declared(model, "payload.mass"))
+    return items
 
 
 def declared(model: RobotModel, name: str) -> Parameter:

@@ -34,6 +34,16 @@ def unit_of(name: str) -> str:
     return _UNITS.get(last, "1")
 
 
+def spring_names(model: RobotModel) -> tuple[str, ...]:
+    """Names of the stiffness, then of the damping of every spring, joint by joint: drive, bearing_x, bearing_y."""
+    springs = [
+        f"{joint.name}.{SPRINGS[c]}"
+        for joint in model.elastic
+        for c in ((2, 0, 1) if joint.bearings else (2,))
+    ]
+    return tuple(f"{spring}.{kind}" for kind in ("stiffness", "damping") for spring in springs)
+
+
 def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
 

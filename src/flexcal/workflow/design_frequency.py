@@ -6,25 +6,55 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
+import numpy as np
+
 from flexcal.data import MultisinePlan, write_plan
-from flexcal.errors import InputError
+from flexcal.design.frequency_poses import ChosenPoses, stiffness_curve
+from flexcal.design.gap_crossing import within_preload
+from flexcal.design.multisines import room
+from flexcal.design.planned_responses import PlannedResponses
+from flexcal.design.spring_criterion import largest_stiffness_std
 from flexcal.frequency import leave_out_detection_lines
 from flexcal.model import RobotModel
-from flexcal.workflow.frequency_plans import frequency_plan
+from flexcal.progress import Progress, silent
+from flexcal.workflow.designed_frequency import (
+    CANDIDATES,
+    POSES,
+    designed_excitation,
+    response_sensors,
+    shaped_plan,
+    unplaced_plan,
+)
+from flexcal.workflow.frequency_plans import frequency_plan, read_frequency_poses
+
+PlanKind = Literal["default", "paper", "designed", "quick"]
 
 
 @dataclass(frozen=True, eq=False)
 class DesignedFrequency:
-    """A plan and the file it was written to."""
+    """A plan, the file it was written to and what it will tell; the `choice` of its poses and their `curve` where they were chosen.
 
-    plan: MultisinePlan
+    `flat` is the same with equal amplitudes. `curve` holds numbers of poses and the largest standard deviation of a stiffness with as many,
+    chosen and at random, (3, K).
+    """
+
+    planned: PlannedResponses
+    flat: PlannedResponses
     file: Path
+    choice: ChosenPoses | None = None
+    curve: np.ndarray | None = None
+
+    @property
+    def plan(self) -> MultisinePlan:
+        """What is written."""
+        return self.planned.plan
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
         plan = self.plan
         recordings = len(plan.poses) * plan.recordings_per_pose
-        return {
+        name, largest = largest_stiffness_std(self.planned.sensitivity)
+        result = {
             "plan": self.file,
             "poses": len(plan.poses),
             "excited_axes": [joint + 1 for joint in plan.joints],
@@ -32,9 +62,23 @@ class DesignedFrequency:
             "detection_lines": len(plan.detection_lines),
             "lowest_hz": float(plan.frequencies_hz[0]),
             "highest_hz": float(plan.frequencies_hz[-1]),
+            "realisations": plan.realisations,
+            "periods": plan.periods,
             "recordings": recordings,
             "seconds_on_the_robot": recordings * plan.duration,
             "seed": plan.seed,
+            "predicted_std": self.planned.std(),
+            "predicted_std_flat": self.flat.std(),
+            "largest_stiffness_std": {"name": name, "std": largest},
+        }
+        if self.choice is None or self.curve is None:
+            return result
+        return result | {
+            "candidates": len(self.choice.candidates),
+            "curve": [
+                {"poses": int(n), "chosen": float(chosen), "random": float(random)}
+                for n, chosen, random in self.curve.T
+            ],
         }
 
 
@@ -42,24 +86,58 @@ def plan_frequency_experiments(
     robot: Path,
     out: Path,
     *,
-    kind: Literal["default", "paper"] = "default",
+    kind: PlanKind = "default",
     poses: Path | None = None,
+    choose: int | None = None,
+    candidates: int = CANDIDATES,
+    amplitude: Literal["flat", "shaped"] | None = None,
+    wanted: float | None = None,
     crest: Literal["random", "optimised"] = "random",
     detection_lines: bool = False,
     seed: int = 0,
+    progress: Progress = silent,
 ) -> DesignedFrequency:
-    """Write the plan `kind` for a robot to `out`; `poses` (default: frequency_poses.csv beside robot.yaml) lists where to excite.
+    """Write the plan `kind` for a robot to `out`.
 
-    `crest`: random phases, or ones with small peaks; with `detection_lines` one line in four is left out, to see odd distortion.
+    `designed` and `quick` choose six poses out of random `candidates`, or `choose` of them, and shape the amplitudes; `default` and `paper`
+    take the poses of frequency_poses.csv beside robot.yaml and flat amplitudes. `poses`: a file of poses to take instead, the rows of
+    this plan. `amplitude` overrides how they are. `wanted`: relative standard deviation that every stiffness shall have; realisations and
+    periods follow. `crest`: random phases, or ones with small peaks; with `detection_lines` one line in four is left out, to see odd
+    distortion.
 
-    Raises `FlexcalError` where the robot declares no elastic joint or no controller, or the poses cannot be read.
+    Raises `FlexcalError` where the robot declares no elastic joint or no controller, the poses cannot be read or excited, too few can be
+    found, or the wanted standard deviation is out of reach.
     """
     model = RobotModel.from_yaml(robot)
-    if not model.elastic:
-        raise InputError(f"{robot} declares no elastic joint, so there is nothing to excite; add `elastic:`.")
-    beside = model.path.parent / "frequency_poses.csv"
-    plan = replace(frequency_plan(model, beside if poses is None else poses, kind, seed), crest=crest)
-    if detection_lines:
-        plan = leave_out_detection_lines(plan)
-    write_plan(out, plan)
-    return DesignedFrequency(plan, out)
+    sensors = response_sensors(robot)
+    choice = None
+    if kind == "default" or kind == "paper":
+        beside = model.path.parent / "frequency_poses.csv"
+        plan = frequency_plan(model, beside if poses is None else poses, kind, seed)
+        plan = leave_out_detection_lines(plan) if detection_lines else plan
+        flat = planned = PlannedResponses.of(model, plan, sensors)
+        if amplitude == "shaped":
+            planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+    else:
+        plan = unplaced_plan(model, kind, detection_lines=detection_lines, seed=seed)
+        if poses is None:
+            found = designed_excitation(
+                model, plan, count=choose or POSES, candidates=candidates, sensors=sensors, progress=progress
+            )
+            flat, planned, choice = found.flat, found.planned, found.choice
+        else:
+            given = read_frequency_poses(poses, kind, model, room(model, plan.reference_amplitude))
+            flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=given)), sensors)
+            planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+        planned = flat if amplitude == "flat" else planned
+    if wanted is not None:
+        planned = planned.reaching(wanted)
+    planned = replace(planned, plan=replace(planned.plan, crest=crest))
+    write_plan(out, planned.plan)
+    return DesignedFrequency(planned, flat, out, choice, None if choice is None else _curve(choice, seed))
+
+
+def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:
+    most = min(2 * len(choice.poses), len(choice.candidates))
+    counts = np.arange(1, most + 1)
+    return np.array([counts, *stiffness_curve(choice, counts, np.random.default_rng([seed, 7]))])

@@ -25,15 +25,18 @@ from flexcal.progress import Progress, silent
 from flexcal.report.publication import TX90L_PAPER
 from flexcal.report.study import CadAlone, TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
+from flexcal.workflow.designed_frequency import designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
 from flexcal.workflow.two_stage_results import two_stage_document, write_verification
 from flexcal.yaml_reader import read_yaml
 
-CALIBRATION_POSES = 40
+CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)
 VERIFICATION_POSES = 150
+
+PlanName = Literal["default", "paper", "designed", "quick"]
 
 STAGES = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "cad_alone", "report")
 
@@ -57,7 +60,7 @@ def run_two_stage(
     out: Path,
     *,
     seed: int = 0,
-    plan: Literal["default", "paper"] = "default",
+    plan: PlanName = "default",
     truth: Path | None = None,
     inertias_known: bool = False,
     report: bool = True,
@@ -89,7 +92,12 @@ def run_two_stage(
             dynamics = run_stage_zero(cell, nominal, out, seed=seed, progress=progress)
         believed = nominal.with_estimate(dynamics)
 
-    frequency = frequency_plan(nominal, robot.parent / "frequency_poses.csv", plan, seed)
+    if plan == "default" or plan == "paper":
+        frequency = frequency_plan(nominal, robot.parent / "frequency_poses.csv", plan, seed)
+    else:
+        with watch.stage("frequency"):
+            flat = unplaced_plan(believed, plan, seed=seed)
+            frequency = designed_excitation(believed, flat, sensors=response_sensors(robot)).planned.plan
     write_plan(out / "frequency_plan.yaml", frequency)
     with watch.stage("frequency"):
         responses = tuple(
@@ -117,9 +125,8 @@ def run_two_stage(
     with watch.stage("poses"):
         progress("poses", 0.0)
         setup = MeasuringSetup(payload=frequency.payload)
-        chosen = design_poses(
-            elastic, CALIBRATION_POSES, rng=np.random.default_rng([seed, 2]), setup=setup
-        ).plan
+        count = QUICK_POSES if plan == "quick" else CALIBRATION_POSES
+        chosen = design_poses(elastic, count, rng=np.random.default_rng([seed, 2]), setup=setup).plan
         progress("poses", 0.25)
         for_rigid = [
             design_poses(believed, n, rng=np.random.default_rng([seed, 3, n]), setup=setup).plan

@@ -1,0 +1,79 @@
+"""The poses whose frequency responses tell the springs best together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import MultisinePlan
+from flexcal.design.collision import CollisionChecker
+from flexcal.design.exchange import exchange, greedy
+from flexcal.design.frequency_candidates import frequency_candidates
+from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
+from flexcal.design.response_sensitivity import response_sensitivity, thinned
+from flexcal.design.spring_criterion import largest_stiffness_std, spring_criterion
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Sensitivity
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+
+SCREEN = 3
+"""One line in so many is evaluated to compare candidates."""
+UNKNOWN = 0.255
+"""Relative standard deviation from which on a stiffness is not known to a factor of two."""
+
+
+@dataclass(frozen=True, eq=False)
+class ChosenPoses:
+    """`poses` (P, n) rad out of `candidates` (C, n), which they are (P,), and the screening sensitivity of all candidates."""
+
+    poses: np.ndarray
+    candidates: np.ndarray
+    chosen: np.ndarray
+    screened: Sensitivity
+
+
+def choose_frequency_poses(
+    model: RobotModel,
+    plan: MultisinePlan,
+    count: int,
+    candidates: int,
+    rng: np.random.Generator,
+    sensors: ResponseSensors = COMMON_SENSORS,
+    checker: CollisionChecker | None = None,
+    progress: Progress = silent,
+) -> ChosenPoses:
+    """The `count` of so many random `candidates` that determine all springs best together, excited as `plan` says; by exchange.
+
+    Raises `FlexcalError` where too few candidates are feasible, or so few poses leave a stiffness unknown, which is named.
+    """
+    checker = CollisionChecker(model) if checker is None else checker
+    pool = frequency_candidates(checker, plan, max(candidates, count), rng, progress)
+    screened = response_sensitivity(model, pool, thinned(plan, SCREEN), sensors, progress)
+    chosen = exchange(screened, count, spring_criterion(screened.parameters), progress=progress).chosen
+    worst, std = largest_stiffness_std(screened, chosen)
+    if std > UNKNOWN:
+        raise FlexcalError(
+            f"{count} poses cannot determine {worst}: its predicted standard deviation is {100 * std:.0f} %; choose more poses, "
+            "or hold a payload off the wrist's axis."
+        )
+    return ChosenPoses(pool[chosen], pool, chosen, screened)
+
+
+def stiffness_curve(
+    chosen: ChosenPoses, counts: np.ndarray, rng: np.random.Generator, random_sets: int = 10
+) -> tuple[np.ndarray, np.ndarray]:
+    """Largest predicted standard deviation of a stiffness (K,) for `counts` (K,) of poses: chosen one by one, and at random (median)."""
+    screened = chosen.screened
+    order = greedy(screened, int(max(counts)), spring_criterion(screened.parameters)).chosen
+    random = [
+        np.median(
+            [
+                largest_stiffness_std(screened, rng.choice(len(screened), k, replace=False))[1]
+                for _ in range(random_sets)
+            ]
+        )
+        for k in counts
+    ]
+    return np.array([largest_stiffness_std(screened, order[:k])[1] for k in counts]), np.array(random)

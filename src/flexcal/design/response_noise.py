@@ -1,0 +1,98 @@
+"""How noisy a frequency response will be: sensors, and friction that the excitation and the reference motion make nonlinear."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import MultisinePlan
+from flexcal.frequency import multisine
+from flexcal.model import RobotModel
+from flexcal.model.closed_loop import closed_loop_motion
+from flexcal.model.declared import SHARED_DISTORTION
+from flexcal.model.linearisation import Linearisation
+
+DRAWS = 3
+"""Realisations of the multisine on which friction is evaluated."""
+PASSES = 3
+"""Evaluations of the motors' motion, each damped by the friction that the one before met."""
+POOLED = 15
+"""Neighbouring lines over which the disturbance is averaged: it has no structure of its own over frequency."""
+_SAMPLES_PER_LINE = 8
+
+
+@dataclass(frozen=True)
+class ResponseSensors:
+    """Encoder `resolution` at the joint (rad) and noise of a torque reading (N m, 1σ), white over the samples of the controller."""
+
+    resolution: float = 2 * np.pi / 2**18
+    torque_noise: float = 1.0
+
+
+COMMON_SENSORS = ResponseSensors()
+"""Encoders of 18 bits and a torque reading good to 1 N m, where nothing better is known."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionDisturbance:
+    """What Coulomb friction does under a multisine and a reference motion.
+
+    `viscous` (E,) N m s/rad is its mean effect on each motor; `power` (L, E) N² m² is E|D|² of the deviation from it in one experiment of
+    one realisation, both signs subtracted, as cosine phasors.
+    """
+
+    viscous: np.ndarray
+    power: np.ndarray
+
+    @classmethod
+    def of(cls, robot: RobotModel, system: Linearisation, plan: MultisinePlan) -> FrictionDisturbance:
+        """Evaluate friction along the linear motion of the motors about the reference motion, in random realisations of the plan's own.
+
+        With v the motor's velocity by the multisine and V that of the reference, the half difference of the two signs is
+        F (sgn(V + v) - sgn(V - v)) / 2 = F sgn(v) where |v| > |V|, else 0.
+        """
+        axes = [joint.index for joint in robot.elastic]
+        coulomb = np.nan_to_num(robot.coulomb[axes])
+        frequencies, lines = plan.frequencies_hz, np.asarray(plan.lines)
+        samples = 1 << int(np.ceil(np.log2(_SAMPLES_PER_LINE * lines.max())))
+        time = np.arange(samples) / (samples * plan.base_frequency_hz)
+        slow = np.abs(multisine.reference(plan, time)[1])[:, None, None]
+        phasors = np.concatenate([multisine.spectra(plan, draw) for draw in range(DRAWS)], axis=2)
+        s = 2j * np.pi * frequencies[:, None, None]
+        viscous = np.zeros(len(axes))
+        deviation = np.zeros((len(lines), len(axes), phasors.shape[2]), dtype=complex)
+        for _ in range(PASSES):
+            moved = closed_loop_motion(system, frequencies, plan.kp[axes], plan.kd[axes] + viscous)
+            fast = s * (moved[:, : len(axes)] @ phasors)
+            velocity = multisine.synthesise(fast, lines, samples)
+            met = coulomb[:, None] * np.where(np.abs(velocity) > slow, np.sign(velocity), 0.0)
+            drag = np.fft.rfft(met, axis=0)[lines] * (2 / samples)
+            viscous = np.sum(np.real(drag * fast.conj()), axis=(0, 2)) / np.sum(
+                np.abs(fast) ** 2, axis=(0, 2)
+            )
+            deviation = drag - viscous[:, None] * fast
+        power = np.mean(np.abs(deviation) ** 2, axis=2)
+        window = np.ones(min(POOLED, len(lines)))
+        share = np.convolve(np.ones(len(lines)), window, "same")
+        pooled = np.stack([np.convolve(column, window, "same") / share for column in power.T], axis=1)
+        return cls(viscous, pooled)
+
+
+def equation_error(
+    plan: MultisinePlan, response: np.ndarray, friction: FrictionDisturbance, sensors: ResponseSensors
+) -> np.ndarray:
+    """Covariance (L, E, E) of the error N_y - G N_u of one experiment, (rad/s²)², averaged over periods, signs and realisations.
+
+    Encoder and torque noise average over all samples kept; of the distortion by friction a share is common to all realisations.
+    A phasor of white noise of the variance σ² in N samples has the variance 4 σ² / N.
+    """
+    kept = plan.rate_hz / plan.base_frequency_hz * (plan.periods - plan.settle_periods) * plan.realisations
+    noise = 4 / (kept * (2 if plan.signs else 1))
+    omega = 2 * np.pi * plan.frequencies_hz
+    own = (1 - SHARED_DISTORTION) / plan.realisations + SHARED_DISTORTION
+    torque = noise * sensors.torque_noise**2 + own * friction.power
+    position = noise * sensors.resolution**2 / 12
+    axes = response.shape[-1]
+    acceleration = (position * omega**4)[:, None, None] * np.eye(axes)
+    return acceleration + (response * torque[:, None, :]) @ np.swapaxes(response, 1, 2).conj()

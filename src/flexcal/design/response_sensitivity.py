@@ -1,0 +1,202 @@
+"""What the frequency response in one pose tells about springs, rotors and links: whitened Jacobian rows, its own nuisances eliminated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data import MultisinePlan
+from flexcal.design.response_noise import (
+    COMMON_SENSORS,
+    FrictionDisturbance,
+    ResponseSensors,
+    equation_error,
+)
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Parameter, Parameters, Sensitivity
+from flexcal.model import RobotModel
+from flexcal.model.declared import (
+    FRICTION_LOG_STD,
+    FRICTION_TOLERANCE,
+    declared,
+    elastic_inertials,
+    springs_and_rotors,
+)
+from flexcal.model.linearisation import linearise
+from flexcal.model.motor_impedance import KNOT_OCTAVES, friction_shifts
+from flexcal.model.names import GEOMETRY
+from flexcal.model.transfer import transfer_matrix
+from flexcal.progress import Progress, silent
+
+
+@dataclass(frozen=True, eq=False)
+class PoseResponse:
+    """The response of one pose as the design needs it, E axes on L lines.
+
+    `response` (L, E, E); `derivatives` (L, E, E, p) by the parameters that all poses share, `nuisance` (L, E, E, m) by the pose's own,
+    each in units of its prior; `friction` and `sensors` make the noise.
+    """
+
+    response: np.ndarray
+    derivatives: np.ndarray
+    nuisance: np.ndarray
+    friction: FrictionDisturbance
+    sensors: ResponseSensors
+
+    def rows(self, plan: MultisinePlan) -> np.ndarray:
+        """R (p, p), upper triangular: RᵀR is the information about the shared parameters, that about the nuisances taken off.
+
+        In the triangular factor of [nuisance | shared] over the nuisances' priors [1 | 0], the last block is a root of the Schur
+        complement S = A - B D⁻¹ Bᵀ.
+        """
+        own = self.nuisance.shape[-1]
+        whitened = self.whitened(plan)
+        stacked = np.vstack([np.eye(own, whitened.shape[1]), whitened])
+        return np.asarray(np.linalg.qr(stacked, mode="r"))[own:, own:]
+
+    def whitened(self, plan: MultisinePlan) -> np.ndarray:
+        """Rows (2 L E², m + p): √2 times real and imaginary part of C⁻¹ ∂G diag(amplitude), nuisances first.
+
+        cov(vec G) = (Γ Γᴴ)⁻¹ ⊗ C Cᴴ with Γ Γᴴ = diag(amplitude²) and C Cᴴ the covariance of `equation_error`.
+        """
+        change = np.concatenate([self.nuisance, self.derivatives], axis=-1)
+        lines, axes = change.shape[:2]
+        root = np.linalg.cholesky(self.error(plan))
+        white = np.linalg.solve(root, change.reshape(lines, axes, -1)).reshape(change.shape)
+        white = (white * plan.amplitude.T[:, None, :, None]).reshape(-1, change.shape[-1])
+        return np.sqrt(2.0) * np.vstack([np.real(white), np.imag(white)])
+
+    def gains(self, plan: MultisinePlan, gradient: np.ndarray) -> np.ndarray:
+        """What a criterion with the derivative `gradient` (p, p) by the information gains per N² m² more of amplitude², (E, L)."""
+        own = self.nuisance.shape[-1]
+        white = self.whitened(plan)
+        inner = np.eye(own) + white[:, :own].T @ white[:, :own]
+        left = white[:, own:] - white[:, :own] @ np.linalg.solve(inner, white[:, :own].T @ white[:, own:])
+        gain = np.einsum("rp,pq,rq->r", left, gradient, left, optimize=True)
+        lines, axes, _ = self.response.shape
+        return gain.reshape(2, lines, axes, axes).sum(axis=(0, 2)).T / plan.amplitude**2
+
+    def error(self, plan: MultisinePlan) -> np.ndarray:
+        """The covariance (L, E, E) of `equation_error`."""
+        return equation_error(plan, self.response, self.friction, self.sensors)
+
+    def relative_error(self, plan: MultisinePlan) -> np.ndarray:
+        """Standard deviation (L, E) of every motor's own response, relative to it."""
+        variance = np.real(np.diagonal(self.error(plan), axis1=1, axis2=2)) / plan.amplitude.T**2
+        return np.sqrt(variance) / np.abs(np.diagonal(self.response, axis1=1, axis2=2))
+
+
+def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
+    """What the responses of all poses share: springs, rotors, inertials of links and payload, a delay an axis, geometric errors.
+
+    Priors are those that robot.yaml declares; `prior_information` takes what was estimated before instead.
+    """
+    delays = (
+        Parameter(f"{joint.name}.delay", "s", 0.0, prior_std=1 / plan.rate_hz) for joint in model.elastic
+    )
+    errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
+    inertials = elastic_inertials(model, loaded=plan.payload != 0)
+    return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors))
+
+
+def response_sensitivity(
+    model: RobotModel,
+    poses: np.ndarray,
+    plan: MultisinePlan,
+    sensors: ResponseSensors = COMMON_SENSORS,
+    progress: Progress = silent,
+) -> Sensitivity:
+    """Rows of every pose of `poses` (candidates, n) under the excitation of `plan`; prior: the robot's posterior, else robot.yaml's.
+
+    Raises `FlexcalError` where the plan does not excite exactly the elastic joints.
+    """
+    parameters = response_parameters(model, plan)
+    rows = []
+    for number, q in enumerate(poses):
+        progress("sensitivities", number / len(poses))
+        rows.append(pose_response(model, q, plan, parameters, sensors).rows(plan))
+    progress("sensitivities", 1.0)
+    return Sensitivity(np.array(rows), parameters, known_before(model, parameters))
+
+
+def known_before(model: RobotModel, parameters: Parameters) -> np.ndarray:
+    """Information (p, p) of the robot's posterior, and of the parameters' priors where nothing was estimated."""
+    prior = model.posterior.prior(parameters)[1]
+    scale = np.sqrt(np.diag(prior))
+    information = np.linalg.inv(prior / np.outer(scale, scale)) / np.outer(scale, scale)
+    return (information + information.T) / 2
+
+
+def pose_response(
+    model: RobotModel,
+    q: np.ndarray,
+    plan: MultisinePlan,
+    parameters: Parameters,
+    sensors: ResponseSensors = COMMON_SENSORS,
+) -> PoseResponse:
+    """Response, derivatives and noise in the pose `q` (n,); the motors' viscous coefficients are those of robot.yaml plus friction's.
+
+    Its own nuisances: the logarithm of every motor's viscous coefficient, and what its friction deviates from one at any frequency.
+    """
+    if plan.joints != tuple(joint.index for joint in model.elastic):
+        raise FlexcalError(
+            f"the plan must excite exactly the elastic joints of {model.path}, in their order."
+        )
+    frequencies = plan.frequencies_hz
+    friction = FrictionDisturbance.of(model, linearise(model, q, plan.payload), plan)
+    rubbing = [f"{joint.name}.viscous" for joint in model.elastic]
+    viscous = np.nan_to_num(model.viscous[list(plan.joints)]) + friction.viscous
+    robot = model.with_values(dict(zip(rubbing, viscous, strict=True)))
+    own = [name for name in parameters.names if _in_linearisation(name)]
+    system = linearise(robot, q, plan.payload, derivatives=(*own, *rubbing))
+    moved = transfer_matrix(system, frequencies)
+    response, by = moved.response, dict(zip(moved.names, np.moveaxis(moved.derivatives, -1, 0), strict=True))
+    geometric = _geometric(robot, q, plan, parameters, response)
+    columns = []
+    for item in parameters:
+        if item.name in geometric:
+            columns.append(geometric[item.name])
+        elif item.name.endswith(".delay"):
+            axis = [joint.name for joint in model.elastic].index(item.name.removesuffix(".delay"))
+            columns.append(_late(response, frequencies, axis))
+        else:
+            columns.append(by[item.name] * (item.value if item.scale == "log" else 1.0))
+    loss = [by[name] * value * FRICTION_LOG_STD for name, value in zip(rubbing, viscous, strict=True)]
+    strange = friction_shifts(response, frequencies, FRICTION_TOLERANCE * viscous, KNOT_OCTAVES)
+    return PoseResponse(
+        response,
+        np.stack(columns, axis=-1),
+        np.concatenate([np.stack(loss, axis=-1), strange], axis=-1),
+        friction,
+        sensors,
+    )
+
+
+def thinned(plan: MultisinePlan, step: int) -> MultisinePlan:
+    """The plan with every `step`-th line only, their power raised so that a band tells as much: for comparing many poses quickly."""
+    kept = plan.amplitude[:, ::step] * np.sqrt(len(plan.lines) / len(plan.lines[::step]))
+    return replace(plan, lines=plan.lines[::step], amplitude=kept)
+
+
+def _in_linearisation(name: str) -> bool:
+    return not name.endswith(".delay") and name.rpartition(".")[2] not in GEOMETRY
+
+
+def _late(response: np.ndarray, frequencies: np.ndarray, axis: int) -> np.ndarray:
+    change = np.zeros_like(response)
+    change[:, :, axis] = -2j * np.pi * frequencies[:, None] * response[:, :, axis]
+    return change
+
+
+def _geometric(
+    robot: RobotModel, q: np.ndarray, plan: MultisinePlan, parameters: Parameters, response: np.ndarray
+) -> dict[str, np.ndarray]:
+    """∂G (L, E, E) by every geometric error, by forward differences of its tolerance."""
+    changes = {}
+    for item in parameters:
+        if item.name.rpartition(".")[2] in GEOMETRY:
+            other = robot.with_values({item.name: item.value + item.prior_std})
+            moved = transfer_matrix(linearise(other, q, plan.payload), plan.frequencies_hz).response
+            changes[item.name] = (moved - response) / item.prior_std
+    return changes

@@ -1,0 +1,27 @@
+"""How impedances between motor and ground change a frequency response, and changes that vary over frequency."""
+
+from __future__ import annotations
+
+import numpy as np
+
+KNOT_OCTAVES = 0.5
+"""Octaves between the knots of a change that varies over frequency."""
+
+
+def friction_shifts(
+    response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float
+) -> np.ndarray:
+    """∂G (L, E, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω."""
+    s = 2j * np.pi * frequencies_hz[:, None, None, None]
+    change = -np.einsum("lia,laj->lija", response, response) * size / s
+    return over_frequency(change, frequencies_hz, octave)
+
+
+def over_frequency(change: np.ndarray, frequencies_hz: np.ndarray, octave: float) -> np.ndarray:
+    """Changes (L, E, E, k) that may come in any complex proportion that varies over frequency, (L, E, E, 2 k knots)."""
+    position = np.log2(frequencies_hz / frequencies_hz[0]) / octave
+    knots = np.arange(int(np.ceil(position[-1])) + 1)
+    hats = np.maximum(0.0, 1.0 - np.abs(position[:, None] - knots))
+    spread = change[..., None] * hats[:, None, None, None, :]
+    spread = spread.reshape(*change.shape[:3], -1)
+    return np.concatenate([spread, 1j * spread], axis=-1)

@@ -1,0 +1,91 @@
+"""Frequency experiments whose poses and amplitudes are chosen: for the demonstration, and for `flexcal design frequency`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.cell import CellConfig
+from flexcal.cell.sensors import encoder_resolution
+from flexcal.data import MultisinePlan
+from flexcal.design import CollisionChecker
+from flexcal.design.amplitude import shaped
+from flexcal.design.frequency_poses import ChosenPoses, choose_frequency_poses
+from flexcal.design.gap_crossing import within_preload
+from flexcal.design.multisines import Schedule, flat_multisine
+from flexcal.design.planned_responses import PlannedResponses
+from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
+from flexcal.frequency import leave_out_detection_lines
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.workflow.frequency_plans import REFERENCE
+from flexcal.yaml_reader import read_yaml
+
+POSES = 6
+CANDIDATES = 300
+SCHEDULES = {"designed": Schedule(0.2, 3, 1, 4), "quick": Schedule(0.3125, 3, 1, 3)}
+"""360 and 173 s a pose with three axes."""
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedExcitation:
+    """What was planned, the same with equal amplitudes, and the choice of poses behind both."""
+
+    planned: PlannedResponses
+    flat: PlannedResponses
+    choice: ChosenPoses
+
+
+def designed_excitation(
+    model: RobotModel,
+    plan: MultisinePlan,
+    *,
+    count: int = POSES,
+    candidates: int = CANDIDATES,
+    sensors: ResponseSensors = COMMON_SENSORS,
+    progress: Progress = silent,
+) -> DesignedExcitation:
+    """Choose `count` poses for the flat `plan`, whose own do not count, and the amplitudes in them, for a robot as it is known.
+
+    Raises `FlexcalError` as `choose_frequency_poses` does.
+    """
+    rng = np.random.default_rng([plan.seed, 6])
+    choice = choose_frequency_poses(
+        model, plan, count, candidates, rng, sensors, CollisionChecker(model), progress
+    )
+    progress("amplitudes", 0.0)
+    flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=choice.poses)), sensors)
+    progress("amplitudes", 0.3)
+    planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+    progress("amplitudes", 1.0)
+    return DesignedExcitation(planned, flat, choice)
+
+
+def unplaced_plan(model: RobotModel, kind: str, *, detection_lines: bool = False, seed: int) -> MultisinePlan:
+    """The flat plan `designed` or `quick`, in no pose that counts; payload as declared and reference motion as in the plan `default`."""
+    plan = flat_multisine(
+        model,
+        np.zeros((1, model.n)),
+        name=kind,
+        payload=None,
+        reference=REFERENCE["default"],
+        seed=seed,
+        schedule=SCHEDULES[kind],
+    )
+    return leave_out_detection_lines(plan) if detection_lines else plan
+
+
+def shaped_plan(model: RobotModel, flat: PlannedResponses) -> MultisinePlan:
+    """The plan with its power where it tells most, lowered until no peak pulls a drive across its gap."""
+    return within_preload(model, shaped(flat))
+
+
+def response_sensors(robot: Path) -> ResponseSensors:
+    """The sensors that cell.yaml beside robot.yaml declares, common ones where there is none."""
+    file = robot.parent / "cell.yaml"
+    if not file.is_file():
+        return COMMON_SENSORS
+    sensors = read_yaml(file, CellConfig).sensors
+    return ResponseSensors(encoder_resolution(sensors), sensors.torque_noise)
