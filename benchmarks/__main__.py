@@ -13,8 +13,8 @@ from pathlib import Path
 
 from benchmarks.peers import PeerAbsentError
 
-SLOW = ("mismatch", "two_stage_seeds")
-"""Asked for by name only: they run the demonstration on many hidden truths."""
+SLOW = ("mismatch", "trajectories", "two_stage_seeds")
+"""Asked for by name only: they take hours."""
 
 
 def main(names: list[str]) -> int:
