@@ -87,7 +87,9 @@ def test_poses_that_gravity_does_not_preload_are_left_out_by_number(
     document = run("design", "poses", *arguments, "--json").document
     left_out = document["flank_not_sure"]
     assert 0 < len(left_out) < 60 and not set(left_out) & set(document["chosen"])
-    assert document["candidates"] == 120 - len(left_out)
+    hidden = document["not_seen"]
+    assert 0 < len(hidden) < 30 and not set(hidden) & (set(document["chosen"]) | set(left_out))
+    assert document["candidates"] == 120 - len(left_out) - len(hidden)
 
 
 def test_a_pose_outside_the_limits_is_refused(run, tx90l_folder: Path) -> None:

@@ -70,9 +70,7 @@ def test_acceptance_is_an_angle_about_the_axis(tx90l, rng):
     checker = CollisionChecker(tx90l)
     q = rng.uniform(-2, 2, (400, 6))
     free = visible(checker, q)
-    narrow = visible(
-        checker, q, MeasuringSetup(acceptance=AcceptanceConfig((0.0, 0.0, 2.0), 40 * DEGREE))
-    )
+    narrow = visible(checker, q, MeasuringSetup(acceptance=AcceptanceConfig((0.0, 0.0, 2.0), 40 * DEGREE)))
     motion = point_kinematics(tx90l, q, jacobians=False)
     towards = np.array([2.5, 0, 1]) - motion.position
     angle = np.arccos(np.sum(motion.orientation[:, :, 2] * towards, axis=1) / np.linalg.norm(towards, axis=1))

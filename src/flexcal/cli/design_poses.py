@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from tyro.conf import arg
 
@@ -12,30 +13,48 @@ from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 from flexcal.errors import InputError
+from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True)
 class DesignPoses:
-    """Choose the poses that tell most about the robot's geometric errors, within joint limits, free of collision, seen by the instrument.
+    """Choose the poses that tell most about the robot's geometric errors where it will work, within joint limits, free of collision, seen
+    by the instrument, and put them into an order of short moves. A page with pictures is left beside the plan.
 
-    With --from, out of the poses of a file; for a verification, --random draws poses all over the workspace instead.
+    With --from, out of the poses of a file; with --measured, the next ones after those measured; for a verification, --random draws poses
+    all over the workspace instead.
     """
 
     robot: Robot
     count: Annotated[int, arg(metavar="N")] = 40
-    """Number of poses."""
+    """Number of poses, at most so many with --wanted or --measured."""
     out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
-    """File for the plan."""
+    """File for the plan, YAML or CSV."""
+    working: Annotated[
+        str | None,
+        arg(metavar="BOX|FILE", help_behavior_hint="(default: as robot.yaml declares, else anywhere)"),
+    ] = None
+    """Where the robot will work: ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a CSV of points x, y, z or of poses."""
+    wanted: Annotated[
+        float | None,
+        arg(
+            metavar="MM",
+            help_behavior_hint="(default: --count poses; with --measured until more only average)",
+        ),
+    ] = None
+    """Stop as soon as the predicted tool error is so small, mm."""
+    measured: Annotated[tuple[Path, ...], arg(metavar="FILE", help_behavior_hint="(default: none)")] = ()
+    """Measured poses, to choose the next ones, best first."""
     pool: Annotated[
         Path | None, arg(name="from", metavar="FILE", help_behavior_hint="(default: random poses)")
     ] = None
     """CSV or Parquet with pose, q1, q2 and so on to choose from: poses taught on the robot, or measured before."""
     random: bool = False
-    """Random poses, for a verification; criterion and candidates do not count then."""
+    """Random poses, for a verification; only count, payload and seed count then."""
     criterion: Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"] = "c"
     """c: least predicted tool error; A, D, E: of the parameters' covariance; O1-O5: observability indices."""
     candidates: Annotated[int, arg(metavar="N")] = 4000
-    """Random poses to choose from, without --from."""
+    """Random poses to choose from, without --from; 100000 take seconds more."""
     payload: Annotated[
         float | None, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
@@ -46,24 +65,38 @@ class DesignPoses:
 
     def run(self) -> None:
         """Choose, and print how good the choice is."""
-        from flexcal.workflow.design_poses import plan_calibration_poses, plan_verification_poses
-
         require_robot(self.robot)
         require_at_least(1, count=self.count, candidates=self.candidates)
         require_at_least(0, seed=self.seed, payload=self.payload)
-        console = Console(self.json)
+        if self.wanted is not None and not self.wanted > 0:
+            raise InputError(f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
         if self.random and self.pool is not None:
             raise InputError("--random draws poses and --from chooses given ones; keep one of them.")
+        if self.random and self.measured:
+            raise InputError("--random draws poses and --measured chooses the next ones; keep one of them.")
+        console = Console(self.json)
         if self.random:
-            drawn = plan_verification_poses(
-                self.robot, self.out, self.count, payload=self.payload, seed=self.seed
-            )
-            console.say(f"wrote {self.out}: {self.count} random poses")
-            console.finish(
-                drawn.document(),
-                f"{measuring(self.out, self.robot, 'unseen')}, or measure them on the robot",
-            )
-            return
+            self._draw(console)
+        elif self.measured:
+            self._continue(console)
+        else:
+            self._choose(console)
+
+    def _draw(self, console: Console) -> None:
+        from flexcal.workflow.design_poses import plan_verification_poses
+
+        drawn = plan_verification_poses(
+            self.robot, self.out, self.count, payload=self.payload, seed=self.seed
+        )
+        console.say(f"wrote {self.out}: {self.count} random poses")
+        console.finish(
+            drawn.document(),
+            f"{measuring(self.out, self.robot, 'unseen')}, or measure them on the robot",
+        )
+
+    def _choose(self, console: Console) -> None:
+        from flexcal.workflow.design_poses import plan_calibration_poses
+
         with console.progress() as progress:
             found = plan_calibration_poses(
                 self.robot,
@@ -71,6 +104,8 @@ class DesignPoses:
                 self.count,
                 criterion=self.criterion,
                 candidates=self.candidates if self.pool is None else self.pool,
+                working=self.working,
+                wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
                 payload=self.payload,
                 seed=self.seed,
                 progress=progress,
@@ -81,24 +116,89 @@ class DesignPoses:
             f"{seen['rank']} of {seen['parameters']} parameters can be told apart by position measurements"
         )
         console.say(
-            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over the workspace); "
-            f"from {document['enough_poses']} poses on it falls by averaging only"
+            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}), "
+            f"no choice of as many reaches less than {document['least_possible_mm']:.4f} mm; from {document['enough_poses']} poses on it falls by "
+            "averaging only"
         )
         others = {name: value for name, value in document["criteria"].items() if name != "c"}
         console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))
-        if self.pool is not None:
-            console.say(f"chosen from {self.pool}: {', '.join(map(str, document['chosen']))}")
-            unsure = document["flank_not_sure"]
-            if len(unsure):
-                console.say(
-                    f"{len(unsure)} poses were left out, for gravity does not surely settle the flank of a backlash there"
-                )
-        for joint, sides in document["flanks"].items():
-            console.say(
-                f"{joint}: {sides['positive']} poses on one flank of its backlash, {sides['negative']} on the other"
+        self._say_pool(console, document)
+        blocked = document["blocked_moves"]
+        ways = ", ".join(f"{a} to {b}" for a, b in blocked)
+        console.say(
+            f"moving through them takes {document['moves_s']:.1f} s or more"
+            + (
+                f"; on the straight way of the joints something touches from {ways}: go round there"
+                if blocked
+                else ""
             )
-        console.say(f"wrote {self.out}: {self.count} poses")
+        )
+        console.say(f"wrote {self.out}: {document['poses']} poses")
         console.finish(
             document,
             f"{measuring(self.out, self.robot, 'measured')}, or measure them on the robot",
         )
+
+    def _continue(self, console: Console) -> None:
+        from flexcal.workflow.next_poses import plan_next_poses
+
+        with console.progress() as progress:
+            found = plan_next_poses(
+                self.robot,
+                self.out,
+                self.measured,
+                self.count,
+                criterion=self.criterion,
+                candidates=self.candidates if self.pool is None else self.pool,
+                working=self.working,
+                wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
+                payload=self.payload,
+                seed=self.seed,
+                progress=progress,
+            )
+        document = found.document()
+        errors, least = document["tool_error_mm"], document["least_possible_mm"]
+        console.say(
+            f"after {document['measured']} measured poses the predicted tool error is {errors[0]:.4f} mm from tracker noise alone "
+            f"(rms over {_where(document)}); no choice of as many reaches less than {least[0]:.4f} mm"
+        )
+        stop = document["stop_after"]
+        aim = "more poses only average" if self.wanted is None else f"it is at most {self.wanted:g} mm"
+        if stop == 0:
+            console.say(f"stop here: {aim}; no plan was written")
+            console.finish(document, "flexcal calibrate with the measured poses")
+            return
+        self._say_pool(console, document)
+        reached = errors[document["poses"]]
+        console.say(
+            f"after {document['poses']} more it is {reached:.4f} mm"
+            + (f": then stop, {aim}" if stop is not None else f", and not yet so that {aim}")
+        )
+        console.say(f"wrote {self.out}: the next {document['poses']} poses, best first")
+        console.finish(
+            document,
+            f"{measuring(self.out, self.robot, 'more')}, or measure them on the robot",
+        )
+
+    def _say_pool(self, console: Console, document: Mapping[str, Any]) -> None:
+        if self.pool is not None:
+            console.say(f"chosen from {self.pool}: {', '.join(map(str, document['chosen']))}")
+            unsure, hidden = len(document["flank_not_sure"]), len(document["not_seen"])
+            if unsure:
+                console.say(
+                    f"{unsure} poses were left out, for gravity does not surely settle the flank of a backlash there"
+                )
+            if hidden:
+                console.say(f"{hidden} poses were left out, for the instrument does not see them")
+        for joint, sides in document["flanks"].items():
+            console.say(
+                f"{joint}: {sides['positive']} poses on one flank of its backlash, {sides['negative']} on the other"
+            )
+
+
+def _where(document: Mapping[str, Any]) -> str:
+    working = document["working"]
+    if working is None:
+        return "the workspace"
+    share = working["reached_share"]
+    return "the working volume" + (f", of which it reaches {100 * share:.0f} %" if share < 1 else "")

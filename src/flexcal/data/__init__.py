@@ -14,6 +14,7 @@ from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import read_recording, read_recording_blocks, write_recording
 from flexcal.data.time_base import TimeBase
 from flexcal.data.trajectory_plan import TrajectoryPlan
+from flexcal.data.working_files import read_working
 from flexcal.estimates_file import (
     provenance,
     read_estimates,
@@ -43,6 +44,7 @@ __all__ = [
     "read_poses",
     "read_recording",
     "read_recording_blocks",
+    "read_working",
     "sha256_of",
     "write_estimates",
     "write_measured_poses",

@@ -1,4 +1,4 @@
-"""Plans on disk: YAML whose `kind` says which plan it is."""
+"""Plans on disk: YAML whose `kind` says which plan it is; for poses also CSV."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TypeVar
 
 from flexcal.data.multisine_plan import MultisinePlan
 from flexcal.data.pose_plan import PosePlan
+from flexcal.data.pose_table import read_pose_table, write_pose_table
 from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.errors import InputError
 from flexcal.yaml_reader import read_yaml_file
@@ -24,6 +25,8 @@ _KINDS: dict[str, type[MultisinePlan] | type[TrajectoryPlan] | type[PosePlan]] =
 
 def read_plan(path: str | Path) -> Plan:
     """Read a plan; raises `InputError` with file and line for everything that does not fit."""
+    if Path(path).suffix == ".csv":
+        return read_pose_table(Path(path))
     file = read_yaml_file(path)
     kind = file.data.get("kind") if isinstance(file.data, dict) else None
     if kind not in _KINDS:
@@ -47,5 +50,13 @@ def read_plan_of(path: str | Path, kind: type[P]) -> P:
 
 
 def write_plan(path: str | Path, plan: Plan) -> None:
-    """Write a plan, atomically; `read_plan` gives back the same numbers bit by bit."""
+    """Write a plan, atomically, as CSV where the file ends so; `read_plan` gives back the same numbers bit by bit.
+
+    Raises `InputError` for a CSV of anything but poses.
+    """
+    if Path(path).suffix == ".csv":
+        if not isinstance(plan, PosePlan):
+            raise InputError(f"{path}: only a plan of poses can be a CSV file; end the name in .yaml.")
+        write_pose_table(Path(path), plan)
+        return
     write_yaml(path, plan)

@@ -12,6 +12,8 @@ from flexcal.design.criteria import (
 )
 from flexcal.design.exchange import Selection, exchange, greedy
 from flexcal.design.joint_space import joint_ranges
+from flexcal.design.next_poses import NextPoses, next_poses
+from flexcal.design.pose_candidates import PoseCandidates, pose_candidates
 from flexcal.design.pose_curve import PoseCurve, pose_curve
 from flexcal.design.pose_sensitivity import (
     BaseSensitivity,
@@ -20,9 +22,14 @@ from flexcal.design.pose_sensitivity import (
     geometry_jacobian,
     pose_sensitivity,
 )
-from flexcal.design.next_poses import NextPoses, next_poses
-from flexcal.design.pose_candidates import PoseCandidates, pose_candidates
-from flexcal.design.poses import CriterionName, PoseDesign, design_poses, random_poses
+from flexcal.design.poses import (
+    CriterionName,
+    PoseDesign,
+    choose_poses,
+    design_poses,
+    fewest_poses,
+    random_poses,
+)
 from flexcal.design.preload import preloaded
 from flexcal.design.setup import MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
@@ -51,9 +58,11 @@ __all__ = [
     "VisitingOrder",
     "WorkingVolume",
     "base_sensitivity",
+    "choose_poses",
     "design_poses",
     "design_trajectories",
     "exchange",
+    "fewest_poses",
     "geometry_jacobian",
     "greedy",
     "joint_origins",

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.data import PoseSet
 from flexcal.design.best_possible import least_trace
-from flexcal.design.criteria import SpectralCriterion, TraceOptimal
+from flexcal.design.criteria import DOptimal, TraceOptimal
 from flexcal.design.exchange import greedy
 from flexcal.design.pose_candidates import PoseCandidates
 from flexcal.design.pose_sensitivity import geometry_jacobian
@@ -37,7 +37,7 @@ class NextPoses:
     possible: np.ndarray
 
     def enough(self, wanted: float | None = None) -> int | None:
-        """After how many of these poses to stop: the tool error is at most `wanted` (m), or averaging is all that is left; None for never."""
+        """After how many of these poses to stop: the tool error is at most `wanted` (m), or more only average; None for never."""
         limit = (1 + AVERAGING) * self.possible if wanted is None else wanted
         good = np.flatnonzero(self.tool_error <= limit)
         return int(good[0]) if len(good) else None
@@ -57,41 +57,36 @@ def next_poses(
     criterion, for fewer candidates, and for poses measured with another target, from another station, or with a draw-wire.
     """
     merit = criterion_named(criterion, found.tool_weight)
-    if isinstance(merit, SpectralCriterion):
+    if not isinstance(merit, DOptimal | TraceOptimal):
         raise FlexcalError(f"the next poses are chosen by c, A or D, not by {criterion}.")
-    prior = found.base.sensitivity.prior_information
-    information = prior + measured_information(found, measured)
-    known = Sensitivity(found.base.sensitivity.jacobian, found.base.sensitivity.parameters, information)
+    before = found.base.sensitivity
+    rows = measured_rows(found, measured)
+    flat = rows.reshape(-1, rows.shape[2])
+    information = before.prior_information + flat.T @ flat
+    known = Sensitivity(before.jacobian, before.parameters, information)
     base = replace(found.base, sensitivity=known)
     selection = greedy(known, count, merit)
-    trace = TraceOptimal(found.tool_weight, "c")
     done = len(np.unique(measured.pose))
-    errors, least = [], []
-    for number in range(count + 1):
-        errors.append(tool_error(base, found.tool_weight, selection.chosen[:number]))
-        least.append(least_trace(known, information, trace, prior, done + number) ** 0.5)
-        if number < count:
-            rows = known.jacobian[selection.chosen[number]]
-            information = information + rows.T @ rows
+    steps = range(count + 1)
+    errors = [tool_error(base, found.tool_weight, selection.chosen[:number]) for number in steps]
+    either = Sensitivity(np.concatenate([before.jacobian, rows]), before.parameters, before.prior_information)
+    least = least_trace(either, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
     design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
-    return NextPoses(design, done, np.array(errors), np.array(least))
+    return NextPoses(design, done, np.array(errors), least)
 
 
-def measured_information(found: PoseCandidates, measured: PoseSet) -> np.ndarray:
-    """Information (rank, rank) of measured poses on the combinations that the candidates tell apart."""
+def measured_rows(found: PoseCandidates, measured: PoseSet) -> np.ndarray:
+    """Whitened rows (N, 3, rank) of measured poses in the combinations that the candidates tell apart."""
     model, setup = found.model, found.setup
     _check(model, measured, setup)
-    rank = len(found.base.scale)
-    total = np.zeros((rank, rank))
     payload = np.full(len(measured), np.nan) if measured.payload is None else measured.payload
+    rows = np.zeros((len(measured), 3, len(found.base.scale)))
     for mass in np.unique(payload):
         held = np.isnan(payload) if np.isnan(mass) else payload == mass
-        q = measured.q[held]
         own = replace(setup, payload=setup.payload if np.isnan(mass) else float(mass))
-        jacobian = found.base.columns(geometry_jacobian(model, q, own)[1])
-        rows = (jacobian / _noise(model, measured.subset(held), own)[:, :, None]).reshape(-1, rank)
-        total += rows.T @ rows
-    return total
+        jacobian = found.base.columns(geometry_jacobian(model, measured.q[held], own)[1])
+        rows[held] = jacobian / _noise(model, measured.subset(held), own)[:, :, None]
+    return rows
 
 
 def _noise(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> np.ndarray:
@@ -100,7 +95,11 @@ def _noise(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> np.nd
         return measured.sigma
     origin = station_position(model, setup.station)
     position = point_kinematics(model, measured.q, point=setup.point, jacobians=False).position
-    apart = np.full(len(position), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
+    apart = (
+        np.full(len(position), 2 * model.reach)
+        if origin is None
+        else np.linalg.norm(position - origin, axis=1)
+    )
     return np.repeat(setup.noise.std(apart)[:, None], 3, axis=1)
 
 
@@ -111,5 +110,5 @@ def _check(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> None:
     for word, names, own in (("target", measured.targets, target), ("station", measured.stations, station)):
         if names != (own,):
             raise FlexcalError(
-                f"the measured poses hold the {word} {', '.join(names)}, but the next ones are chosen for {own}; give those with {own} only."
+                f"the measured poses hold the {word} {', '.join(names)}, but the next ones are chosen for {own}; give those only."
             )

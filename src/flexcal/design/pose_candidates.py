@@ -31,7 +31,7 @@ class PoseCandidates:
     """Poses that can be measured as `setup` says.
 
     `base` holds the rows of all poses of the `pool`; `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool
-    error over the working poses.
+    error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see.
     """
 
     model: RobotModel
@@ -39,6 +39,7 @@ class PoseCandidates:
     pool: PosePool
     base: BaseSensitivity
     tool_weight: np.ndarray
+    hidden: np.ndarray
 
 
 def pose_candidates(
@@ -65,16 +66,18 @@ def pose_candidates(
     if isinstance(candidates, PosePool):
         if setup.payload is None:
             setup = replace(setup, payload=candidates.payload)
-        pool = _usable(checker, candidates, least, setup)
+        seen = visible(checker, candidates.q, setup)
+        hidden = candidates.pose[~seen]
+        pool = _usable(checker, candidates, seen, least, setup)
     else:
         q = random_candidates(checker, candidates, rng, setup, preload=True, progress=progress)
-        pool = PosePool(q, np.arange(1, len(q) + 1))
+        pool, hidden = PosePool(q, np.arange(1, len(q) + 1)), np.zeros(0, dtype=int)
     _check_flanks(model, pool.q, setup.payload)
     base = base_sensitivity(pose_sensitivity(model, pool.q, setup))
     if working is None:
         anywhere = replace(setup, acceptance=None)
         working = random_candidates(checker, WORKING_POSES, rng, anywhere)
-    return PoseCandidates(model, setup, pool, base, tool_weight(base, model, working, setup))
+    return PoseCandidates(model, setup, pool, base, tool_weight(base, model, working, setup), hidden)
 
 
 def tool_weight(
@@ -87,17 +90,19 @@ def tool_weight(
     return rows.T @ rows / len(jacobian)
 
 
-def _usable(checker: CollisionChecker, given: PosePool, least: int, setup: MeasuringSetup) -> PosePool:
-    """The poses of a pool that can be measured; raises `FlexcalError` where they are fewer than `least`."""
-    seen = given.subset(visible(checker, given.q, setup))
-    if not len(seen):
+def _usable(
+    checker: CollisionChecker, given: PosePool, seen: np.ndarray, least: int, setup: MeasuringSetup
+) -> PosePool:
+    """The poses of a pool that can be measured, of those `seen` (a mask); raises `FlexcalError` where they are fewer than `least`."""
+    if not seen.any():
         raise FlexcalError(
             f"the instrument sees none of the {len(given)} poses of the pool; check where `stations:` puts it, the acceptance of the "
             "reflector, and what stands in its line of sight."
         )
-    usable = seen.subset(preloaded(checker.model, seen.q, setup.payload))
+    shown = given.subset(seen)
+    usable = shown.subset(preloaded(checker.model, shown.q, setup.payload))
     if len(usable) < least:
-        hidden = f", the instrument sees {len(seen)}" if len(seen) < len(given) else ""
+        hidden = f", of which the instrument sees {len(shown)}" if len(shown) < len(given) else ""
         raise FlexcalError(
             f"the pool holds {len(given)} poses{hidden}, and gravity surely settles the flank of every backlash in {len(usable)} of them; "
             f"{least} cannot be chosen."

@@ -134,7 +134,7 @@ def _triangle(jacobian: np.ndarray) -> np.ndarray:
     factor = np.zeros((0, jacobian.shape[2]))
     for first in range(0, len(jacobian), BLOCK):
         rows = jacobian[first : first + BLOCK].reshape(-1, jacobian.shape[2])
-        factor = np.linalg.qr(np.vstack([factor, rows]), mode="r")
+        factor = np.asarray(np.linalg.qr(np.vstack([factor, rows]), mode="r"))
     return factor
 
 

@@ -8,6 +8,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from flexcal.data import PosePlan, PosePool
+from flexcal.design.best_possible import least_trace
 from flexcal.design.candidates import random_candidates
 from flexcal.design.collision import CollisionChecker
 from flexcal.design.criteria import (
@@ -17,7 +18,7 @@ from flexcal.design.criteria import (
     TraceOptimal,
     observability,
 )
-from flexcal.design.exchange import Selection
+from flexcal.design.exchange import Selection, greedy
 from flexcal.design.pose_candidates import PoseCandidates, pose_candidates
 from flexcal.design.pose_sensitivity import BaseSensitivity
 from flexcal.design.preload import preload_joints
@@ -27,6 +28,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Identifiability
 from flexcal.model import RobotModel, gravity_torque
 from flexcal.progress import Progress, silent
+from flexcal.units import MILLIMETRE
 
 CriterionName = Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"]
 
@@ -37,7 +39,8 @@ class PoseDesign:
 
     `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
     `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
-    (N, joints with backlash) is the sign of the gravity torque at `flank_joints`.
+    (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
+    instrument does not see.
     """
 
     plan: PosePlan
@@ -48,6 +51,7 @@ class PoseDesign:
     tool_weight: np.ndarray
     flank_joints: tuple[str, ...]
     flank: np.ndarray
+    hidden: np.ndarray
 
     @classmethod
     def of(
@@ -65,6 +69,7 @@ class PoseDesign:
             tool_weight=found.tool_weight,
             flank_joints=tuple(found.model.joint_names[i] for i in loose),
             flank=np.sign(gravity_torque(found.model, chosen, found.setup.payload))[:, loose],
+            hidden=found.hidden,
         )
 
     def in_order(self, order: np.ndarray) -> PoseDesign:
@@ -93,6 +98,12 @@ class PoseDesign:
         From tracker noise alone; what deflection, backlash near its crossing or repeatability add is not in it.
         """
         return tool_error(self.base, self.tool_weight, self.selection.chosen)
+
+    @property
+    def least_possible(self) -> float:
+        """A tool error, m, that no choice of as many of the candidates could predict less than (see `least_trace`)."""
+        trace = TraceOptimal(self.tool_weight, "c")
+        return float(least_trace(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
 
     @property
     def criteria(self) -> dict[CriterionName, float]:
@@ -155,15 +166,42 @@ def design_poses(
         checker=checker,
         progress=progress,
     )
+    return choose_poses(found, count, rng=rng, criterion=criterion, progress=progress)
+
+
+def choose_poses(
+    found: PoseCandidates,
+    count: int,
+    *,
+    rng: np.random.Generator,
+    criterion: CriterionName = "c",
+    progress: Progress = silent,
+) -> PoseDesign:
+    """As `design_poses`, from candidates that have been found; `rng` draws the plan's seed."""
     rank = found.base.identifiability.rank
     if 3 * count < rank:
         raise FlexcalError(
-            f"{count} poses cannot determine {rank} geometric parameters of {model.name}; "
+            f"{count} poses cannot determine {rank} geometric parameters of {found.model.name}; "
             f"choose at least {-(-rank // 3)}, better twice as many."
         )
     wanted = criterion_named(criterion, found.tool_weight)
     selection = choose(found.base.sensitivity, count, wanted, progress=progress)
     return PoseDesign.of(found, wanted, selection, rng)
+
+
+def fewest_poses(found: PoseCandidates, most: int, wanted: float) -> int:
+    """How many candidates, chosen one by one, predict a tool error of at most `wanted` (m); raises `FlexcalError` where `most` do not."""
+    weight, sensitivity = found.tool_weight, found.base.sensitivity
+    order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
+    least = -(-found.base.identifiability.rank // 3)
+    for count in range(least, most + 1):
+        if tool_error(found.base, weight, order[:count]) <= wanted:
+            return count
+    reached = tool_error(found.base, weight, order)
+    raise FlexcalError(
+        f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not {wanted / MILLIMETRE:.4f} mm; "
+        "allow more poses, or want less."
+    )
 
 
 def random_poses(

@@ -40,7 +40,9 @@ class MeasuringSetup:
     def declared(cls, model: RobotModel, payload: float | None = None) -> MeasuringSetup:
         """The first point as robot.yaml declares it, with the acceptance of its reflector."""
         point = next(iter(model.config.points), None)
-        return cls(payload=payload, acceptance=None if point is None else model.config.points[point].acceptance)
+        return cls(
+            payload=payload, acceptance=None if point is None else model.config.points[point].acceptance
+        )
 
 
 STANDARD = MeasuringSetup()

@@ -12,11 +12,13 @@ _ENOUGH = 1e-9
 
 
 def short_tour(cost: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
-    """An order (N,) of short open way, either end free, by symmetric `cost` (N, N) of each move; improved from the order `start` if given."""
+    """The order (N,) of a short open way, either end free; `cost` (N, N) of moves is symmetric. With `start`, that order improved."""
     count = len(cost)
     if count < 3:
         return np.arange(count)
-    closed = np.zeros((count + 1, count + 1))  # an open way is a closed one through a place next to everything
+    closed = np.zeros(
+        (count + 1, count + 1)
+    )  # an open way is a closed one through a place next to everything
     closed[:count, :count] = cost
     if start is not None:
         starts = [np.append(start, count)]
@@ -75,7 +77,7 @@ def _or_opt(cost: np.ndarray, way: np.ndarray) -> np.ndarray:
             ahead = cost[rest, part[0]] + cost[part[-1], after] - open_legs
             back = cost[rest, part[-1]] + cost[part[0], after] - open_legs
             place = int(np.argmin(np.minimum(ahead, back)))
-            if min(ahead[place], back[place]) < saved - _ENOUGH * (1 + saved):
+            if min(ahead[place], back[place]) < saved - _ENOUGH * (1 + abs(saved)):
                 turned = part if ahead[place] <= back[place] else part[::-1]
                 way = np.concatenate([rest[: place + 1], turned, rest[place + 1 :]])
                 tried = 0

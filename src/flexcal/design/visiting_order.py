@@ -21,7 +21,7 @@ _EVEN = 64
 
 @dataclass(frozen=True, eq=False)
 class VisitingOrder:
-    """`order` (N,) of the poses, the least `seconds` (N - 1,) of each move, and which of them are `blocked` (N - 1,) and need a way round."""
+    """`order` (N,) of the poses, least `seconds` (N - 1,) of the moves, and which are `blocked` (N - 1,) and need a way round."""
 
     order: np.ndarray
     seconds: np.ndarray

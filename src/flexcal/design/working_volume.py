@@ -39,7 +39,7 @@ def working_box(
     *,
     point: str | None = None,
 ) -> WorkingVolume:
-    """Of 300 random points between the corners `lower` and `upper` (3,), m, base frame, those that the robot reaches, in random orientations.
+    """Of 300 random points between the corners `lower` and `upper` (3,), m, base frame, those that it reaches, in random orientations.
 
     Raises `FlexcalError` where a lower corner is not below the upper one, and where the robot reaches none of them.
     """

@@ -189,7 +189,9 @@ class WorkingVolumeConfig:
 
     def __post_init__(self) -> None:
         if not all(low < high for low, high in zip(self.lower, self.upper, strict=True)):
-            raise FlexcalError("every coordinate of a working volume's lower corner must be below the upper one's.")
+            raise FlexcalError(
+                "every coordinate of a working volume's lower corner must be below the upper one's."
+            )
 
 
 @dataclass(frozen=True)

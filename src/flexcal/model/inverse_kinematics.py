@@ -33,7 +33,9 @@ def reach_points(
     q = np.clip(joint_batch(model, q), lower, upper)
     for _ in range(STEPS):
         motion = point_kinematics(model, q, point=point)
-        columns = motion.geometry_jacobian[:, :3, : 6 * model.n : 6]  # by the joint's offset, which moves it like q
+        columns = motion.geometry_jacobian[
+            :, :3, : 6 * model.n : 6
+        ]  # by the joint's offset, which moves it like q
         missing = position - motion.position
         square = columns @ np.swapaxes(columns, 1, 2) + DAMPING**2 * np.eye(3)
         step = np.einsum("sij,si->sj", columns, np.linalg.solve(square, missing[:, :, None])[:, :, 0])

@@ -1,0 +1,107 @@
+"""Which poses to measure next, after those that have been measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data import PosePlan, PosePool, read_pose_pool, read_poses, write_plan
+from flexcal.design import (
+    CollisionChecker,
+    CriterionName,
+    MeasuringSetup,
+    NextPoses,
+    WorkingVolume,
+    next_poses,
+    pose_candidates,
+)
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.design_poses import flank_block, pool_block, working_block, working_volume
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuedPoses:
+    """The next poses, best first, up to where to stop; `plan` and `file` are None where nothing is left to measure."""
+
+    plan: PosePlan | None
+    file: Path | None
+    found: NextPoses
+    stop: int | None
+    wanted: float | None
+    working: WorkingVolume | None = None
+    pool: PosePool | None = None
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
+        found, design = self.found, self.found.design
+        return (
+            {
+                "plan": self.file,
+                "poses": 0 if self.plan is None else len(self.plan),
+                "measured": found.measured,
+            }
+            | pool_block(design, self.pool)
+            | {
+                "seed": design.plan.seed,
+                "criterion": design.criterion.name,
+                "candidates": len(design.candidates),
+                "wanted_mm": None if self.wanted is None else self.wanted / MILLIMETRE,
+                "stop_after": self.stop,
+                "working": working_block(self.working),
+                "flanks": flank_block(design),
+                "tool_error_mm": found.tool_error / MILLIMETRE,
+                "least_possible_mm": found.possible / MILLIMETRE,
+            }
+        )
+
+
+def plan_next_poses(
+    robot: Path,
+    out: Path,
+    measured: Sequence[Path],
+    count: int,
+    *,
+    criterion: CriterionName = "c",
+    candidates: int | Path = 4000,
+    working: str | None = None,
+    wanted: float | None = None,
+    payload: float | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> ContinuedPoses:
+    """Write to `out` the next poses, at most `count`, after the files of `measured` ones; nothing where these are enough.
+
+    They end where the predicted tool error is `wanted` (m), or without it where more poses only average. The other arguments are those of
+    `plan_calibration_poses`. Raises `FlexcalError` as `next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
+    """
+    model = RobotModel.from_yaml(robot)
+    checker = CollisionChecker(model)
+    place = working_volume(checker, working, seed)
+    known = read_poses(measured, model, require_motion=False)
+    choice = read_pose_pool(candidates, model) if isinstance(candidates, Path) else candidates
+    rng = np.random.default_rng([seed, 7])
+    found = pose_candidates(
+        model,
+        rng=rng,
+        candidates=choice,
+        least=count,
+        setup=MeasuringSetup.declared(model, payload),
+        working=None if place is None else place.q,
+        checker=checker,
+        progress=progress,
+    )
+    after = next_poses(found, known, count, rng=rng, criterion=criterion)
+    stop = after.enough(wanted)
+    pool = choice if isinstance(choice, PosePool) else None
+    if stop == 0:
+        return ContinuedPoses(None, None, after, stop, wanted, place, pool)
+    design = after.design.in_order(np.arange(count if stop is None else stop))
+    plan = replace(design.plan, name="calibration")
+    write_plan(out, plan)
+    return ContinuedPoses(plan, out, replace(after, design=design), stop, wanted, place, pool)
