@@ -17,6 +17,7 @@ from flexcal.design.spring_criterion import largest_stiffness_std
 from flexcal.frequency import leave_out_detection_lines
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.frequency_design import FrequencyDesignStudy, write_frequency_page
 from flexcal.workflow.designed_frequency import (
     CANDIDATES,
     POSES,
@@ -56,6 +57,7 @@ class DesignedFrequency:
         name, largest = largest_stiffness_std(self.planned.sensitivity)
         result = {
             "plan": self.file,
+            "page": self.file.with_suffix(".html"),
             "poses": len(plan.poses),
             "excited_axes": [joint + 1 for joint in plan.joints],
             "lines": len(plan.lines),
@@ -97,7 +99,7 @@ def plan_frequency_experiments(
     seed: int = 0,
     progress: Progress = silent,
 ) -> DesignedFrequency:
-    """Write the plan `kind` for a robot to `out`.
+    """Write the plan `kind` for a robot to `out`, and a page with pictures beside it.
 
     `designed` and `quick` choose six poses out of random `candidates`, or `choose` of them, and shape the amplitudes; `default` and `paper`
     take the poses of frequency_poses.csv beside robot.yaml and flat amplitudes. `poses`: a file of poses to take instead, the rows of
@@ -134,7 +136,10 @@ def plan_frequency_experiments(
         planned = planned.reaching(wanted)
     planned = replace(planned, plan=replace(planned.plan, crest=crest))
     write_plan(out, planned.plan)
-    return DesignedFrequency(planned, flat, out, choice, None if choice is None else _curve(choice, seed))
+    found = DesignedFrequency(planned, flat, out, choice, None if choice is None else _curve(choice, seed))
+    study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
+    write_frequency_page(out.with_suffix(".html"), study)
+    return found
 
 
 def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:
