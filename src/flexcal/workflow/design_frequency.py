@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from flexcal.data import MultisinePlan, write_plan
+from flexcal.design.amplitude import shaped
 from flexcal.design.frequency_poses import ChosenPoses, stiffness_curve
 from flexcal.design.gap_crossing import within_preload
 from flexcal.design.multisines import room
@@ -23,7 +24,6 @@ from flexcal.workflow.designed_frequency import (
     POSES,
     designed_excitation,
     response_sensors,
-    shaped_plan,
     unplaced_plan,
 )
 from flexcal.workflow.frequency_plans import frequency_plan, read_frequency_poses
@@ -119,7 +119,7 @@ def plan_frequency_experiments(
         plan = leave_out_detection_lines(plan) if detection_lines else plan
         flat = planned = PlannedResponses.of(model, plan, sensors)
         if amplitude == "shaped":
-            planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+            planned = PlannedResponses.of(model, shaped(model, flat), sensors)
     else:
         plan = unplaced_plan(model, kind, detection_lines=detection_lines, seed=seed)
         if poses is None:
@@ -130,7 +130,7 @@ def plan_frequency_experiments(
         else:
             given = read_frequency_poses(poses, kind, model, room(model, plan.reference_amplitude))
             flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=given)), sensors)
-            planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+            planned = PlannedResponses.of(model, shaped(model, flat), sensors)
         planned = flat if amplitude == "flat" else planned
     if wanted is not None:
         planned = planned.reaching(wanted)
