@@ -54,7 +54,7 @@ def frequency_candidates(
         progress("candidates", min(1.0, len(found) / count))
         if len(found) >= count:
             return np.array(found[:count])
-        if drawn * _BATCH >= 40 * count + 4000 and len(found) < 0.02 * count:
+        if drawn * _BATCH >= 40 * count + 1000 and len(found) < 0.02 * count:
             break
     losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
     raise FlexcalError(

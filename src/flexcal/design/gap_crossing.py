@@ -19,7 +19,7 @@ SELDOM = 2.0
 """Standard deviations of a drive's torque that gravity must exceed all along the reference motion: its gap opens seldom, and little."""
 LOWEST = 0.2
 """Share of the excitation below which too little would be left to measure with."""
-INSTANTS = 32
+INSTANTS = 16
 """Instants of the reference motion at which the torque of the drives is looked at."""
 
 
@@ -29,12 +29,11 @@ def share_at_rest(model: RobotModel, plan: MultisinePlan) -> float:
     The reference motion is left out, as in the paper. Above 1 where there is room.
     """
     drives = _loose(model, plan)
-    held = np.abs(static_equilibrium(model, plan.poses, plan.payload).torque[:, list(plan.joints)])
-    loads = [
-        _strain(model, q, plan) * (CREST / torque)[:, None, None] ** 2
-        for q, torque in zip(plan.poses, held, strict=True)
-    ]
-    return share(np.array(loads)[:, drives], plan.amplitude)
+    held = np.abs(
+        static_equilibrium(model, plan.poses, plan.payload).torque[:, [plan.joints[k] for k in drives]]
+    )
+    power = np.sum([_strain(model, q, plan)[drives] * plan.amplitude**2 for q in plan.poses], axis=(2, 3))
+    return float((held / (CREST * np.sqrt(power))).min(initial=np.inf))
 
 
 def gap_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
