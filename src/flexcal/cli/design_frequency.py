@@ -85,8 +85,8 @@ class DesignFrequency:
             ).document()
         console.show(predicted_table(document["predicted_std"]))
         console.say(
-            f"wrote {self.out}: {document['poses']} poses, {document['lines']} lines from {document['lowest_hz']:g} to "
-            f"{document['highest_hz']:g} Hz, {document['recordings']} recordings, "
+            f"wrote {self.out} and {document['page']}: {document['poses']} poses, {document['lines']} lines from "
+            f"{document['lowest_hz']:g} to {document['highest_hz']:g} Hz, {document['recordings']} recordings, "
             f"{document['seconds_on_the_robot'] / 60:.0f} minutes on a real robot"
         )
         console.finish(document, f"{measuring(self.out, self.robot, 'frequency')}, or record it on the robot")

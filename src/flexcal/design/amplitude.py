@@ -1,4 +1,4 @@
-"""The amplitude spectrum that tells most: more power where the response depends on the springs, the same power in all."""
+"""The amplitude spectrum that tells most: more power where the response depends on the springs, within effort and gravity's preload."""
 
 from __future__ import annotations
 
@@ -7,43 +7,49 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
+from flexcal.design.gap_crossing import gap_load, share
 from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.spring_criterion import spring_criterion
+from flexcal.model import RobotModel
 
-LEAST, MOST = 0.5, 2.5
-"""Amplitude of any line over that of the flat spectrum of the same power: below, the response's logarithm would be biased at that line;
-above, friction would no longer be the disturbance that was predicted."""
-ITERATIONS = 15
+LEAST, MOST = 0.4, 3.0
+"""Amplitude of any line over that of the flat spectrum: below, the response's logarithm would be biased at that line; above, friction
+would no longer be the disturbance that was predicted."""
+ITERATIONS = 20
 
 
-def shaped(planned: PlannedResponses) -> MultisinePlan:
-    """The plan, whose spectrum is flat, with amplitudes of the same power that make `spring_criterion` small in its poses.
+def shaped(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
+    """The plan, whose spectrum is flat, with amplitudes that make `spring_criterion` small in its poses.
 
-    The multiplicative algorithm for optimal designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of
-    what more of it would gain, axis by axis, within `LEAST` and `MOST`.
+    No axis gets more power than it has, and no gap is strained beyond what `gap_load` allows. The multiplicative algorithm for optimal
+    designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of what more of it would gain over what it costs,
+    its share of the axis' power plus its share in the gap that is strained most.
     """
-    criterion = spring_criterion(planned.parameters)
-    plan, responses = planned.plan, planned.responses
-    mean = np.mean(plan.amplitude**2, axis=1, keepdims=True)
+    criterion, plan = spring_criterion(planned.parameters), planned.plan
+    allowed = np.sum(plan.amplitude**2, axis=1, keepdims=True)
+    flat = plan.amplitude**2
+    load = np.array([gap_load(model, q, plan) for q in plan.poses]).reshape(-1, *flat.shape)
+    plan = replace(plan, amplitude=_feasible(flat, allowed, load))
     best, lowest = plan, np.inf
     for _ in range(ITERATIONS):
-        information = planned.prior_information + sum((r := x.rows(plan)).T @ r for x in responses)
+        power = plan.amplitude**2
+        information = planned.prior_information + sum((r := x.rows(plan)).T @ r for x in planned.responses)
         trace = criterion.trace(information)
         if trace < lowest:
             best, lowest = plan, trace
-        gain = np.sum([x.gains(plan, criterion.gradient(information)) for x in responses], axis=0)
-        power = plan.amplitude**2
-        power = within(power * np.sqrt(gain / np.sum(gain * power, axis=1, keepdims=True)), mean)
-        plan = replace(plan, amplitude=np.sqrt(power))
+        gain = np.sum([x.gains(plan, criterion.gradient(information)) for x in planned.responses], axis=0)
+        cost = 1 / (len(power) * allowed)
+        if len(load):
+            cost = cost + load[np.argmax(np.sum(load * power, axis=(1, 2)))]
+        grown = power * np.sqrt(gain / cost)
+        grown *= power.sum() / grown.sum()
+        plan = replace(
+            plan, amplitude=_feasible(np.clip(grown, LEAST**2 * flat, MOST**2 * flat), allowed, load)
+        )
     return best
 
 
-def within(power: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Powers (E, L), scaled and clipped so that each axis has the `mean` (E, 1) and no line leaves `LEAST` and `MOST` (of amplitude)."""
-    low, high = LEAST**2 * mean, MOST**2 * mean
-    small, large = np.zeros_like(mean), high / power.min(axis=1, keepdims=True)
-    for _ in range(60):
-        scale = (small + large) / 2
-        over = np.clip(scale * power, low, high).mean(axis=1, keepdims=True) > mean
-        small, large = np.where(over, small, scale), np.where(over, scale, large)
-    return np.clip(scale * power, low, high)
+def _feasible(power: np.ndarray, allowed: np.ndarray, load: np.ndarray) -> np.ndarray:
+    """Amplitudes (E, L): the power lowered, axis by axis to what is `allowed` (E, 1), then on all alike until every gap stays closed."""
+    amplitude = np.sqrt(power * np.minimum(1.0, allowed / power.sum(axis=1, keepdims=True)))
+    return min(1.0, share(load, amplitude)) * amplitude

@@ -6,7 +6,7 @@ import numpy as np
 
 from flexcal.data import MultisinePlan
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.gap_crossing import share_in_motion
+from flexcal.design.gap_crossing import gap_load, share
 from flexcal.design.joint_space import joint_ranges
 from flexcal.design.multisines import room
 from flexcal.design.preload import preloaded
@@ -47,14 +47,14 @@ def frequency_candidates(
         q = rng.uniform(lower, upper, (_BATCH, model.n))
         held = q[preloaded(model, q, plan.payload)]
         free = [x for x in held if not checker.collides(x + np.outer([0.0, 1.0, -1.0], swing)).any()]
-        kept = [x for x in free if share_in_motion(model, x, plan) >= 1]
+        kept = [x for x in free if share(gap_load(model, x, plan), plan.amplitude) >= 1]
         lost["collision"] += len(held) - len(free)
         lost["gravity preload"] += len(q) - len(held) + len(free) - len(kept)
         found += kept
         progress("candidates", min(1.0, len(found) / count))
         if len(found) >= count:
             return np.array(found[:count])
-        if drawn * _BATCH >= 40 * count + 4000 and len(found) < 0.02 * count:
+        if drawn * _BATCH >= 40 * count + 1000 and len(found) < 0.02 * count:
             break
     losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
     raise FlexcalError(

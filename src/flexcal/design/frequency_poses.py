@@ -11,7 +11,11 @@ from flexcal.design.collision import CollisionChecker
 from flexcal.design.exchange import exchange, greedy
 from flexcal.design.frequency_candidates import frequency_candidates
 from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
-from flexcal.design.response_sensitivity import response_sensitivity, thinned
+from flexcal.design.response_sensitivity import (
+    response_parameters,
+    response_sensitivity,
+    thinned,
+)
 from flexcal.design.spring_criterion import largest_stiffness_std, spring_criterion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
@@ -50,7 +54,8 @@ def choose_frequency_poses(
     """
     checker = CollisionChecker(model) if checker is None else checker
     pool = frequency_candidates(checker, plan, max(candidates, count), rng, progress)
-    screened = response_sensitivity(model, pool, thinned(plan, SCREEN), sensors, progress)
+    parameters = response_parameters(model, plan)
+    screened = response_sensitivity(model, pool, thinned(plan, SCREEN), parameters, sensors, progress)
     chosen = exchange(screened, count, spring_criterion(screened.parameters), progress=progress).chosen
     worst, std = largest_stiffness_std(screened, chosen)
     if std > UNKNOWN:

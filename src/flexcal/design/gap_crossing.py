@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, static_equilibrium
-from flexcal.model.closed_loop import multisine_torque
+from flexcal.model.closed_loop import strain_power
 from flexcal.model.linearisation import linearise
 from flexcal.model.periodic_torque import periodic_torque
 
@@ -19,21 +19,8 @@ SELDOM = 2.0
 """Standard deviations of a drive's torque that gravity must exceed all along the reference motion: its gap opens seldom, and little."""
 LOWEST = 0.2
 """Share of the excitation below which too little would be left to measure with."""
-INSTANTS = 32
+INSTANTS = 16
 """Instants of the reference motion at which the torque of the drives is looked at."""
-
-
-def drive_torque(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
-    """Root mean square (E,) N m of the torque in each elastic drive's spring under one experiment of the plan at `q` (n,)."""
-    axes = list(plan.joints)
-    system = linearise(model, q, plan.payload)
-    excitation = plan.amplitude / np.sqrt(len(axes))
-    return multisine_torque(model, system, plan.frequencies_hz, excitation, plan.kp[axes], plan.kd[axes])
-
-
-def loose_drives(model: RobotModel, plan: MultisinePlan) -> list[int]:
-    """The numbers of the excited axes that have backlash."""
-    return [k for k, joint in enumerate(plan.joints) if joint in model.backlash_joints]
 
 
 def share_at_rest(model: RobotModel, plan: MultisinePlan) -> float:
@@ -41,19 +28,21 @@ def share_at_rest(model: RobotModel, plan: MultisinePlan) -> float:
 
     The reference motion is left out, as in the paper. Above 1 where there is room.
     """
-    held = np.abs(static_equilibrium(model, plan.poses, plan.payload).torque[:, list(plan.joints)])
-    swing = CREST * np.array([drive_torque(model, q, plan) for q in plan.poses])
-    return float((held / swing)[:, loose_drives(model, plan)].min(initial=np.inf))
+    drives = _loose(model, plan)
+    held = np.abs(
+        static_equilibrium(model, plan.poses, plan.payload).torque[:, [plan.joints[k] for k in drives]]
+    )
+    power = np.sum([_strain(model, q, plan)[drives] * plan.amplitude**2 for q in plan.poses], axis=(2, 3))
+    return float((held / (CREST * np.sqrt(power))).min(initial=np.inf))
 
 
-def share_in_motion(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> float:
-    """The share of the excitation at which gaps at `q` (n,) open seldom all along the reference motion, and with peaks not at rest.
+def gap_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
+    """What 1 N² m² of amplitude² of each line adds to the square of how far every gap is strained at `q` (n,), (drives, E, L).
 
-    0 where the reference motion alone opens one; inf without backlash.
+    Where the sum over the lines is 1, gravity just exceeds three standard deviations of the drive's torque at rest, or two all along the
+    reference motion, whichever takes more. Of the drives with backlash, in their order.
     """
-    drives = loose_drives(model, plan)
-    if not drives:
-        return np.inf
+    drives = _loose(model, plan)
     omega = 2 * np.pi * plan.reference_frequency_hz
     angle = 2 * np.pi * np.arange(INSTANTS)[:, None] / INSTANTS
     excited = np.isin(np.arange(model.n), plan.joints) * plan.reference_amplitude
@@ -62,22 +51,47 @@ def share_in_motion(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> fl
         excited * omega * np.cos(angle),
         -excited * omega**2 * np.sin(angle),
     )
-    held = periodic_torque(model, *motion, period=2 * np.pi / omega, payload=plan.payload)
+    period = 1 / plan.reference_frequency_hz if omega else 1.0
+    held = periodic_torque(model, *motion, period=period, payload=plan.payload)
     held = held[:, [plan.joints[k] for k in drives]]
-    least = np.where((held > 0).all(axis=0) | (held < 0).all(axis=0), np.abs(held).min(axis=0), 1e-9)
-    needed = np.maximum(SELDOM / least, CREST / np.abs(held.mean(axis=0)))
-    return float(1 / (needed * drive_torque(model, q, plan)[drives]).max())
+    one_sided = (held > 0).all(axis=0) | (held < 0).all(axis=0)
+    least = np.where(one_sided, np.abs(held).min(axis=0), 0.0)
+    with np.errstate(divide="ignore"):
+        needed = np.maximum(SELDOM / least, CREST / np.abs(held.mean(axis=0)))
+    return _strain(model, q, plan)[drives] * needed[:, None, None] ** 2
+
+
+def share(load: np.ndarray, amplitude: np.ndarray) -> float:
+    """The share of `amplitude` (E, L) N m that strains no gap beyond its limit; `load` (..., E, L) is that of `gap_load`.
+
+    0 where the reference motion alone opens a gap; inf without backlash.
+    """
+    strained = np.sum(load * amplitude**2, axis=(-2, -1))
+    return float(1 / np.sqrt(strained.max())) if strained.size else np.inf
 
 
 def within_preload(model: RobotModel, plan: MultisinePlan) -> MultisinePlan:
-    """The plan, its amplitudes lowered on all axes alike until `share_in_motion` is 1 or more in every pose.
+    """The plan, its amplitudes lowered on all axes alike until no gap is strained beyond its limit in any pose.
 
-    Raises `FlexcalError` where the reference motion alone opens a gap.
+    Raises `FlexcalError` where next to nothing would be left, naming the pose.
     """
-    shares = [share_in_motion(model, q, plan) for q in plan.poses]
+    shares = [share(gap_load(model, q, plan), plan.amplitude) for q in plan.poses]
     if min(shares) < LOWEST:
         raise FlexcalError(
-            f"pose {int(np.argmin(shares)) + 1} does not load the drives with backlash enough: their gaps would stay closed only with "
-            f"{100 * min(shares):.0f} % of the excitation; choose another pose or a smaller reference motion."
+            f"gravity does not load the drives with backlash in pose {int(np.argmin(shares)) + 1} enough: their gaps would stay closed "
+            f"only with {100 * min(shares):.0f} % of the excitation; choose another pose or a smaller reference motion."
         )
     return replace(plan, amplitude=min(1.0, *shares) * plan.amplitude)
+
+
+def _loose(model: RobotModel, plan: MultisinePlan) -> list[int]:
+    """The numbers of the excited axes that have backlash."""
+    return [k for k, joint in enumerate(plan.joints) if joint in model.backlash_joints]
+
+
+def _strain(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
+    """Mean square (E, E, L) of the torque in each drive's spring by 1 N m of amplitude, in one experiment: axes share it evenly."""
+    axes = list(plan.joints)
+    system = linearise(model, q, plan.payload)
+    power = strain_power(model, system, plan.frequencies_hz, plan.kp[axes], plan.kd[axes])
+    return np.moveaxis(power, 0, -1) / len(axes)

@@ -90,13 +90,13 @@ class PoseResponse:
 def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
     """What the responses of all poses share: springs, rotors, inertials of links and payload, a delay an axis, geometric errors.
 
-    Priors are those that robot.yaml declares; `prior_information` takes what was estimated before instead.
+    Priors are those that robot.yaml declares; `known_before` takes what was estimated before instead.
     """
     delays = (
         Parameter(f"{joint.name}.delay", "s", 0.0, prior_std=1 / plan.rate_hz) for joint in model.elastic
     )
-    errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
     inertials = elastic_inertials(model, loaded=plan.payload != 0)
+    errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
     return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors))
 
 
@@ -104,14 +104,16 @@ def response_sensitivity(
     model: RobotModel,
     poses: np.ndarray,
     plan: MultisinePlan,
+    parameters: Parameters,
     sensors: ResponseSensors = COMMON_SENSORS,
     progress: Progress = silent,
 ) -> Sensitivity:
-    """Rows of every pose of `poses` (candidates, n) under the excitation of `plan`; prior: the robot's posterior, else robot.yaml's.
+    """Rows of every pose of `poses` (candidates, n) under the excitation of `plan`, in the shared `parameters`.
+
+    The prior is the robot's posterior, where nothing was estimated that of the parameters.
 
     Raises `FlexcalError` where the plan does not excite exactly the elastic joints.
     """
-    parameters = response_parameters(model, plan)
     rows = []
     for number, q in enumerate(poses):
         progress("sensitivities", number / len(poses))

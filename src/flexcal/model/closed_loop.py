@@ -33,6 +33,15 @@ def drive_pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
     return pull
 
 
+def strain_power(
+    robot: RobotModel, system: Linearisation, frequencies_hz: np.ndarray, kp: np.ndarray, kd: np.ndarray
+) -> np.ndarray:
+    """Mean square (L, E, E) of the torque in each elastic drive's spring by a cosine of 1 N m added to each motor (last)."""
+    stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
+    moved = closed_loop_motion(system, frequencies_hz, kp, kd)
+    return 0.5 * np.abs(stiffness[:, None] * (drive_pull(robot, system).T @ moved)) ** 2
+
+
 def multisine_torque(
     robot: RobotModel,
     system: Linearisation,
@@ -45,7 +54,5 @@ def multisine_torque(
 
     `excitation` (E, L) N m are the cosine amplitudes added to the motors; otherwise as in `closed_loop_motion`.
     """
-    stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
-    moved = closed_loop_motion(system, frequencies_hz, kp, kd)
-    power = np.abs(stiffness[:, None] * (drive_pull(robot, system).T @ moved)) ** 2
-    return np.sqrt(0.5 * (power * excitation.T[:, None, :] ** 2).sum(axis=(0, 2)))
+    power = strain_power(robot, system, frequencies_hz, kp, kd)
+    return np.sqrt(np.sum(power * excitation.T[:, None, :] ** 2, axis=(0, 2)))

@@ -9,6 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from flexcal.data import MultisinePlan, write_plan
+from flexcal.design.amplitude import shaped
 from flexcal.design.frequency_poses import ChosenPoses, stiffness_curve
 from flexcal.design.gap_crossing import within_preload
 from flexcal.design.multisines import room
@@ -17,12 +18,12 @@ from flexcal.design.spring_criterion import largest_stiffness_std
 from flexcal.frequency import leave_out_detection_lines
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.frequency_design import FrequencyDesignStudy, write_frequency_page
 from flexcal.workflow.designed_frequency import (
     CANDIDATES,
     POSES,
     designed_excitation,
     response_sensors,
-    shaped_plan,
     unplaced_plan,
 )
 from flexcal.workflow.frequency_plans import frequency_plan, read_frequency_poses
@@ -56,6 +57,7 @@ class DesignedFrequency:
         name, largest = largest_stiffness_std(self.planned.sensitivity)
         result = {
             "plan": self.file,
+            "page": self.file.with_suffix(".html"),
             "poses": len(plan.poses),
             "excited_axes": [joint + 1 for joint in plan.joints],
             "lines": len(plan.lines),
@@ -97,7 +99,7 @@ def plan_frequency_experiments(
     seed: int = 0,
     progress: Progress = silent,
 ) -> DesignedFrequency:
-    """Write the plan `kind` for a robot to `out`.
+    """Write the plan `kind` for a robot to `out`, and a page with pictures beside it.
 
     `designed` and `quick` choose six poses out of random `candidates`, or `choose` of them, and shape the amplitudes; `default` and `paper`
     take the poses of frequency_poses.csv beside robot.yaml and flat amplitudes. `poses`: a file of poses to take instead, the rows of
@@ -117,7 +119,7 @@ def plan_frequency_experiments(
         plan = leave_out_detection_lines(plan) if detection_lines else plan
         flat = planned = PlannedResponses.of(model, plan, sensors)
         if amplitude == "shaped":
-            planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+            planned = PlannedResponses.of(model, shaped(model, flat), sensors)
     else:
         plan = unplaced_plan(model, kind, detection_lines=detection_lines, seed=seed)
         if poses is None:
@@ -128,13 +130,16 @@ def plan_frequency_experiments(
         else:
             given = read_frequency_poses(poses, kind, model, room(model, plan.reference_amplitude))
             flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=given)), sensors)
-            planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+            planned = PlannedResponses.of(model, shaped(model, flat), sensors)
         planned = flat if amplitude == "flat" else planned
     if wanted is not None:
         planned = planned.reaching(wanted)
     planned = replace(planned, plan=replace(planned.plan, crest=crest))
     write_plan(out, planned.plan)
-    return DesignedFrequency(planned, flat, out, choice, None if choice is None else _curve(choice, seed))
+    found = DesignedFrequency(planned, flat, out, choice, None if choice is None else _curve(choice, seed))
+    study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
+    write_frequency_page(out.with_suffix(".html"), study)
+    return found
 
 
 def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:

@@ -58,7 +58,7 @@ def designed_excitation(
     progress("amplitudes", 0.0)
     flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=choice.poses)), sensors)
     progress("amplitudes", 0.3)
-    planned = PlannedResponses.of(model, shaped_plan(model, flat), sensors)
+    planned = PlannedResponses.of(model, shaped(model, flat), sensors)
     progress("amplitudes", 1.0)
     return DesignedExcitation(planned, flat, choice)
 
@@ -75,11 +75,6 @@ def unplaced_plan(model: RobotModel, kind: str, *, detection_lines: bool = False
         schedule=SCHEDULES[kind],
     )
     return leave_out_detection_lines(plan) if detection_lines else plan
-
-
-def shaped_plan(model: RobotModel, flat: PlannedResponses) -> MultisinePlan:
-    """The plan with its power where it tells most, lowered until no peak pulls a drive across its gap."""
-    return within_preload(model, shaped(flat))
 
 
 def response_sensors(robot: Path) -> ResponseSensors:

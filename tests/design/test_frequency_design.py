@@ -1,0 +1,170 @@
+"""Poses and amplitudes of frequency experiments: limits, choice and bad input."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from flexcal.design import CollisionChecker, exchange, joint_ranges
+from flexcal.design.amplitude import LEAST, MOST, shaped
+from flexcal.design.frequency_candidates import frequency_candidates
+from flexcal.design.frequency_poses import choose_frequency_poses, stiffness_curve
+from flexcal.design.gap_crossing import CREST, gap_load, share, share_at_rest, within_preload
+from flexcal.design.multisines import DROOP, flat_multisine
+from flexcal.design.planned_responses import PlannedResponses
+from flexcal.design.response_sensitivity import thinned
+from flexcal.design.spring_criterion import spring_criterion
+from flexcal.errors import FlexcalError
+from flexcal.frequency import leave_out_detection_lines, multisine
+from flexcal.model import gravity_torque
+
+
+@pytest.fixture(scope="module")
+def plan(tx90l):
+    anywhere = np.zeros((1, 6))
+    flat = flat_multisine(tx90l, anywhere, name="test", payload=None, reference=np.radians(1.5), seed=3)
+    return thinned(leave_out_detection_lines(flat), 4)
+
+
+@pytest.fixture(scope="module")
+def choice(tx90l, plan):
+    return choose_frequency_poses(tx90l, plan, 4, 14, np.random.default_rng(2))
+
+
+@pytest.fixture(scope="module")
+def amplitudes(tx90l, plan, choice):
+    flat = PlannedResponses.of(tx90l, within_preload(tx90l, replace(plan, poses=choice.poses)))
+    return flat, shaped(tx90l, flat)
+
+
+def test_candidates_have_room_and_touch_nothing_and_are_preloaded(tx90l, plan, choice):
+    q = choice.candidates
+    lower, upper = joint_ranges(tx90l)
+    free = np.r_[np.full(3, plan.reference_amplitude + DROOP), np.zeros(3)]
+    assert (q > lower + free).all() and (q < upper - free).all()
+    swing = np.r_[np.full(3, plan.reference_amplitude), np.zeros(3)]
+    for side in (-1, 0, 1):
+        assert not CollisionChecker(tx90l).collides(q + side * swing).any()
+    for pose in q:
+        one = replace(plan, poses=pose[None])
+        assert (
+            share_at_rest(tx90l, one) >= 0.98
+        )  # the reference motion's mean torque is not quite gravity's at rest
+        assert share(gap_load(tx90l, pose, plan), plan.amplitude) >= 1
+
+
+def test_the_limit_of_a_gap_is_gravity_over_its_crest(tx90l, plan):
+    """Without reference motion three standard deviations of the drive's torque, from a time series, meet gravity."""
+    q = np.radians([0, 60.1, -105, 79.6, 67.5, 0])
+    still = replace(plan, reference_amplitude=0.0, poses=q[None])
+    allowed = share(gap_load(tx90l, q, still), still.amplitude)
+    from flexcal.model.closed_loop import closed_loop_motion, drive_pull
+    from flexcal.model.linearisation import linearise
+
+    system = linearise(tx90l, q)
+    moved = closed_loop_motion(system, still.frequencies_hz, still.kp[:3], still.kd[:3])
+    strain = (
+        tx90l.stiffness[:3, 2][:, None] * (drive_pull(tx90l, system).T @ moved) @ multisine.spectra(still, 0)
+    )
+    torque = multisine.synthesise(strain, still.lines, 4096)  # (samples, drives, experiments)
+    held = np.abs(gravity_torque(tx90l, q[None]))[0, 1:3]
+    rms = np.sqrt(np.mean(torque**2, axis=(0, 2)))[1:]
+    assert allowed == pytest.approx((held / (CREST * rms)).min(), rel=0.02)
+
+
+def test_exchange_finds_the_best_of_all_sets_of_a_small_pool(choice):
+    criterion = spring_criterion(choice.screened.parameters)
+    every = [
+        criterion.trace((factor := choice.screened.factor(list(some))).T @ factor)
+        for some in combinations(range(len(choice.candidates)), 4)
+    ]
+    found = choice.screened.factor(choice.chosen)
+    assert criterion.trace(found.T @ found) <= 1.03 * min(every) < np.median(every) / 1.5
+    start = exchange(choice.screened, 4, criterion, start=[0, 1, 2, 3])
+    assert criterion.trace((f := choice.screened.factor(start.chosen)).T @ f) <= 1.05 * min(every)
+
+
+def test_shaped_amplitudes_keep_all_limits_and_tell_more(tx90l, plan, choice, amplitudes):
+    flat, found = amplitudes
+    assert np.all(np.sum(found.amplitude**2, axis=1) <= np.sum(flat.plan.amplitude**2, axis=1) * (1 + 1e-9))
+    for q in choice.poses:
+        assert share(gap_load(tx90l, q, found), found.amplitude) >= 1 - 1e-9
+    over = found.amplitude / flat.plan.amplitude
+    assert over.max() <= MOST + 1e-9
+    assert over.max() / over.min() <= MOST / LEAST * np.sqrt(3)
+    np.testing.assert_array_equal(found.detection_lines, plan.detection_lines)
+    assert not np.isin(found.detection_lines, found.lines).any()
+    crests = [
+        multisine.crest_factor(multisine.torque(replace(found, crest="optimised"), r, 0)).max()
+        for r in (0, 1)
+    ]
+    assert max(crests) < CREST
+    planned = PlannedResponses.of(tx90l, found)
+    criterion = spring_criterion(planned.parameters)
+    before, after = (criterion.trace((f := x.sensitivity.factor()).T @ f) for x in (flat, planned))
+    assert after < 0.85 * before
+    assert max(np.median(r.relative_error(found)) for r in planned.responses) < 0.3
+
+
+def test_gains_are_the_derivative_of_the_criterion(amplitudes):
+    """∂ log tr(W M⁻¹) by the power of one line of one axis, nuisances eliminated, by central differences."""
+    flat, _ = amplitudes
+    criterion = spring_criterion(flat.parameters)
+
+    def merit(plan):
+        return criterion.merit(
+            flat.prior_information + sum((r := x.rows(plan)).T @ r for x in flat.responses)
+        )
+
+    plan = flat.plan
+    information = flat.prior_information + sum((r := x.rows(plan)).T @ r for x in flat.responses)
+    gain = np.sum([x.gains(plan, criterion.gradient(information)) for x in flat.responses], axis=0)
+    for axis, line in ((0, 5), (1, 11), (2, 20)):
+        ends = []
+        for side in (1, -1):
+            power = plan.amplitude**2
+            power[axis, line] *= 1 + side * 1e-4
+            ends.append(merit(replace(plan, amplitude=np.sqrt(power))))
+        expected = (ends[0] - ends[1]) / (2e-4 * plan.amplitude[axis, line] ** 2)
+        assert gain[axis, line] == pytest.approx(expected, rel=1e-3)
+
+
+def test_more_poses_tell_more_and_chosen_ones_more_than_random(choice):
+    chosen, random = stiffness_curve(choice, np.arange(1, 7), np.random.default_rng(0))
+    assert np.all(np.diff(chosen) < 0)
+    assert np.all(chosen[1:] < random[1:])
+
+
+def test_too_few_poses_name_the_spring(tx90l, plan):
+    with pytest.raises(
+        FlexcalError,
+        match=r"1 poses? cannot determine joint_3\.bearing_y\.stiffness: .* %; choose more poses",
+    ):
+        choose_frequency_poses(
+            tx90l, replace(plan, payload=0.0, amplitude=0.4 * plan.amplitude), 1, 3, np.random.default_rng(0)
+        )
+
+
+def test_no_room_for_the_motion_names_the_joint(tx90l, plan):
+    wide = replace(plan, reference_amplitude=np.radians(200))
+    with pytest.raises(FlexcalError, match=r"limits of joint_1 leave no room for the 202°"):
+        frequency_candidates(CollisionChecker(tx90l), wide, 3, np.random.default_rng(0))
+
+
+def test_no_preload_anywhere_says_what_threw_poses_out(tx90l, plan):
+    strong = replace(plan, amplitude=20 * plan.amplitude)
+    with pytest.raises(
+        FlexcalError, match=r"only 0 of the wanted 3 can be excited: gravity preload threw out \d+, collision"
+    ):
+        frequency_candidates(CollisionChecker(tx90l), strong, 3, np.random.default_rng(0))
+
+
+def test_a_given_pose_that_does_not_load_a_gap_is_named(tx90l, plan):
+    upright = replace(plan, poses=np.zeros((1, 6)))
+    with pytest.raises(
+        FlexcalError, match=r"gravity does not load the drives with backlash in pose 1 enough"
+    ):
+        within_preload(tx90l, upright)
