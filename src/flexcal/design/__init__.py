@@ -33,7 +33,7 @@ from flexcal.design.poses import (
 from flexcal.design.preload import preloaded
 from flexcal.design.setup import MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
-from flexcal.design.trajectories import design_trajectories
+from flexcal.design.trajectories import TrajectoryDesign, design_trajectories
 from flexcal.design.visibility import visible
 from flexcal.design.visiting_order import VisitingOrder, visiting_order
 from flexcal.design.working_volume import WorkingVolume, working_box, working_points
@@ -55,6 +55,7 @@ __all__ = [
     "Tolerances",
     "TraceOptimal",
     "TrackerNoise",
+    "TrajectoryDesign",
     "VisitingOrder",
     "WorkingVolume",
     "base_sensitivity",
