@@ -2,7 +2,8 @@
 
 A Boolean or a text is never a number, NaN and infinity are refused, an unknown key is refused with the
 nearest known one. Arrays (`numpy.ndarray`, `NDArray[np.int64]`) are rectangular nested lists of numbers. Of a
-union, the members that have the form of the value (mapping, list or scalar) are tried in order.
+union, the members that have the form of the value (mapping, list or scalar) are tried in order, dataclasses that know more of its
+keys later.
 """
 
 from __future__ import annotations
@@ -189,7 +190,9 @@ def _union_hook(cls: Any, converter: Converter) -> Any:
     def structure(value: Any, _: Any) -> Any:
         if value is None and NoneType in members:
             return None
-        fitting = [member for member in members if _takes(member, value)]
+        fitting = sorted(
+            (member for member in members if _takes(member, value)), key=lambda m: _known(m, value)
+        )
         if not fitting:
             expected = " or ".join(_expected(member) for member in members if member is not NoneType)
             raise _Unfit(f"{expected} is expected, not {_describe(value)}")
@@ -201,6 +204,11 @@ def _union_hook(cls: Any, converter: Converter) -> Any:
         return converter.structure(value, fitting[-1])
 
     return structure
+
+
+def _known(cls: Any, value: Any) -> int:
+    """How many of a value's keys a dataclass has: of two, the fault of the nearer one is told."""
+    return len(value.keys() & set(_known_keys(cls))) if dataclasses.is_dataclass(cls) else 0
 
 
 def _kind(cls: Any) -> type:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.cell import CellConfig, FrictionConfig, SensorConfig, VirtualCell
-from flexcal.data import TrajectoryPlan
+from flexcal.data import FourierPaths, TrajectoryPlan
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 from flexcal.model.periodic_torque import periodic_torque
@@ -24,9 +24,11 @@ def plan(tx90l: RobotModel) -> TrajectoryPlan:
     assert controller is not None
     return TrajectoryPlan(
         name="slow",
-        centre=np.array([[0.0, 0.4, 0.8, 0.0, 0.5, 0.0]]),
-        sine=0.3 * rng.normal(size=(1, 6, 2)),
-        cosine=0.3 * rng.normal(size=(1, 6, 2)),
+        paths=FourierPaths(
+            centre=np.array([[0.0, 0.4, 0.8, 0.0, 0.5, 0.0]]),
+            sine=0.3 * rng.normal(size=(1, 6, 2)),
+            cosine=0.3 * rng.normal(size=(1, 6, 2)),
+        ),
         payload=0.0,
         base_frequency_hz=0.5,
         periods=2,
@@ -74,9 +76,7 @@ def test_what_the_cell_cannot_do_is_said(tx90l: RobotModel, plan: TrajectoryPlan
         list(VirtualCell(tx90l).record(replace(plan, torque="instantaneous")))
     narrow = replace(
         plan,
-        centre=plan.centre[:, :3],
-        sine=plan.sine[:, :3],
-        cosine=plan.cosine[:, :3],
+        paths=FourierPaths.of_coefficients(plan.paths.coefficients[:, :, :3]),
         kp=plan.kp[:3],
         kd=plan.kd[:3],
     )

@@ -16,7 +16,7 @@ from test_bad_input import refused
 
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth
 from flexcal.cli.main import main
-from flexcal.data import TrajectoryPlan, read_estimates, read_plan_of, write_plan
+from flexcal.data import FourierPaths, TrajectoryPlan, read_estimates, read_plan_of, write_plan
 from flexcal.model import RobotModel
 from flexcal.progress import silent
 from flexcal.workflow import stage_zero
@@ -178,19 +178,44 @@ def test_folders_of_other_plans(run, recorded: Path, tmp_path: Path) -> None:
         assert f"'flexcal {following}'" in refused(run, tmp_path, *inertials)
 
 
+REFUSED = {
+    ("--duration", 3): "3 s is too short for the base frequency 0.2 Hz",
+    ("--duration", 12): "2.4 periods",
+    ("--of", "link_3.mass"): "only for c",
+    ("--criterion", "c", "--of", "link_3.mas"): "did you mean link_3.mass",
+    ("--criterion", "c", "--of", "link_1.com_z"): "link_1.com_z, which torques show not at all",
+    ("--criterion", "c", "--of", "link_1.Izz", "joint_1.rotor_inertia"): "only together with joint_1.rotor_inertia",
+    ("--start", 0, 0): "2 positions, but tx90l has 6",
+    ("--start", 0, 0, 9, 0, 0, 0): "joint_3 is at 9, outside",
+    ("--start", 0, 2.2, 2.2, 0, 0, 0): "touches",
+}
+
+
 def test_what_cannot_be_designed(run, recorded: Path, tmp_path: Path) -> None:
     robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
     arguments = ("design", "trajectory", robot, "--out", tmp_path / "plan.yaml")
     assert "--count is 0" in refused(run, tmp_path, *arguments, "--count", 0)
+    for words, sentence in REFUSED.items():
+        assert sentence in refused(run, tmp_path, *arguments, *words)
+
+
+def test_a_robot_without_controller_gets_a_plan_that_the_virtual_cell_refuses(
+    run, recorded: Path, tmp_path: Path
+) -> None:
+    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
     text = robot.read_text().splitlines(keepends=True)
     robot.write_text("".join(line for line in text if not line.startswith("controller:")))
-    assert "declares no controller" in refused(run, tmp_path, *arguments)
+    plan = robot.parent / "plan.yaml"
+    assert run("design", "trajectory", robot, "--count", 1, "--out", plan).status == 0
+    assert read_plan_of(plan, TrajectoryPlan).rate_hz == 1000.0
+    measure = ("measure", plan, "--cell", "virtual", "--out", tmp_path / "measured")
+    assert "no gains" in refused(run, tmp_path, *measure)
 
 
 def test_a_plan_of_more_trajectories_needs_all_logs(run, recorded: Path, tmp_path: Path) -> None:
     folder = copied(recorded / "exciting", tmp_path / "exciting")
     plan = read_plan_of(folder / "plan.yaml", TrajectoryPlan)
-    twice = {name: np.repeat(getattr(plan, name), 2, axis=0) for name in ("centre", "sine", "cosine")}
-    write_plan(folder / "plan.yaml", replace(plan, **twice))
+    twice = FourierPaths.of_coefficients(np.repeat(plan.paths.coefficients, 2, axis=0))
+    write_plan(folder / "plan.yaml", replace(plan, paths=twice))
     arguments = ("identify", "inertials", recorded / "robot.yaml", folder)
     assert "realisation_2_experiment_1_plus" in refused(run, tmp_path, *arguments)

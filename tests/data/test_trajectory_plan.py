@@ -2,13 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from flexcal.data import MultisinePlan, TrajectoryPlan, labels, read_plan_of, write_plan
+from flexcal.data import (
+    FourierPaths,
+    MultisinePlan,
+    SplinePaths,
+    TrajectoryPlan,
+    labels,
+    read_plan_of,
+    write_plan,
+)
 from flexcal.errors import FlexcalError, InputError
 from flexcal.yaml_writer import to_plain
 
@@ -18,9 +27,7 @@ def make_trajectory(**changes: Any) -> TrajectoryPlan:
     rng = np.random.default_rng(3)
     values: dict[str, Any] = {
         "name": "small",
-        "centre": rng.normal(size=(2, 3)),
-        "sine": rng.normal(size=(2, 3, 4)),
-        "cosine": rng.normal(size=(2, 3, 4)),
+        "paths": FourierPaths(*(rng.normal(size=size) for size in ((2, 3), (2, 3, 4), (2, 3, 4)))),
         "payload": 0.0,
         "base_frequency_hz": 0.2,
         "periods": 3,
@@ -39,7 +46,7 @@ def test_round_trip(tmp_path: Path) -> None:
     write_plan(tmp_path / "plan.yaml", plan)
     again = read_plan_of(tmp_path / "plan.yaml", TrajectoryPlan)
     assert to_plain(again) == to_plain(plan)
-    np.testing.assert_array_equal(again.sine, plan.sine)
+    np.testing.assert_array_equal(again.paths.coefficients, plan.paths.coefficients)
     with pytest.raises(InputError, match="kind 'trajectory', but one of kind 'multisine'"):
         read_plan_of(tmp_path / "plan.yaml", MultisinePlan)
 
@@ -47,13 +54,14 @@ def test_round_trip(tmp_path: Path) -> None:
 def test_velocity_and_acceleration_are_derivatives() -> None:
     """Complex steps on a series written out independently of the plan."""
     plan = make_trajectory()
+    sine, cosine = plan.paths.coefficients[1, 1:].T.reshape(3, 2, 4).swapaxes(0, 1)
     time = np.linspace(0.3, 4.1, 17)
     q, dq, ddq = plan.motion(1, time)
     k = 2 * np.pi * 0.2 * np.arange(1, 5)
 
     def velocity(t: np.ndarray) -> np.ndarray:
         angle = t[:, None, None] * k
-        return np.sum(plan.sine[1] * np.sin(angle) + plan.cosine[1] * np.cos(angle), axis=2)
+        return np.sum(sine * np.sin(angle) + cosine * np.cos(angle), axis=2)
 
     np.testing.assert_allclose(dq, velocity(time), rtol=1e-12, atol=1e-12)
     np.testing.assert_allclose(ddq, velocity(time + 1e-20j).imag / 1e-20, rtol=1e-10, atol=1e-10)
@@ -68,7 +76,7 @@ def test_motion_is_periodic_about_its_centre() -> None:
     now, later = plan.motion(0, time), plan.motion(0, time + 5.0)
     for one, other in zip(now, later, strict=True):
         np.testing.assert_allclose(one, other, atol=1e-9)
-    np.testing.assert_allclose(now[0].mean(axis=0), plan.centre[0], atol=1e-9)
+    np.testing.assert_allclose(now[0].mean(axis=0), plan.paths.coefficients[0, 0], atol=1e-9)
 
 
 def test_every_trajectory_has_a_label() -> None:
@@ -79,8 +87,6 @@ def test_every_trajectory_has_a_label() -> None:
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
-        ({"sine": np.zeros((2, 2, 4))}, "sine has shape"),
-        ({"cosine": np.zeros((2, 3, 5))}, "same number of harmonics"),
         ({"kp": np.ones(2)}, "kp has 2 gains"),
         ({"base_frequency_hz": 0.3}, "no whole number of samples"),
         ({"settle_periods": 3}, "keep at least one"),
@@ -91,3 +97,48 @@ def test_every_trajectory_has_a_label() -> None:
 def test_what_does_not_fit_is_said(changes: dict[str, Any], message: str) -> None:
     with pytest.raises(FlexcalError, match=message):
         make_trajectory(**changes)
+
+
+@pytest.mark.parametrize(
+    ("paths", "message"),
+    [
+        (lambda: FourierPaths(np.zeros((2, 3)), np.zeros((2, 2, 4)), np.zeros((2, 3, 4))), "sine has shape"),
+        (
+            lambda: FourierPaths(np.zeros((2, 3)), np.zeros((2, 3, 4)), np.zeros((2, 3, 5))),
+            "same number of harmonics",
+        ),
+        (lambda: FourierPaths(np.zeros(3), np.zeros((1, 3, 4)), np.zeros((1, 3, 4))), "centre must be"),
+        (lambda: SplinePaths(np.zeros((2, 3, 6))), "at least 7"),
+    ],
+)
+def test_paths_that_do_not_fit_are_said(paths: Callable[[], object], message: str) -> None:
+    with pytest.raises(FlexcalError, match=message):
+        paths()
+
+
+def test_splines_come_back_and_are_splines(tmp_path: Path) -> None:
+    """Bit by bit through a file; between knots a polynomial of degree 5, and where all control points are one, at rest there."""
+    control = np.random.default_rng(5).normal(size=(2, 3, 10))
+    control[:, :, [0, 6, 7, 8, 9]] = control[:, :, 5:6]
+    plan = make_trajectory(paths=SplinePaths(control))
+    write_plan(tmp_path / "plan.yaml", plan)
+    again = read_plan_of(tmp_path / "plan.yaml", TrajectoryPlan)
+    assert isinstance(again.paths, SplinePaths)
+    np.testing.assert_array_equal(again.paths.control, control)
+    time = 5.0 * (2 + np.linspace(0, 1, 40)) / 10
+    q, dq, ddq = plan.motion(0, time)
+    fitted = np.polynomial.Polynomial.fit(time, q[:, 1], 5)
+    np.testing.assert_allclose(fitted(time), q[:, 1], atol=1e-10)
+    np.testing.assert_allclose(fitted.deriv()(time), dq[:, 1], atol=1e-8)
+    np.testing.assert_allclose(fitted.deriv(2)(time), ddq[:, 1], atol=1e-7)
+    rest = plan.motion(0, np.array([0.0, 5.0]))
+    np.testing.assert_allclose(rest[0][0], control[0, :, 5], atol=1e-12)
+    np.testing.assert_allclose(rest[1:], 0.0, atol=1e-9)
+
+
+def test_of_a_misspelt_path_the_nearer_kind_is_named(tmp_path: Path) -> None:
+    write_plan(tmp_path / "plan.yaml", make_trajectory())
+    text = (tmp_path / "plan.yaml").read_text().replace("cosine:", "cosines:")
+    (tmp_path / "plan.yaml").write_text(text)
+    with pytest.raises(InputError, match="did you mean 'cosine'"):
+        read_plan_of(tmp_path / "plan.yaml", TrajectoryPlan)

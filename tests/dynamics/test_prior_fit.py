@@ -10,27 +10,27 @@ import numpy as np
 import pytest
 
 from flexcal.cell import CellConfig, VirtualCell, draw_truth
-from flexcal.data import Recording, TrajectoryPlan
-from flexcal.design import design_trajectories
+from flexcal.data import FourierPaths, Recording, TrajectoryPlan
 from flexcal.dynamics import identify_with_prior, trajectory_error
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
 from flexcal.model.config import PriorConfig
 from flexcal.model.periodic_torque import periodic_torque
+from flexcal.workflow.design_trajectory import exciting_plan
 
 
 @pytest.fixture(scope="module")
 def plan(tx90l: RobotModel) -> TrajectoryPlan:
     """Two trajectories, sampled slowly: synthetic torques need no controller."""
-    designed = design_trajectories(tx90l, 2, candidates=20, seed=1, payload=0.0)
+    designed = exciting_plan(tx90l, count=2, seed=1)
     return replace(designed, rate_hz=400.0, torque="instantaneous")
 
 
 @pytest.fixture(scope="module")
 def single(plan: TrajectoryPlan) -> TrajectoryPlan:
     """The first of them."""
-    return replace(plan, centre=plan.centre[:1], sine=plan.sine[:1], cosine=plan.cosine[:1])
+    return replace(plan, paths=FourierPaths.of_coefficients(plan.paths.coefficients[:1]))
 
 
 def drawn(model: RobotModel, rng: np.random.Generator) -> RobotModel:
@@ -162,7 +162,7 @@ def coverage(model: RobotModel, plan: TrajectoryPlan, seeds: range) -> tuple[flo
 
 def test_the_virtual_cell_is_understood(tx90l: RobotModel) -> None:
     """MuJoCo's robot with gaps, encoders and a friction that is no sign: the covariance still holds, and gravity is known."""
-    plan = design_trajectories(tx90l, 1, candidates=20, seed=4, payload=0.0)
+    plan = exciting_plan(tx90l, count=1, seed=4)
     values = draw_truth(tx90l, CellConfig().spread, np.random.default_rng(4))
     truth = tx90l.with_values(values)
     cell = VirtualCell(truth, seed=4, controller_model=tx90l)

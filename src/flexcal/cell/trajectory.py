@@ -29,6 +29,11 @@ def trajectory_recordings(
         raise FlexcalError(
             "the virtual cell's torque is held over a sample, not instantaneous; write `tau: held` in the plan."
         )
+    if plan.kp is None or plan.kd is None:
+        raise FlexcalError(
+            "the plan has no gains, which the virtual cell's controller needs; add `controller: {kp: […], kd: […], rate_hz: 4000}` to "
+            "robot.yaml and design it again."
+        )
     everything = range(truth.n)
     samples = plan.periods * plan.samples_per_period
     for number, label in enumerate(labels(plan)):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import arg
 
@@ -15,29 +15,81 @@ from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 
 @dataclass(frozen=True)
 class DesignTrajectory:
-    """Plan exciting trajectories: periodic motions of all joints that keep the limits, touch nothing and tell most of the links."""
+    """Plan exciting trajectories: periodic motions that keep the limits, touch nothing and tell most of the robot's dynamics."""
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE")] = Path("trajectory.yaml")
     """File for the plan."""
     count: Annotated[int, arg(metavar="N")] = 3
-    """Trajectories; the best of twenty times as many random ones."""
+    """Trajectories; each is designed in view of those before it."""
+    criterion: Literal["posterior", "condition", "D", "E", "A", "c"] = "posterior"
+    """posterior: masses, centres of mass and rotors beside robot.yaml's prior; c: the variances of the parameters --of, beside it.
+    Of the base parameters without prior: condition number of the column-scaled observation matrix, log det (D), least eigenvalue of the
+    information (E), trace of the covariance (A)."""
+    of: Annotated[tuple[str, ...], arg(metavar="NAME")] = ()
+    """Parameters that the criterion c is of, as link_3.mass or payload.mass."""
+    kind: Literal["fourier", "spline"] = "fourier"
+    """Fourier series, or cyclic B-splines with three control points for each of the harmonics."""
+    duration: Annotated[float, arg(metavar="S")] = 10.0
+    """Seconds that a trajectory lasts, beside one period to settle."""
+    base_frequency: Annotated[float, arg(metavar="HZ")] = 0.2
+    """Of its repetitions."""
+    harmonics: Annotated[int, arg(metavar="N")] = 5
+    """Multiples of the base frequency."""
+    rest: bool = False
+    """Every period begins and ends at rest."""
+    start: Annotated[
+        tuple[float, ...], arg(metavar="Q", help_behavior_hint="(default: anywhere, for the best)")
+    ] = ()
+    """Joint positions, rad or m, where every period begins and ends at rest."""
+    share: Annotated[float, arg(metavar="SHARE")] = 0.8
+    """Of velocities, accelerations and torques that a motion uses; the controller needs the rest."""
+    loaded: bool = False
+    """With the declared payload; without it by default."""
+    searches: Annotated[int, arg(metavar="N")] = 1
+    """Random beginnings, of which the best is followed; more take longer."""
+    steps: Annotated[int, arg(metavar="N")] = 20
+    """Steps of a search at each height of its barrier; 60 come close to the end."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the random trajectories."""
+    """Of the random beginnings."""
     json: Json = False
 
     def run(self) -> None:
         """Plan, and print how long it takes."""
-        from flexcal.workflow.design_trajectory import plan_trajectories
+        from flexcal.workflow.design_trajectory import TrajectoryRequest, plan_trajectories
 
         require_robot(self.robot)
-        require_at_least(1, count=self.count)
+        require_at_least(
+            1, count=self.count, harmonics=self.harmonics, searches=self.searches, steps=self.steps
+        )
         require_at_least(0, seed=self.seed)
         console = Console(self.json)
-        document = plan_trajectories(self.robot, self.out, count=self.count, seed=self.seed).document()
+        request = TrajectoryRequest(
+            count=self.count,
+            criterion=self.criterion,
+            of=self.of,
+            kind=self.kind,
+            duration=self.duration,
+            base_frequency_hz=self.base_frequency,
+            harmonics=self.harmonics,
+            rest=self.rest,
+            start=self.start,
+            share=self.share,
+            loaded=self.loaded,
+            starts=self.searches,
+            steps=self.steps,
+            seed=self.seed,
+        )
+        with console.progress() as progress:
+            document = plan_trajectories(self.robot, self.out, request, progress=progress).document()
         without = "" if document["payload"] is None else ", without the payload"
         console.say(
             f"wrote {self.out}: {document['trajectories']} trajectories of {document['periods']} periods of "
             f"{1 / document['base_frequency_hz']:g} s{without}, {document['seconds_on_the_robot']:.0f} s on a real robot"
+        )
+        console.say(
+            f"{document['base_parameters']} base parameters, condition number {document['condition']:.3g} of the column-scaled observation "
+            f"matrix; criterion {self.criterion}: "
+            + ", ".join(f"{merit:.4g}" for merit in document["merits"])
         )
         console.finish(document, f"{measuring(self.out, self.robot, 'exciting')}, or record it on the robot")

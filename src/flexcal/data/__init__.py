@@ -13,6 +13,7 @@ from flexcal.data.pose_set import PoseSet, concatenate
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import read_recording, read_recording_blocks, write_recording
 from flexcal.data.time_base import TimeBase
+from flexcal.data.trajectory_paths import FourierPaths, SplinePaths
 from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.estimates_file import (
     provenance,
@@ -24,12 +25,14 @@ from flexcal.estimates_file import (
 __all__ = [
     "Cell",
     "FolderCell",
+    "FourierPaths",
     "MultisinePlan",
     "PosePlan",
     "PosePool",
     "PoseSet",
     "Recording",
     "RecordingLabel",
+    "SplinePaths",
     "TimeBase",
     "TrajectoryPlan",
     "check_motion",

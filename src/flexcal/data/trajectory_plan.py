@@ -8,18 +8,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from flexcal.data.trajectory_paths import FourierPaths, SplinePaths
 from flexcal.errors import FlexcalError
 
 
 @dataclass(frozen=True, eq=False)
 class TrajectoryPlan:
-    """E periodic trajectories of an n-joint robot, each a finite Fourier series of H harmonics in every joint (Swevers 1997).
+    """E periodic trajectories of an n-joint robot.
 
-    centre: (E, n) positions about which the joints move, rad.
-    sine, cosine: (E, n, H) amplitudes of the velocity's sines and cosines at the multiples 1…H of `base_frequency_hz`, rad/s.
+    paths: what the joints follow over one period, again and again.
     payload: kg at the declared payload's centre of mass; None takes what robot.yaml declares.
     periods, settle_periods: recorded periods of each trajectory, and how many of them are dropped at the start.
-    kp, kd: (n,) gains of the position controller referred to the joint, N m/rad and N m s/rad; rate_hz its rate.
+    kp, kd: (n,) gains of the position controller referred to the joint, N m/rad and N m s/rad; None where robot.yaml declares none.
+    rate_hz: of that controller, and of the log.
     torque: what the logged torque is over a sample; `tau` in files.
     seed: of the design.
 
@@ -28,33 +29,29 @@ class TrajectoryPlan:
 
     kind: Literal["trajectory"] = field(default="trajectory", kw_only=True)
     name: str
-    centre: NDArray[np.float64]
-    sine: NDArray[np.float64]
-    cosine: NDArray[np.float64]
+    paths: FourierPaths | SplinePaths
     payload: float | None = field(default=None, kw_only=True)
     base_frequency_hz: float
     periods: int
     settle_periods: int
-    kp: NDArray[np.float64]
-    kd: NDArray[np.float64]
+    kp: NDArray[np.float64] | None = field(default=None, kw_only=True)
+    kd: NDArray[np.float64] | None = field(default=None, kw_only=True)
     rate_hz: float
     torque: Literal["held", "instantaneous", "mean"] = field(metadata={"key": "tau"})
     seed: int
 
     def __post_init__(self) -> None:
-        for name in ("centre", "sine", "cosine", "kp", "kd"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=np.float64))
-        self._check_shapes()
+        self._check_gains()
         self._check_values()
 
     def __len__(self) -> int:
         """Number of trajectories."""
-        return len(self.centre)
+        return len(self.paths.coefficients)
 
     @property
     def joint_count(self) -> int:
         """Joints of the robot that the plan is for."""
-        return self.centre.shape[1]
+        return self.paths.coefficients.shape[2]
 
     @property
     def samples_per_period(self) -> int:
@@ -68,28 +65,22 @@ class TrajectoryPlan:
 
     def motion(self, number: int, time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position, velocity and acceleration (N, n) of trajectory `number` at times (N,), in rad and s."""
-        sine, cosine = self.sine[number].T, self.cosine[number].T
-        omega = 2 * np.pi * self.base_frequency_hz * np.arange(1, len(sine) + 1)[:, None]
-        s, c = np.sin(time[:, None] * omega.T), np.cos(time[:, None] * omega.T)
-        position = self.centre[number] + s @ (cosine / omega) - c @ (sine / omega)
-        return position, c @ cosine + s @ sine, c @ (omega * sine) - s @ (omega * cosine)
+        basis = self.paths.basis(time, 1 / self.base_frequency_hz)
+        position, velocity, acceleration = basis @ self.paths.coefficients[number]
+        return position, velocity, acceleration
 
-    def _check_shapes(self) -> None:
-        if self.centre.ndim != 2 or 0 in self.centre.shape:
-            raise FlexcalError("centre must be a list of trajectories, each a list with one angle per joint.")
-        for name in ("sine", "cosine"):
-            shape = getattr(self, name).shape
-            if len(shape) != 3 or shape[:2] != self.centre.shape or not shape[2]:
+    def _check_gains(self) -> None:
+        if (self.kp is None) != (self.kd is None):
+            raise FlexcalError("the plan has one of kp and kd; give both or neither.")
+        for name in ("kp", "kd"):
+            gains = getattr(self, name)
+            if gains is None:
+                continue
+            gains = np.asarray(gains, dtype=np.float64)
+            object.__setattr__(self, name, gains)
+            if gains.shape != (self.joint_count,):
                 raise FlexcalError(
-                    f"{name} has shape {shape}; {self.centre.shape[0]} trajectories of {self.centre.shape[1]} joints need "
-                    f"({self.centre.shape[0]}, {self.centre.shape[1]}, harmonics)."
-                )
-        if self.sine.shape != self.cosine.shape:
-            raise FlexcalError("sine and cosine must have the same number of harmonics.")
-        for name, gains in (("kp", self.kp), ("kd", self.kd)):
-            if gains.shape != self.centre.shape[1:]:
-                raise FlexcalError(
-                    f"{name} has {gains.size} gains, but there are {self.centre.shape[1]} joints; give one each."
+                    f"{name} has {gains.size} gains, but there are {self.joint_count} joints; give one each."
                 )
 
     def _check_values(self) -> None:

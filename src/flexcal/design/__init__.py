@@ -24,7 +24,7 @@ from flexcal.design.poses import CriterionName, PoseDesign, design_poses, random
 from flexcal.design.preload import preloaded
 from flexcal.design.setup import Acceptance, MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
-from flexcal.design.trajectories import design_trajectories
+from flexcal.design.trajectories import TrajectoryDesign, design_trajectories
 from flexcal.design.visibility import visible
 
 __all__ = [
@@ -43,6 +43,7 @@ __all__ = [
     "Tolerances",
     "TraceOptimal",
     "TrackerNoise",
+    "TrajectoryDesign",
     "base_sensitivity",
     "design_poses",
     "design_trajectories",

@@ -38,7 +38,8 @@ class CollisionChecker:
     that overlap in each of 200 configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names
     them. Pairs that never come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull;
     `package://name/` is looked for in every folder above the URDF. A payload, the reflector's mount and cables have no shape and are
-    not seen. Without collision shapes in the URDF nothing collides. Raises `InputError` where shapes or obstacles cannot be read.
+    not seen. Without collision shapes in the URDF nothing collides. `kinematics` and `geometry` are Pinocchio's. Raises `InputError`
+    where shapes or obstacles cannot be read.
     """
 
     def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
@@ -50,18 +51,18 @@ class CollisionChecker:
         self.floor = floor
         whole = pin.buildModelFromUrdf(str(model.urdf))
         shapes = _shapes(whole, model.urdf)
-        self._model: Any
-        self._model, self._geometry = pin.buildReducedModel(
+        self.kinematics: Any
+        self.kinematics, self.geometry = pin.buildReducedModel(
             whole, shapes, *locked_joints(whole, model.config.locked)
         )
-        own = self._geometry.ngeoms
+        own = self.geometry.ngeoms
         for name in model.config.obstacles:
-            _add_obstacle(self._geometry, model.path.parent / name)
-        self._obstacles = range(own, self._geometry.ngeoms)
+            _add_obstacle(self.geometry, model.path.parent / name)
+        self._obstacles = range(own, self.geometry.ngeoms)
         if floor is not None:
             plane = coal.Halfspace(np.array([0.0, 0.0, 1.0]), floor)
-            self._geometry.addGeometryObject(pin.GeometryObject(_FLOOR, 0, 0, pin.SE3.Identity(), plane))
-        self._data = self._model.createData()
+            self.geometry.addGeometryObject(pin.GeometryObject(_FLOOR, 0, 0, pin.SE3.Identity(), plane))
+        self._data = self.kinematics.createData()
         pairs = self._comparable()
         overlap = self._always_touching(pairs, [0.0] * len(pairs))
         self.permanent = tuple(self._names(pair) for pair in overlap)
@@ -72,7 +73,9 @@ class CollisionChecker:
     @property
     def shapes(self) -> tuple[Shape, ...]:
         """Every shape but the floor, the base's and the obstacles' included."""
-        place = {self._model.getJointId(name): i for i, name in enumerate(self.model.joint_names)} | {0: -1}
+        place = {self.kinematics.getJointId(name): i for i, name in enumerate(self.model.joint_names)} | {
+            0: -1
+        }
         return tuple(
             Shape(
                 o.name,
@@ -81,37 +84,42 @@ class CollisionChecker:
                 np.array(o.placement.rotation),
                 np.array(o.placement.translation),
             )
-            for o in self._geometry.geometryObjects
+            for o in self.geometry.geometryObjects
             if o.name != _FLOOR
         )
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
         """Names of the shapes that are compared."""
-        return tuple(self._names((p.first, p.second)) for p in self._geometry.collisionPairs)
+        return tuple(self._names((p.first, p.second)) for p in self.geometry.collisionPairs)
+
+    @property
+    def margins(self) -> np.ndarray:
+        """Distance (pairs,), m, below which each pair counts as touching."""
+        return np.array([request.security_margin for request in self._checked.collisionRequests])
 
     def collides(self, q: np.ndarray) -> np.ndarray:
         """Whether each configuration of `q` (samples, n) collides, as (samples,) of bool."""
         import pinocchio as pin
 
         q = joint_batch(self.model, q)
-        if not len(self._geometry.collisionPairs):
+        if not len(self.geometry.collisionPairs):
             return np.zeros(len(q), dtype=bool)
         return np.array(
             [
-                pin.computeCollisions(self._model, self._data, self._geometry, self._checked, values, True)
-                for values in self._configurations(q)
+                pin.computeCollisions(self.kinematics, self._data, self.geometry, self._checked, values, True)
+                for values in self.configurations(q)
             ],
             dtype=bool,
         )
 
     def colliding(self, q: np.ndarray) -> tuple[tuple[str, str], ...]:
         """Names of the shapes that touch at one configuration `q` (n,)."""
-        touching = self._touching(self._configurations(joint_batch(self.model, q))[0])
+        touching = self._touching(self.configurations(joint_batch(self.model, q))[0])
         return tuple(names for names, touches in zip(self.pairs, touching, strict=True) if touches)
 
     def _comparable(self) -> list[tuple[int, int]]:
-        objects, parents = self._geometry.geometryObjects, self._model.parents
+        objects, parents = self.geometry.geometryObjects, self.kinematics.parents
         result = []
         for i, one in enumerate(objects):
             for j in range(i + 1, len(objects)):
@@ -124,10 +132,10 @@ class CollisionChecker:
     def _set_pairs(self, pairs: list[tuple[int, int]], margins: list[float]) -> Any:
         import pinocchio as pin
 
-        self._geometry.removeAllCollisionPairs()
+        self.geometry.removeAllCollisionPairs()
         for first, second in pairs:
-            self._geometry.addCollisionPair(pin.CollisionPair(first, second))
-        checked = self._geometry.createData()
+            self.geometry.addCollisionPair(pin.CollisionPair(first, second))
+        checked = self.geometry.createData()
         for request, margin in zip(checked.collisionRequests, margins, strict=True):
             request.security_margin = margin
         return checked
@@ -135,7 +143,7 @@ class CollisionChecker:
     def _always_touching(self, pairs: list[tuple[int, int]], margins: list[float]) -> list[tuple[int, int]]:
         self._checked = self._set_pairs(pairs, margins)
         always = np.ones(len(pairs), dtype=bool)
-        for values in self._configurations(even_configurations(self.model, _SAMPLES)):
+        for values in self.configurations(even_configurations(self.model, _SAMPLES)):
             if not always.any():
                 break
             always &= self._touching(values)
@@ -144,18 +152,18 @@ class CollisionChecker:
     def _touching(self, values: np.ndarray) -> np.ndarray:
         import pinocchio as pin
 
-        pin.computeCollisions(self._model, self._data, self._geometry, self._checked, values, False)
+        pin.computeCollisions(self.kinematics, self._data, self.geometry, self._checked, values, False)
         return np.array([result.isCollision() for result in self._checked.collisionResults], dtype=bool)
 
     def _names(self, pair: tuple[int, int]) -> tuple[str, str]:
-        objects = self._geometry.geometryObjects
+        objects = self.geometry.geometryObjects
         return objects[pair[0]].name, objects[pair[1]].name
 
-    def _configurations(self, q: np.ndarray) -> np.ndarray:
+    def configurations(self, q: np.ndarray) -> np.ndarray:
         """Pinocchio's configurations (samples, nq): an unbounded joint is a cosine and a sine there."""
-        result = np.empty((len(q), self._model.nq))
+        result = np.empty((len(q), self.kinematics.nq))
         for i, name in enumerate(self.model.joint_names):
-            joint = self._model.joints[self._model.getJointId(name)]
+            joint = self.kinematics.joints[self.kinematics.getJointId(name)]
             if joint.nq == 1:
                 result[:, joint.idx_q] = q[:, i]
             else:

@@ -1,161 +1,201 @@
-"""Exciting trajectories: random feasible Fourier series, of which the most informative are kept (Swevers 1997)."""
+"""Exciting trajectories: the periodic motions within a robot's limits from which torques tell most (Swevers 1997)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.data import TrajectoryPlan
+from flexcal.data import FourierPaths, SplinePaths, TrajectoryPlan
+from flexcal.design.clearance import Clearance
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.joint_space import joint_ranges
-from flexcal.errors import FlexcalError, InputError
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.model.declared import declared, uncertain_inertials
+from flexcal.design.exciting_program import NEAR, ExcitingProgram
+from flexcal.design.feasible_start import FINER, feasible_places, feasible_swing, require_standing
+from flexcal.design.interior_search import minimise
+from flexcal.design.motion_limits import MotionLimits
+from flexcal.design.motion_space import Kind, MotionSpace
+from flexcal.design.torque_columns import TorqueColumns
+from flexcal.design.torque_goal import TorqueGoal, TrajectoryCriterion, torque_goal
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
 
-BASE_FREQUENCY_HZ = 0.2
-HARMONICS = 5
-PERIODS, SETTLE_PERIODS = 3, 1
-SPEED, EFFORT = 0.8, 0.8
-"""Largest velocity and torque, relative to the limits of a joint."""
-RANGE = 0.8
-"""Largest swing, relative to the range of a joint."""
-_INSTANTS = 200
-_TRIES = 200
-_STEP = 1e-4
-_TORQUE_ERROR = 1e-3
-"""1σ of an instant's torque for the criterion, relative to the joint's effort."""
-
-
-def design_trajectories(
-    model: RobotModel, count: int, *, candidates: int, seed: int, payload: float | None = None
-) -> TrajectoryPlan:
-    """`count` trajectories out of `candidates` random ones that keep limits and touch nothing.
-
-    One after the other, each raises log det of the posterior information of link inertials and rotors most, beside free friction and
-    with robot.yaml's prior. `payload` kg is what the robot holds then; limits are checked with the rigid robot without it. Raises
-    `FlexcalError` where the robot declares no controller, or too few candidates are feasible.
-    """
-    if model.controller is None:
-        raise InputError(
-            f"{model.path} declares no controller; add `controller: {{kp: […], kd: […], rate_hz: 4000}}`."
-        )
-    rng = np.random.default_rng(seed)
-    checker = CollisionChecker(model)
-    found: list[Candidate] = []
-    for _ in range(_TRIES * candidates):
-        drawn = Candidate.drawn(model, rng)
-        if drawn.feasible(model, checker):
-            found.append(drawn)
-            if len(found) == candidates:
-                break
-    if len(found) < count:
-        raise FlexcalError(
-            f"of {_TRIES * candidates} random trajectories of {model.name} only {len(found)} keep its limits and touch nothing; "
-            "check limits and obstacles."
-        )
-    best = _most_informative(model, found, count)
-    return TrajectoryPlan(
-        name="exciting",
-        centre=np.array([c.centre for c in best]),
-        sine=np.array([c.sine for c in best]),
-        cosine=np.array([c.cosine for c in best]),
-        payload=payload,
-        base_frequency_hz=BASE_FREQUENCY_HZ,
-        periods=PERIODS,
-        settle_periods=SETTLE_PERIODS,
-        kp=np.array(model.controller.kp),
-        kd=np.array(model.controller.kd),
-        rate_hz=model.controller.rate_hz,
-        torque="held",
-        seed=seed,
-    )
+SETTLE_PERIODS = 1
+RATE_HZ = 1000.0
+"""Of the log where robot.yaml declares no controller."""
+TORQUE_ERROR = 1e-3
+"""1σ of an instant's torque, relative to the joint's effort, and how many of these a second are independent."""
+INDEPENDENT_HZ = 40.0
+_INSTANTS_A_HARMONIC = 20
+_SCREENING, _REFINING = (1.0, 0.3), (0.1, 0.03, 0.01)
+_REPAIRS = 12
 
 
 @dataclass(frozen=True, eq=False)
-class Candidate:
-    """One trajectory: `centre` (n,), `sine` and `cosine` (n, H), and `motion` (3, instants, n): q, q̇, q̈ over one period."""
+class TrajectoryDesign:
+    """A `plan`, and for each of its trajectories the information (r, r) on the base `columns` after it, all before it included.
 
-    centre: np.ndarray
-    sine: np.ndarray
-    cosine: np.ndarray
-    motion: np.ndarray
+    `limits` are those that it keeps, `goal` is what it was designed for, `merits` how much of that there is after each trajectory.
+    """
 
-    @classmethod
-    def drawn(cls, model: RobotModel, rng: np.random.Generator) -> Candidate:
-        """Random amplitudes, scaled to a random share of what speed and range allow, about a random place within the range."""
-        lower, upper = joint_ranges(model)
-        fastest = np.array([joint.velocity for joint in model.joints])
-        sine, cosine = rng.standard_normal((2, model.n, HARMONICS))
-        q, dq, _ = _series(sine, cosine)
-        allowed = np.minimum(
-            RANGE * (upper - lower) / np.ptp(q, axis=0), SPEED * fastest / np.abs(dq).max(axis=0)
-        )
-        scale = (allowed * rng.uniform(0.3, 1.0, model.n))[:, None]
-        sine, cosine = scale * sine, scale * cosine
-        q, dq, ddq = _series(sine, cosine)
-        centre = rng.uniform(lower - q.min(axis=0), upper - q.max(axis=0))
-        return cls(centre, sine, cosine, np.array([q + centre, dq, ddq]))
-
-    def feasible(self, model: RobotModel, checker: CollisionChecker) -> bool:
-        """Whether no torque comes near its limit and nothing touches."""
-        q, dq, ddq = self.motion
-        rotor, viscous, coulomb = np.nan_to_num([model.rotor_inertia, model.viscous, model.coulomb])
-        torque = torque_regressor(model, q, dq, ddq) @ inertial_parameters(model)
-        torque = torque + rotor * ddq + viscous * dq + coulomb * np.sign(dq)
-        efforts = np.array([joint.effort for joint in model.joints])
-        return bool((np.abs(torque) <= EFFORT * efforts).all() and not checker.collides(q).any())
-
-    def information(self, model: RobotModel, directions: np.ndarray) -> np.ndarray:
-        """Information (p, p) on the unknowns in units of their prior, free friction eliminated; see `_directions` for (10 n, p - n)."""
-        q, dq, ddq = self.motion
-        efforts = _TORQUE_ERROR * np.array([joint.effort for joint in model.joints])
-        links = torque_regressor(model, q, dq, ddq) @ directions
-        rows = []
-        for joint in range(model.n):
-            rotor = np.zeros((len(q), model.n))
-            rotor[:, joint] = (
-                model.prior.rotor_inertia * np.nan_to_num(model.rotor_inertia[joint]) * ddq[:, joint]
-            )
-            friction = np.column_stack([dq[:, joint], np.sign(dq[:, joint]), np.ones(len(q))])
-            basis = np.linalg.qr(friction)[0]
-            wanted = np.hstack([links[:, joint], rotor]) / efforts[joint]
-            rows.append(wanted - basis @ (basis.T @ wanted))
-        jacobian = np.vstack(rows)
-        return jacobian.T @ jacobian
+    model: RobotModel
+    plan: TrajectoryPlan
+    columns: TorqueColumns
+    limits: MotionLimits
+    goal: TorqueGoal
+    merits: tuple[float, ...]
+    information: tuple[np.ndarray, ...]
 
 
-def _series(sine: np.ndarray, cosine: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Motion (instants, n) about zero over one period."""
-    omega = 2 * np.pi * BASE_FREQUENCY_HZ * np.arange(1, HARMONICS + 1)
-    phase = np.arange(_INSTANTS)[:, None] / (_INSTANTS * BASE_FREQUENCY_HZ) * omega
-    s, c = np.sin(phase), np.cos(phase)
-    return (
-        s @ (cosine / omega).T - c @ (sine / omega).T,
-        c @ cosine.T + s @ sine.T,
-        c @ (sine * omega).T - s @ (cosine * omega).T,
+def design_trajectories(
+    model: RobotModel,
+    count: int = 1,
+    *,
+    criterion: TrajectoryCriterion = "condition",
+    of: Sequence[str] = (),
+    kind: Kind = "fourier",
+    duration: float = 10.0,
+    base_frequency_hz: float | None = None,
+    harmonics: int = 5,
+    rest: bool = False,
+    start: np.ndarray | None = None,
+    share: float = 1.0,
+    payload: float | None = None,
+    starts: int = 3,
+    steps: int = 60,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> TrajectoryDesign:
+    """`count` trajectories, each the best in view of those before it, from the best of `starts` random beginnings of the search.
+
+    A trajectory lasts `duration` s beside one period to settle, and repeats itself at `base_frequency_hz` (once in the duration by
+    default). It has `harmonics`, or three times as many control points where `kind` is spline; with `rest` every period begins and ends
+    at rest, with `start` (n,) at this configuration and at rest. `share` of the URDF's velocities and efforts and of robot.yaml's
+    accelerations may be used; position, box, speed and bodies count in full. `payload` kg is what the robot holds. Searches take at
+    most `steps` steps at each height of the barrier, so that the seed decides everything. Limits hold on a grid ten times finer than
+    that of the search.
+
+    Raises `InputError` or `FlexcalError` where the duration does not hold a period, limits cross, the start is not possible, the robot
+    can stand nowhere, or torques cannot tell the parameters `of`.
+    """
+    frequency = 1 / duration if base_frequency_hz is None else base_frequency_hz
+    periods = _periods(duration, frequency)
+    limits = MotionLimits.of(model, share)
+    columns = TorqueColumns.of(model, payload)
+    size = harmonics if kind == "fourier" else 3 * harmonics
+    begin = None if start is None else np.asarray(start, dtype=float)
+    space = MotionSpace.of(
+        kind,
+        size,
+        1 / frequency,
+        _INSTANTS_A_HARMONIC * harmonics,
+        limits,
+        moving=range(model.n),
+        rest=rest or begin is not None,
+        start=begin,
     )
+    weights = 1 / (TORQUE_ERROR * np.array([joint.effort for joint in model.joints]))
+    goal = torque_goal(columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration)
+    program = ExcitingProgram(space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR))
+    rng = np.random.default_rng(seed)
+    coefficients, merits, information = [], [], []
+    for number in range(count):
+        x = _designed(program, begin, starts, steps, rng, progress, number, count)
+        found = program.information(program.finer(FINER).space.motion(x))
+        merits.append(goal.merit(found))
+        goal = goal.after(found)
+        information.append(goal.gathered)
+        program = replace(program, merit=goal)
+        coefficients.append(space.coefficients(x))
+    progress("trajectories", 1.0)
+    of_kind = FourierPaths if kind == "fourier" else SplinePaths
+    controller = model.controller
+    plan = TrajectoryPlan(
+        name="exciting",
+        paths=of_kind.of_coefficients(np.array(coefficients)),
+        payload=payload,
+        base_frequency_hz=frequency,
+        periods=periods + SETTLE_PERIODS,
+        settle_periods=SETTLE_PERIODS,
+        kp=None if controller is None else np.array(controller.kp),
+        kd=None if controller is None else np.array(controller.kd),
+        rate_hz=RATE_HZ if controller is None else controller.rate_hz,
+        torque="held",
+        seed=seed,
+    )
+    return TrajectoryDesign(model, plan, columns, limits, goal, tuple(merits), tuple(information))
 
 
-def _most_informative(model: RobotModel, found: list[Candidate], count: int) -> list[Candidate]:
-    directions = _directions(model)
-    each = [candidate.information(model, directions) for candidate in found]
-    total, left, best = np.eye(len(each[0])), list(range(len(found))), []
-    for _ in range(count):
-        gain = [np.linalg.slogdet(total + each[k])[1] for k in left]
-        chosen = left.pop(int(np.argmax(gain)))
-        total = total + each[chosen]
-        best.append(found[chosen])
-    return best
+def _periods(duration: float, frequency: float) -> int:
+    if not (duration > 0 and frequency > 0):
+        raise InputError("duration and base frequency must be positive.")
+    periods = duration * frequency
+    if periods < 1 - 1e-9:
+        raise InputError(
+            f"a duration of {duration:g} s is too short for the base frequency {frequency:g} Hz, whose period is {1 / frequency:g} s; "
+            "make one of them larger."
+        )
+    if abs(periods - round(periods)) > 1e-6:
+        raise InputError(
+            f"{duration:g} s are {periods:g} periods of {frequency:g} Hz; choose a duration of whole periods."
+        )
+    return round(periods)
 
 
-def _directions(model: RobotModel) -> np.ndarray:
-    """Change (10 n, p) of the links' inertial parameters by one prior standard deviation of each unknown."""
-    names = uncertain_inertials(model, range(model.n))
-    start = inertial_parameters(model)
-    directions = np.empty((len(start), len(names)))
-    for k, name in enumerate(names):
-        item = declared(model, name)
-        x = item.coordinate(item.value) + _STEP * item.prior_std
-        directions[:, k] = (inertial_parameters(model.with_values({name: item.natural(x)})) - start) / _STEP
-    return directions
+def _sizes(columns: TorqueColumns, weights: np.ndarray, limits: MotionLimits) -> np.ndarray:
+    """Root mean square (r,) of the base columns at random states within the limits, relative to the torques' noise."""
+    rng = np.random.default_rng(0)
+    swing = rng.uniform(-1, 1, (3, 500, len(weights)))
+    velocity = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0)
+    half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
+    motion = swing * np.array([half, velocity, velocity**2 / half])[:, None]
+    motion[0] += middle
+    weighted = columns.write(motion) * weights[:, None, None]
+    return np.sqrt(np.mean(np.sum(weighted**2, axis=0), axis=1))
+
+
+def _designed(
+    program: ExcitingProgram,
+    begin: np.ndarray | None,
+    starts: int,
+    steps: int,
+    rng: np.random.Generator,
+    progress: Progress,
+    number: int,
+    count: int,
+) -> np.ndarray:
+    """Coordinates of one trajectory."""
+    if begin is None:
+        places = feasible_places(program)
+    else:
+        require_standing(program, begin)
+        places = None
+    tried = []
+    for k in range(starts):
+        progress("trajectories", (number + 0.7 * k / starts) / count)
+        first = feasible_swing(program, places, rng)
+        x = minimise(program, first, list(_SCREENING), steps)
+        tried.append((program.merit.merit(program.information(program.space.motion(x))), k, x, first))
+    _, _, x, first = max(tried)
+    progress("trajectories", (number + 0.7) / count)
+    x = minimise(program, x, list(_REFINING), steps)
+    return _kept(program, x, first, steps)
+
+
+def _kept(program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, steps: int) -> np.ndarray:
+    """`x` changed so that all limits hold on the finer grid: the coarse one gets tighter where they did not."""
+    fine = program.finer(FINER)
+    tight = program
+    for _ in range(_REPAIRS):
+        excess = fine.excess(x)
+        if excess is None:
+            return x
+        tight = tight.tightened(excess)
+        share = 1.0
+        while not np.isfinite(tight.evaluate(inside + share * (x - inside), 1.0).value) and share > 1e-3:
+            share *= 0.98
+        x = minimise(tight, inside + share * (x - inside), [_REFINING[-1]], steps // 2)
+    while fine.excess(x) is not None:
+        x = inside + 0.9 * (x - inside)
+    return x

@@ -166,6 +166,37 @@ class StationConfig:
 
 
 @dataclass(frozen=True)
+class BoxConfig:
+    """Corners of a box in the robot's base frame, m."""
+
+    lower: Triple
+    upper: Triple
+
+    def __post_init__(self) -> None:
+        for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
+            if not low < high:
+                raise FlexcalError(
+                    f"the box's limits cross along {axis} ({low:g} to {high:g} m); give `lower` and `upper` corners."
+                )
+
+
+@dataclass(frozen=True)
+class LimitsConfig:
+    """What a designed motion keeps beside the URDF's limits.
+
+    Accelerations of the joints, rad/s² or m/s², the speed of the first point, m/s, and a box in which that stays.
+    """
+
+    acceleration: tuple[float, ...] | None = None
+    speed: float | None = None
+    box: BoxConfig | None = None
+
+    def __post_init__(self) -> None:
+        if min(self.acceleration or (1.0,)) <= 0 or (self.speed is not None and not self.speed > 0):
+            raise FlexcalError("limits of acceleration and speed must be positive.")
+
+
+@dataclass(frozen=True)
 class ControllerConfig:
     """Joint-side PD gains (N m/rad, N m s/rad) and the rate (Hz) of the position controller."""
 
@@ -207,6 +238,7 @@ class RobotConfig:
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)
     obstacles: tuple[str, ...] = ()
+    limits: LimitsConfig = LimitsConfig()
     controller: ControllerConfig | None = None
     signals: dict[str, SignalConfig] = field(default_factory=dict)
     estimates: str = "estimates.yaml"

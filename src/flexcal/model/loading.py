@@ -46,6 +46,8 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         _joint(file, ("drives", "coupling", k, "joint"), names, coupling.joint)
     for key in ("kp", "kd") if config.controller is not None else ():
         _check_count(file, ("controller", key), getattr(config.controller, key), n)
+    if config.limits.acceleration is not None:
+        _check_count(file, ("limits", "acceleration"), config.limits.acceleration, n)
     points = {name: _point(file, description, name, config) for name in config.points}
     payload = _payload(file, description, config)
     stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)

@@ -6,49 +6,96 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexcal.data import TrajectoryPlan, write_plan
-from flexcal.design import design_trajectories
-from flexcal.model import RobotModel
+import numpy as np
 
-TRAJECTORIES = 3
-CANDIDATES_EACH = 20
+from flexcal.data import TrajectoryPlan, write_plan
+from flexcal.design import TrajectoryDesign, design_trajectories
+from flexcal.design.condition import condition_number
+from flexcal.design.motion_space import Kind
+from flexcal.design.torque_goal import TrajectoryCriterion
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class TrajectoryRequest:
+    """What is asked of a design; see `design_trajectories`. The defaults are those of stage 0 of the demonstration."""
+
+    count: int = 3
+    criterion: TrajectoryCriterion = "posterior"
+    of: tuple[str, ...] = ()
+    kind: Kind = "fourier"
+    duration: float = 10.0
+    base_frequency_hz: float = 0.2
+    harmonics: int = 5
+    rest: bool = False
+    start: tuple[float, ...] = ()
+    share: float = 0.8
+    loaded: bool = False
+    starts: int = 1
+    steps: int = 20
+    seed: int = 0
+
+    def design(self, nominal: RobotModel, progress: Progress = silent) -> TrajectoryDesign:
+        """Design for a robot. Raises `FlexcalError` as `design_trajectories` does, and for a start of another number of joints."""
+        if self.start and len(self.start) != nominal.n:
+            raise InputError(
+                f"the start has {len(self.start)} positions, but {nominal.name} has {nominal.n} joints; give one each."
+            )
+        return design_trajectories(
+            nominal,
+            self.count,
+            criterion=self.criterion,
+            of=self.of,
+            kind=self.kind,
+            duration=self.duration,
+            base_frequency_hz=self.base_frequency_hz,
+            harmonics=self.harmonics,
+            rest=self.rest,
+            start=np.array(self.start) if self.start else None,
+            share=self.share,
+            payload=None if self.loaded or nominal.payload is None else 0.0,
+            starts=self.starts,
+            steps=self.steps,
+            seed=self.seed,
+            progress=progress,
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class DesignedTrajectories:
-    """A plan and the file it was written to."""
+    """A design and the file that its plan was written to."""
 
-    plan: TrajectoryPlan
+    design: TrajectoryDesign
     file: Path
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        plan = self.plan
+        design, plan = self.design, self.design.plan
         return {
             "plan": self.file,
             "trajectories": len(plan),
-            "harmonics": plan.sine.shape[2],
             "base_frequency_hz": plan.base_frequency_hz,
             "periods": plan.periods,
             "payload": plan.payload,
             "seconds_on_the_robot": len(plan) * plan.duration,
+            "base_parameters": design.columns.rank,
+            "condition": condition_number(design.information[-1]),
+            "merits": list(design.merits),
             "seed": plan.seed,
         }
 
 
 def plan_trajectories(
-    robot: Path, out: Path, *, count: int = TRAJECTORIES, seed: int = 0
+    robot: Path, out: Path, request: TrajectoryRequest, *, progress: Progress = silent
 ) -> DesignedTrajectories:
-    """Write `count` exciting trajectories of the nominal robot, without its payload, to the file `out`.
-
-    Raises `FlexcalError` where the robot declares no controller, or too few random trajectories keep its limits and touch nothing.
-    """
-    plan = exciting_plan(RobotModel.from_yaml(robot, estimates=False), count=count, seed=seed)
-    write_plan(out, plan)
-    return DesignedTrajectories(plan, out)
+    """Write exciting trajectories of the nominal robot to the file `out`. Raises `FlexcalError` as `design_trajectories` does."""
+    design = request.design(RobotModel.from_yaml(robot, estimates=False), progress)
+    write_plan(out, design.plan)
+    return DesignedTrajectories(design, out)
 
 
-def exciting_plan(nominal: RobotModel, *, count: int = TRAJECTORIES, seed: int) -> TrajectoryPlan:
-    """The `count` trajectories without payload that tell most, out of twenty times as many random ones."""
-    payload = None if nominal.payload is None else 0.0
-    return design_trajectories(nominal, count, candidates=CANDIDATES_EACH * count, seed=seed, payload=payload)
+def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:
+    """Trajectories without payload that tell most of masses, centres of mass and rotors beside robot.yaml's prior."""
+    return TrajectoryRequest(count=count, seed=seed).design(nominal).plan

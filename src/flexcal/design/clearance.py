@@ -1,0 +1,118 @@
+"""How far a robot's bodies keep from each other along a motion, with the derivatives by the joints: coal's witness points."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexcal.design.collision import CollisionChecker
+
+
+class Clearance:
+    """Distances, less their margins and `beyond`, of all pairs of shapes that a checker compares, wherever they are below `within`, m.
+
+    What is farther is not computed again until the joints have moved so much that it could be near: no point of a body moves farther
+    than its distance from the axis times the angle.
+    """
+
+    def __init__(self, checker: CollisionChecker, within: float, beyond: float = 0.0) -> None:
+        self.checker, self.within, self.beyond = checker, within, beyond
+        self._robot, self._geometry = checker.kinematics, checker.geometry
+        self._data: Any = self._robot.createData()
+        self._distances: Any = self._geometry.createData()
+        places = [self._robot.getJointId(name) for name in checker.model.joint_names]
+        self._columns = [self._robot.joints[place].idx_v for place in places]
+        self._margins = checker.margins + beyond
+        moves = np.array(
+            [
+                [place in self._robot.supports[o.parentJoint] for place in places]
+                for o in self._geometry.geometryObjects
+            ]
+        )
+        ends = np.array([(p.first, p.second) for p in self._geometry.collisionPairs], dtype=int).reshape(
+            -1, 2
+        )
+        self._first, self._second = moves[ends[:, 0]], moves[ends[:, 1]]
+        self._reach = (self._first != self._second) * _reaches(checker)
+        self._last: tuple[np.ndarray, np.ndarray] | None = None
+
+    def wider(self, further: float) -> Clearance:
+        """The same with margins that are larger by `further`, m, and nothing remembered."""
+        return Clearance(self.checker, self.within, self.beyond + further)
+
+    def near(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Instants (k,), distances (k,), negative where too near, and derivatives (k, n) by the joints, of what is below `within`.
+
+        `q` (N, n). A derivative is along the line between the nearest points; it jumps where these do.
+        """
+        import pinocchio as pin
+
+        perhaps = self._perhaps(q)
+        seen: list[tuple[int, int, float]] = []
+        close: list[tuple[int, int]] = []
+        points: list[np.ndarray] = []
+        jacobians: list[np.ndarray] = []
+        results = self._distances.distanceResults
+        for i in np.flatnonzero(perhaps.any(axis=1)).tolist():
+            values = self.checker.configurations(q[i : i + 1])[0]
+            pin.updateGeometryPlacements(self._robot, self._data, self._geometry, self._distances, values)
+            jacobian = None
+            for pair in np.flatnonzero(perhaps[i]).tolist():
+                distance = pin.computeDistance(self._geometry, self._distances, pair).min_distance
+                seen.append((i, pair, distance))
+                if distance < self.within + self._margins[pair]:
+                    if jacobian is None:
+                        jacobian = pin.computeJointJacobians(self._robot, self._data, values)[
+                            :, self._columns
+                        ]
+                    result = results[pair]
+                    close.append((i, pair))
+                    points.append(
+                        np.array([result.getNearestPoint1(), result.getNearestPoint2(), result.normal])
+                    )
+                    jacobians.append(jacobian)
+        self._remember(q, seen)
+        instants, pairs = np.array(close, dtype=int).reshape(-1, 2).T
+        one, other, normal = np.array(points).reshape(-1, 3, 3).transpose(1, 0, 2)
+        moving = np.array(jacobians).reshape(len(close), 6, q.shape[1])
+        slopes = np.zeros((len(close), q.shape[1]))
+        for point, moved, sign in ((one, self._first, -1.0), (other, self._second, 1.0)):
+            turning = np.einsum("kc,kcj->kj", np.cross(point, normal), moving[:, 3:])
+            slopes += sign * moved[pairs] * (np.einsum("kc,kcj->kj", normal, moving[:, :3]) + turning)
+        assert self._last is not None
+        return instants, self._last[0][instants, pairs], slopes
+
+    def _perhaps(self, q: np.ndarray) -> np.ndarray:
+        """Which pairs (N, pairs) could be below `within`."""
+        if self._last is None or len(self._last[0]) != len(q):
+            return np.ones((len(q), len(self._reach)), dtype=bool)
+        distance, where = self._last
+        return distance - np.einsum("ipj,pj->ip", np.abs(q[:, None] - where), self._reach) < self.within
+
+    def _remember(self, q: np.ndarray, seen: list[tuple[int, int, float]]) -> None:
+        if self._last is None or len(self._last[0]) != len(q):
+            self._last = np.empty((len(q), len(self._reach))), np.empty((len(q), *self._reach.shape))
+        numbers = np.array(seen).reshape(-1, 3)
+        instants, pairs = numbers[:, :2].astype(int).T
+        self._last[0][instants, pairs] = numbers[:, 2] - self._margins[pairs]
+        self._last[1][instants, pairs] = q[instants]
+
+
+def _reaches(checker: CollisionChecker) -> np.ndarray:
+    """How far (n,) what a joint turns can lie from its axis, m; 1 for a prismatic joint, whose bodies move by as much as it does."""
+    joints = checker.model.joints
+    reach = np.zeros(len(joints))
+    for shape in checker.shapes:
+        geometry = shape.geometry
+        geometry.computeLocalAABB()
+        far = np.linalg.norm(shape.translation) + np.linalg.norm(geometry.aabb_center) + geometry.aabb_radius
+        at = shape.joint
+        while at >= 0:
+            reach[at] = max(reach[at], far)
+            travel = (
+                max(abs(joints[at].lower), abs(joints[at].upper)) if joints[at].kind == "prismatic" else 0.0
+            )
+            far += np.linalg.norm(joints[at].translation) + travel
+            at = joints[at].parent
+    return np.where([joint.kind == "prismatic" for joint in joints], 1.0, reach)
