@@ -38,8 +38,8 @@ class CollisionChecker:
     that overlap in each of 200 configurations spread evenly over the joint ranges: their shapes are drawn too large; `permanent` names
     them. Pairs that never come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull;
     `package://name/` is looked for in every folder above the URDF. A payload, the reflector's mount and cables have no shape and are
-    not seen. Without collision shapes in the URDF nothing collides. `kinematics` and `geometry` are Pinocchio's. Raises
-    `InputError` where shapes or obstacles cannot be read.
+    not seen. Without collision shapes in the URDF nothing collides. `kinematics` and `geometry` are Pinocchio's. Raises `InputError`
+    where shapes or obstacles cannot be read.
     """
 
     def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
