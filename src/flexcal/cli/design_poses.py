@@ -116,9 +116,9 @@ class DesignPoses:
             f"{seen['rank']} of {seen['parameters']} parameters can be told apart by position measurements"
         )
         console.say(
-            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}), "
-            f"no choice of as many reaches less than {document['least_possible_mm']:.4f} mm; from {document['enough_poses']} poses on it falls by "
-            "averaging only"
+            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}); "
+            f"no choice of as many reaches less than {document['least_possible_mm']:.4f} mm; from "
+            f"{document['enough_poses']} poses on it falls by averaging only"
         )
         others = {name: value for name, value in document["criteria"].items() if name != "c"}
         console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))

@@ -34,7 +34,7 @@ from flexcal.design.preload import preloaded
 from flexcal.design.setup import MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
 from flexcal.design.trajectories import TrajectoryDesign, design_trajectories
-from flexcal.design.visibility import visible
+from flexcal.design.visibility import station_position, visible
 from flexcal.design.visiting_order import VisitingOrder, visiting_order
 from flexcal.design.working_volume import WorkingVolume, working_box, working_points
 
@@ -77,6 +77,7 @@ __all__ = [
     "preloaded",
     "random_candidates",
     "random_poses",
+    "station_position",
     "visible",
     "visiting_order",
     "working_box",

@@ -29,6 +29,7 @@ from flexcal.design import (
 from flexcal.errors import InputError
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.progress import Progress, silent
+from flexcal.report.pose_design import PoseStudy, write_pose_page
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.results import identifiability_block
 
@@ -136,7 +137,7 @@ def plan_calibration_poses(
     seed: int = 0,
     progress: Progress = silent,
 ) -> ChosenPoses:
-    """Choose `count` poses for the calibration of the robot as it is known, and write the plan to `out`, in an order of short moves.
+    """Choose `count` poses for the calibration of the robot as it is known, in an order of short moves; write the plan to `out`, its page beside it.
 
     `candidates`: so many random poses to choose from, or a file of poses. `working`: where the tool error counts, as in `working_volume`.
     With `wanted`, m, only as many poses as bring the predicted tool error down to it. `payload` in kg, None for the file's, else the
@@ -164,21 +165,39 @@ def plan_calibration_poses(
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    write_plan(out, plan)
     pool = choice if isinstance(choice, PosePool) else None
-    return ChosenPoses(plan, out, design, curve, way, place, pool)
+    result = ChosenPoses(plan, out, design, curve, way, place, pool)
+    write_plan(out, plan)
+    write_pose_page(page_beside(out), study_of(model, plan, result.document(), place))
+    return result
 
 
 def plan_verification_poses(
     robot: Path, out: Path, count: int, *, payload: float | None = None, seed: int = 0
 ) -> DesignedPoses:
-    """Draw `count` random poses over the whole workspace, for a verification, and write the plan to `out`."""
+    """Draw `count` random poses over the whole workspace, for a verification, and write the plan to `out`, and its page beside it."""
     model = RobotModel.from_yaml(robot)
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
+    result = DesignedPoses(plan, out)
     write_plan(out, plan)
-    return DesignedPoses(plan, out)
+    write_pose_page(page_beside(out), study_of(model, plan, result.document(), None))
+    return result
+
+
+def page_beside(plan: Path) -> Path:
+    """The page with pictures of a plan."""
+    return plan.with_suffix(".html")
+
+
+def study_of(
+    model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
+) -> PoseStudy:
+    """What the page shows."""
+    if working is None:
+        return PoseStudy(model, plan.q, document)
+    return PoseStudy(model, plan.q, document, working.points, working.box)
 
 
 def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> WorkingVolume | None:

@@ -21,8 +21,16 @@ from flexcal.design import (
 )
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.pose_design import write_pose_page
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.design_poses import flank_block, pool_block, working_block, working_volume
+from flexcal.workflow.design_poses import (
+    flank_block,
+    page_beside,
+    pool_block,
+    study_of,
+    working_block,
+    working_volume,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,5 +111,7 @@ def plan_next_poses(
         return ContinuedPoses(None, None, after, stop, wanted, place, pool)
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
+    result = ContinuedPoses(plan, out, replace(after, design=design), stop, wanted, place, pool)
     write_plan(out, plan)
-    return ContinuedPoses(plan, out, replace(after, design=design), stop, wanted, place, pool)
+    write_pose_page(page_beside(out), study_of(model, plan, result.document(), place))
+    return result

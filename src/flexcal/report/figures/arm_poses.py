@@ -27,9 +27,9 @@ def arm_poses(
     """
     corners = skeletons(model, poses)
     figure = canvas(620)
-    figure.add_trace(_polyline(corners, "all poses", NOMINAL, 2.5, opacity=0.45))
+    figure.add_trace(polyline(corners, "all poses", NOMINAL, 2.5, opacity=0.45))
     chosen = corners[:: max(1, len(corners) // _EXAMPLES)][:_EXAMPLES]
-    examples = _polyline(chosen, f"{len(chosen)} of the poses", INK, 9.0)
+    examples = polyline(chosen, f"{len(chosen)} of the poses", INK, 9.0)
     examples.update(mode="lines+markers", marker={"size": 4, "color": INK})
     figure.add_trace(examples)
     tips = corners[:, -1]
@@ -44,7 +44,7 @@ def arm_poses(
         colour = ELASTIC if calibrated else RIGID
         ends = tips + factor * vectors
         shown = number == 0
-        shafts = _polyline(np.stack([tips, ends], axis=1), "error", colour, 6.0)
+        shafts = polyline(np.stack([tips, ends], axis=1), "error", colour, 6.0)
         shafts.update(meta={"arrows": label}, visible=shown)
         sizes = np.linalg.norm(vectors, axis=1) * 1e3
         heads = go.Scatter3d(
@@ -98,9 +98,7 @@ def skeletons(model: RobotModel, poses: PoseSet) -> np.ndarray:
     return np.stack([np.zeros_like(tip), *origins, tip], axis=1)
 
 
-def _polyline(
-    corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0
-) -> go.Scatter3d:
+def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0) -> go.Scatter3d:
     """Several lines (lines, corners, 3) as one trace, parted by gaps."""
     parted = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1).reshape(-1, 3)
     return go.Scatter3d(
