@@ -10,7 +10,7 @@ import pytest
 from flexcal.design.multisines import Schedule, flat_multisine
 from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.response_noise import COMMON_SENSORS, FrictionDisturbance, equation_error
-from flexcal.design.response_sensitivity import pose_response, response_parameters, thinned
+from flexcal.design.response_sensitivity import friction_in, pose_response, response_parameters, thinned
 from flexcal.design.spring_criterion import largest_stiffness_std
 from flexcal.errors import FlexcalError
 from flexcal.model.declared import FRICTION_LOG_STD
@@ -165,9 +165,10 @@ def test_more_realisations_reach_a_wanted_std_or_it_is_said_what_is_reached(plan
 
 
 def test_the_plan_must_excite_the_elastic_joints(tx90l, plan):
+    friction = friction_in(tx90l, POSES[0], plan)
     other = replace(plan, joints=(0, 1), amplitude=plan.amplitude[:2])
     with pytest.raises(FlexcalError, match="exactly the elastic joints"):
-        pose_response(tx90l, POSES[0], other, response_parameters(tx90l, plan))
+        pose_response(tx90l, POSES[0], other, response_parameters(tx90l, plan), friction)
 
 
 def test_a_schedule_of_the_robots_without_effort_is_refused(tx90l):

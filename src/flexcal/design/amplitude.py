@@ -12,9 +12,11 @@ from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.spring_criterion import spring_criterion
 from flexcal.model import RobotModel
 
-LEAST, MOST = 0.4, 3.0
+LEAST, MOST = 0.4, 4.0
 """Amplitude of any line over that of the flat spectrum: below, the response's logarithm would be biased at that line; above, friction
 would no longer be the disturbance that was predicted."""
+ROOM = 2.0
+"""Largest root mean square of an axis' torque over that of the flat plan: 8 % of its effort, with peaks of a quarter."""
 ITERATIONS = 20
 
 
@@ -26,7 +28,7 @@ def shaped(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
     its share of the axis' power plus its share in the gap that is strained most.
     """
     criterion, plan = spring_criterion(planned.parameters), planned.plan
-    allowed = np.sum(plan.amplitude**2, axis=1, keepdims=True)
+    allowed = ROOM**2 * np.sum(plan.amplitude**2, axis=1, keepdims=True)
     flat = plan.amplitude**2
     load = np.array([gap_load(model, q, plan) for q in plan.poses]).reshape(-1, *flat.shape)
     plan = replace(plan, amplitude=_feasible(flat, allowed, load))

@@ -9,12 +9,11 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.design.collision import CollisionChecker
 from flexcal.design.exchange import exchange, greedy
-from flexcal.design.frequency_candidates import frequency_candidates
+from flexcal.design.frequency_candidates import ExcitablePoses
 from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
 from flexcal.design.response_sensitivity import (
     response_parameters,
     response_sensitivity,
-    thinned,
 )
 from flexcal.design.spring_criterion import largest_stiffness_std, spring_criterion
 from flexcal.errors import FlexcalError
@@ -22,8 +21,12 @@ from flexcal.estimation import Sensitivity
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 
-SCREEN = 3
+SCREEN = 4
 """One line in so many is evaluated to compare candidates."""
+REFINED = (0.3, 0.12)
+"""Spread (rad) of the further candidates about the chosen poses, round by round."""
+NEIGHBOURS = 8
+"""Further candidates about each chosen pose in a round, as far as they can be excited."""
 UNKNOWN = 0.255
 """Relative standard deviation from which on a stiffness is not known to a factor of two."""
 
@@ -50,13 +53,25 @@ def choose_frequency_poses(
 ) -> ChosenPoses:
     """The `count` of so many random `candidates` that determine all springs best together, excited as `plan` says; by exchange.
 
+    Then, twice, further candidates are drawn about the chosen poses, and the exchange goes on.
+
     Raises `FlexcalError` where too few candidates are feasible, or so few poses leave a stiffness unknown, which is named.
     """
-    checker = CollisionChecker(model) if checker is None else checker
-    pool = frequency_candidates(checker, plan, max(candidates, count), rng, progress)
+    excitable = ExcitablePoses(CollisionChecker(model) if checker is None else checker, plan)
     parameters = response_parameters(model, plan)
-    screened = response_sensitivity(model, pool, thinned(plan, SCREEN), parameters, sensors, progress)
-    chosen = exchange(screened, count, spring_criterion(screened.parameters), progress=progress).chosen
+    criterion = spring_criterion(parameters)
+    pool = excitable.random(max(candidates, count), rng, progress)
+    screened = response_sensitivity(model, pool, plan, parameters, sensors, every=SCREEN, progress=progress)
+    chosen = exchange(screened, count, criterion, progress=progress).chosen
+    for number, spread in enumerate(REFINED):
+        progress("refining", number / len(REFINED))
+        near = excitable.near(pool[chosen], NEIGHBOURS, spread, rng)
+        more = response_sensitivity(model, near, plan, parameters, sensors, every=SCREEN)
+        pool = np.concatenate([pool, near])
+        rows = np.concatenate([screened.jacobian, more.jacobian])
+        screened = Sensitivity(rows, parameters, screened.prior_information)
+        chosen = exchange(screened, count, criterion, start=chosen).chosen
+    progress("refining", 1.0)
     worst, std = largest_stiffness_std(screened, chosen)
     if std > UNKNOWN:
         raise FlexcalError(

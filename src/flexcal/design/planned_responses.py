@@ -11,6 +11,7 @@ from flexcal.data import MultisinePlan
 from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
 from flexcal.design.response_sensitivity import (
     PoseResponse,
+    friction_in,
     known_before,
     pose_response,
     response_parameters,
@@ -41,7 +42,10 @@ class PlannedResponses:
     ) -> PlannedResponses:
         """Of a robot as it is known."""
         parameters = response_parameters(model, plan)
-        responses = (pose_response(model, q, plan, parameters, sensors) for q in plan.poses)
+        responses = (
+            pose_response(model, q, plan, parameters, friction_in(model, q, plan), sensors)
+            for q in plan.poses
+        )
         return cls(plan, parameters, known_before(model, parameters), tuple(responses))
 
     @cached_property

@@ -78,6 +78,10 @@ class FrictionDisturbance:
         pooled = np.stack([np.convolve(column, window, "same") / share for column in power.T], axis=1)
         return cls(viscous, pooled)
 
+    def thinned(self, step: int) -> FrictionDisturbance:
+        """At every `step`-th line only."""
+        return FrictionDisturbance(self.viscous, self.power[::step])
+
 
 def equation_error(
     plan: MultisinePlan, response: np.ndarray, friction: FrictionDisturbance, sensors: ResponseSensors

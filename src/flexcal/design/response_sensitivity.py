@@ -106,20 +106,30 @@ def response_sensitivity(
     plan: MultisinePlan,
     parameters: Parameters,
     sensors: ResponseSensors = COMMON_SENSORS,
+    *,
+    every: int = 1,
     progress: Progress = silent,
 ) -> Sensitivity:
     """Rows of every pose of `poses` (candidates, n) under the excitation of `plan`, in the shared `parameters`.
+
+    To compare many poses quickly, one line in `every` is evaluated, as if its neighbours told as much.
 
     The prior is the robot's posterior, where nothing was estimated that of the parameters.
 
     Raises `FlexcalError` where the plan does not excite exactly the elastic joints.
     """
+    thin = thinned(plan, every)
     rows = []
     for number, q in enumerate(poses):
         progress("sensitivities", number / len(poses))
-        rows.append(pose_response(model, q, plan, parameters, sensors).rows(plan))
+        friction = friction_in(model, q, plan).thinned(every)
+        rows.append(pose_response(model, q, thin, parameters, friction, sensors).rows(thin))
     progress("sensitivities", 1.0)
-    return Sensitivity(np.array(rows), parameters, known_before(model, parameters))
+    return Sensitivity(
+        np.array(rows).reshape(len(poses), *2 * (len(parameters),)),
+        parameters,
+        known_before(model, parameters),
+    )
 
 
 def known_before(model: RobotModel, parameters: Parameters) -> np.ndarray:
@@ -135,6 +145,7 @@ def pose_response(
     q: np.ndarray,
     plan: MultisinePlan,
     parameters: Parameters,
+    friction: FrictionDisturbance,
     sensors: ResponseSensors = COMMON_SENSORS,
 ) -> PoseResponse:
     """Response, derivatives and noise in the pose `q` (n,); the motors' viscous coefficients are those of robot.yaml plus friction's.
@@ -146,7 +157,6 @@ def pose_response(
             f"the plan must excite exactly the elastic joints of {model.path}, in their order."
         )
     frequencies = plan.frequencies_hz
-    friction = FrictionDisturbance.of(model, linearise(model, q, plan.payload), plan)
     rubbing = [f"{joint.name}.viscous" for joint in model.elastic]
     viscous = np.nan_to_num(model.viscous[list(plan.joints)]) + friction.viscous
     robot = model.with_values(dict(zip(rubbing, viscous, strict=True)))
@@ -175,8 +185,13 @@ def pose_response(
     )
 
 
+def friction_in(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> FrictionDisturbance:
+    """What friction does in the pose `q` (n,) under all lines of `plan`."""
+    return FrictionDisturbance.of(model, linearise(model, q, plan.payload), plan)
+
+
 def thinned(plan: MultisinePlan, step: int) -> MultisinePlan:
-    """The plan with every `step`-th line only, their power raised so that a band tells as much: for comparing many poses quickly."""
+    """The plan with every `step`-th line only, their power raised so that a band tells as much."""
     kept = plan.amplitude[:, ::step] * np.sqrt(len(plan.lines) / len(plan.lines[::step]))
     return replace(plan, lines=plan.lines[::step], amplitude=kept)
 
