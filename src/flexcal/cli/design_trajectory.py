@@ -28,6 +28,10 @@ class DesignTrajectory:
     information (E), trace of the covariance (A)."""
     of: Annotated[tuple[str, ...], arg(metavar="NAME")] = ()
     """Parameters that the criterion c is of, as link_3.mass or payload.mass."""
+    sequence: Literal["links", "axes", "kinds"] | None = None
+    """One trajectory for each link from the last on, for wrist and main axes, or for inertia, gravity and friction; with --criterion D."""
+    after: Annotated[Path | None, arg(metavar="PLAN", help_behavior_hint="")] = None
+    """A plan that is recorded already: what it tells counts as known."""
     kind: Literal["fourier", "spline"] = "fourier"
     """Fourier series, or cyclic B-splines with three control points for each of the harmonics."""
     duration: Annotated[float, arg(metavar="S")] = 10.0
@@ -45,7 +49,7 @@ class DesignTrajectory:
     share: Annotated[float, arg(metavar="SHARE")] = 0.8
     """Of velocities, accelerations and torques that a motion uses; the controller needs the rest."""
     loaded: bool = False
-    """With the declared payload; without it by default."""
+    """With the declared payload, as when the criterion is of it; without by default."""
     searches: Annotated[int, arg(metavar="N")] = 1
     """Random beginnings, of which the best is followed; more take longer."""
     steps: Annotated[int, arg(metavar="N")] = 20
@@ -68,6 +72,8 @@ class DesignTrajectory:
             count=self.count,
             criterion=self.criterion,
             of=self.of,
+            sequence=self.sequence,
+            after=self.after,
             kind=self.kind,
             duration=self.duration,
             base_frequency_hz=self.base_frequency,

@@ -22,6 +22,7 @@ from flexcal.design.pose_sensitivity import (
 )
 from flexcal.design.poses import CriterionName, PoseDesign, design_poses, random_poses
 from flexcal.design.preload import preloaded
+from flexcal.design.sequences import Stage, sequence
 from flexcal.design.setup import Acceptance, MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
 from flexcal.design.trajectories import TrajectoryDesign, design_trajectories
@@ -40,6 +41,7 @@ __all__ = [
     "PoseDesign",
     "Selection",
     "SpectralCriterion",
+    "Stage",
     "Tolerances",
     "TraceOptimal",
     "TrackerNoise",
@@ -59,5 +61,6 @@ __all__ = [
     "preloaded",
     "random_candidates",
     "random_poses",
+    "sequence",
     "visible",
 ]

@@ -214,14 +214,14 @@ class _Point:
             beyond = np.einsum("icj,ij->ic", jacobian[:, :, j:], dq[:, j:])
             before = np.einsum("icj,ij->ic", turning[:, :, :j], dq[:, :j])
             bent[:, :, j] = np.cross(turning[:, :, j], beyond) + np.cross(before, jacobian[:, :, j])
-        sizes = np.where(np.isfinite(limits.box).all(axis=0), np.ptp(limits.box, axis=0), 1.0)
-        outside = np.hstack([limits.box[0] - seen.position, seen.position - limits.box[1]]) / np.tile(
-            sizes, 2
-        )
+        bounded = np.isfinite(limits.box).all()
+        sizes = np.ptp(limits.box, axis=0) if bounded else np.full(3, np.inf)
+        sides = np.hstack([limits.box[0] - seen.position, seen.position - limits.box[1]])
+        outside = sides / np.tile(sizes, 2) if bounded else np.full_like(sides, -1.0)
         speed = np.linalg.norm(velocity, axis=1, keepdims=True)
         constraints = np.hstack([outside, speed / limits.speed - 1])
         return cls(
-            np.maximum(constraints, -1.0),
+            constraints,
             jacobian,
             bent,
             velocity / np.maximum(speed, 1e-12),

@@ -58,6 +58,10 @@ class TorqueGoal:
         directions = self.unknowns.directions
         return self.instants * directions @ slope @ directions.T
 
+    def about(self, wanted: Sequence[str]) -> TorqueGoal:
+        """The same of some of the unknowns only, the others eliminated (Ds-optimality)."""
+        return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(wanted))))
+
     def after(self, information: np.ndarray) -> TorqueGoal:
         """The goal of the next motion."""
         return replace(self, gathered=self.total(information))
@@ -134,7 +138,7 @@ def declared_unknowns(columns: TorqueColumns, free: tuple[str, ...] = ()) -> Unk
     ]
     names += [f"{joint}.{key}" for key in DRIVE[1:] for joint in model.joint_names]
     held = model.nominal_payload
-    if held is not None and held.mass_std > 0 and columns.payload != 0:
+    if held is not None and held.mass_std > 0 and columns.payload is None:
         names.append("payload.mass")
     names += [name for name in free if name not in names]
     known = np.array([np.isfinite(declared(model, name).prior_std) and name not in free for name in names])

@@ -15,6 +15,7 @@ from flexcal.design.feasible_start import FINER, feasible_places, feasible_swing
 from flexcal.design.interior_search import minimise
 from flexcal.design.motion_limits import MotionLimits
 from flexcal.design.motion_space import Kind, MotionSpace
+from flexcal.design.sequences import Stage
 from flexcal.design.torque_columns import TorqueColumns
 from flexcal.design.torque_goal import TorqueGoal, TrajectoryCriterion, declared_unknowns, torque_goal
 from flexcal.errors import InputError
@@ -86,6 +87,8 @@ def design_trajectories(
     duration: float = 10.0,
     base_frequency_hz: float | None = None,
     harmonics: int = 5,
+    sequence: Sequence[Stage] = (),
+    after: TrajectoryPlan | None = None,
     rest: bool = False,
     start: np.ndarray | None = None,
     share: float = 1.0,
@@ -104,6 +107,9 @@ def design_trajectories(
     most `steps` steps at each height of the barrier, so that the seed decides everything. Limits hold on a grid ten times finer than
     that of the search.
 
+    A `sequence` of stages replaces `count`: one trajectory each, with the joints and the parameters of its own, for the criterion D.
+    What was recorded by another plan, `after`, counts as known.
+
     Raises `InputError` or `FlexcalError` where the duration does not hold a period, limits cross, the start is not possible, the robot
     can stand nowhere, or torques cannot tell the parameters `of`.
     """
@@ -119,24 +125,33 @@ def design_trajectories(
         1 / frequency,
         _INSTANTS_A_HARMONIC * harmonics,
         limits,
-        moving=range(model.n),
         rest=rest or begin is not None,
         start=begin,
     )
     weights = 1 / (TORQUE_ERROR * np.array([joint.effort for joint in model.joints]))
     goal = torque_goal(columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration)
+    if sequence and criterion != "D":
+        raise InputError("a sequence is designed by the criterion D of each stage's parameters; choose D.")
     program = ExcitingProgram(space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR))
+    if after is not None:
+        if after.payload != payload or after.joint_count != model.n:
+            raise InputError("the plan before is for another robot or payload; design both alike.")
+        time = np.arange(space.instants) / (space.instants * after.base_frequency_hz)
+        for number in range(len(after)):
+            goal = goal.after(program.information(np.array(after.motion(number, time))))
+    stages = sequence or (Stage(tuple(range(model.n)), ()),) * count
     rng = np.random.default_rng(seed)
     coefficients, merits, information = [], [], []
     least = NEAR
-    for number in range(count):
-        x = _designed(program, begin, starts, steps, rng, progress, number, count)
+    for number, stage in enumerate(stages):
+        aim = goal.about(stage.wanted) if stage.wanted else goal
+        program = replace(program, merit=aim, space=space.moving(stage.moving))
+        x = _designed(program, begin, starts, steps, rng, progress, number, len(stages))
         found = program.information(program.finer(FINER).space.motion(x))
-        merits.append(goal.merit(found))
+        merits.append(aim.merit(found))
         goal = goal.after(found)
         information.append(goal.gathered)
-        program = replace(program, merit=goal)
-        coefficients.append(space.coefficients(x))
+        coefficients.append(program.space.coefficients(x))
         least = min(
             least,
             program.finer(FINER).clearance.near(program.finer(FINER).space.motion(x)[0])[1].min(initial=NEAR),

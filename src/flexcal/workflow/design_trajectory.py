@@ -8,10 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import TrajectoryPlan, write_plan
-from flexcal.design import TrajectoryDesign, design_trajectories
+from flexcal.data import TrajectoryPlan, read_plan_of, write_plan
+from flexcal.design import TrajectoryDesign, design_trajectories, sequence
 from flexcal.design.condition import condition_number
 from flexcal.design.motion_space import Kind
+from flexcal.design.sequences import SequenceName
+from flexcal.design.torque_columns import TorqueColumns
 from flexcal.design.torque_goal import TrajectoryCriterion
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
@@ -26,6 +28,8 @@ class TrajectoryRequest:
     count: int = 3
     criterion: TrajectoryCriterion = "posterior"
     of: tuple[str, ...] = ()
+    sequence: SequenceName | None = None
+    after: Path | None = None
     kind: Kind = "fourier"
     duration: float = 10.0
     base_frequency_hz: float = 0.2
@@ -44,11 +48,14 @@ class TrajectoryRequest:
             raise InputError(
                 f"the start has {len(self.start)} positions, but {nominal.name} has {nominal.n} joints; give one each."
             )
+        loaded = self.loaded or any(name.startswith("payload.") for name in self.of)
         return design_trajectories(
             nominal,
             self.count,
             criterion=self.criterion,
             of=self.of,
+            sequence=() if self.sequence is None else sequence(TorqueColumns.of(nominal), self.sequence),
+            after=None if self.after is None else read_plan_of(self.after, TrajectoryPlan),
             kind=self.kind,
             duration=self.duration,
             base_frequency_hz=self.base_frequency_hz,
@@ -56,7 +63,7 @@ class TrajectoryRequest:
             rest=self.rest,
             start=np.array(self.start) if self.start else None,
             share=self.share,
-            payload=None if self.loaded or nominal.payload is None else 0.0,
+            payload=None if loaded or nominal.payload is None else 0.0,
             starts=self.starts,
             steps=self.steps,
             seed=self.seed,

@@ -25,7 +25,6 @@ def prior_gains(names: Sequence[str], after: np.ndarray) -> go.Figure:
         )
     )
     low = int(np.floor(np.log10(max(float(after.min(initial=1.0)), 1e-9))))
-    figure.update_xaxes(
-        type="log", range=[low, 0.1], title_text="standard deviation, relative to before", **decades(low, 0)
-    )
+    figure.update_xaxes(decades(low, 0))
+    figure.update_xaxes(type="log", range=[low, 0.1], title_text="standard deviation, relative to before")
     return figure
