@@ -28,6 +28,10 @@ class DesignTrajectory:
     information (E), trace of the covariance (A)."""
     of: Annotated[tuple[str, ...], arg(metavar="NAME")] = ()
     """Parameters that the criterion c is of, as link_3.mass or payload.mass."""
+    sequence: Literal["links", "axes", "kinds"] | None = None
+    """One trajectory for each link from the last on, for wrist and main axes, or for inertia, gravity and friction; with --criterion D."""
+    after: Annotated[Path | None, arg(metavar="PLAN", help_behavior_hint="")] = None
+    """A plan that is recorded already: what it tells counts as known."""
     kind: Literal["fourier", "spline"] = "fourier"
     """Fourier series, or cyclic B-splines with three control points for each of the harmonics."""
     duration: Annotated[float, arg(metavar="S")] = 10.0
@@ -45,11 +49,11 @@ class DesignTrajectory:
     share: Annotated[float, arg(metavar="SHARE")] = 0.8
     """Of velocities, accelerations and torques that a motion uses; the controller needs the rest."""
     loaded: bool = False
-    """With the declared payload; without it by default."""
+    """With the declared payload, as when the criterion is of it; without by default."""
     searches: Annotated[int, arg(metavar="N")] = 1
     """Random beginnings, of which the best is followed; more take longer."""
     steps: Annotated[int, arg(metavar="N")] = 20
-    """Steps of a search at each height of its barrier; 60 come close to the end."""
+    """Steps of a search at each height of its barrier; 40 come close to the end."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the random beginnings."""
     json: Json = False
@@ -68,6 +72,8 @@ class DesignTrajectory:
             count=self.count,
             criterion=self.criterion,
             of=self.of,
+            sequence=self.sequence,
+            after=self.after,
             kind=self.kind,
             duration=self.duration,
             base_frequency_hz=self.base_frequency,
@@ -92,4 +98,5 @@ class DesignTrajectory:
             f"matrix; criterion {self.criterion}: "
             + ", ".join(f"{merit:.4g}" for merit in document["merits"])
         )
+        console.say(f"pictures: {document['page']}")
         console.finish(document, f"{measuring(self.out, self.robot, 'exciting')}, or record it on the robot")

@@ -31,6 +31,7 @@ from flexcal.design.poses import (
     random_poses,
 )
 from flexcal.design.preload import preloaded
+from flexcal.design.sequences import Stage, sequence
 from flexcal.design.setup import MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
 from flexcal.design.trajectories import TrajectoryDesign, design_trajectories
@@ -52,6 +53,7 @@ __all__ = [
     "PoseDesign",
     "Selection",
     "SpectralCriterion",
+    "Stage",
     "Tolerances",
     "TraceOptimal",
     "TrackerNoise",
@@ -77,6 +79,7 @@ __all__ = [
     "preloaded",
     "random_candidates",
     "random_poses",
+    "sequence",
     "station_position",
     "visible",
     "visiting_order",

@@ -42,11 +42,10 @@ class MotionSpace:
         instants: int,
         limits: MotionLimits,
         *,
-        moving: Sequence[int],
         rest: bool = False,
         start: np.ndarray | None = None,
     ) -> MotionSpace:
-        """Motions in which the joints `moving` do so; with `rest` they begin and end at rest, with `start` (n,) there."""
+        """Motions of all joints; with `rest` they begin and end at rest, with `start` (n,) there."""
         standing = np.ones(size) if kind == "spline" else np.eye(1 + 2 * size)[0]
         begin = _basis(kind, np.zeros(1), period, size)[:, 0]
         rows = [standing, *(begin[1:] if rest else ()), *(begin[:1] if start is not None else ())]
@@ -59,9 +58,15 @@ class MotionSpace:
             axis=1
         )
         allowed = np.minimum(reach / fastest[0][:, None], limits.velocity / fastest[1][:, None])
-        allowed[:, [j for j in range(n) if j not in moving]] = 0.0
         scale = allowed if start is not None else np.vstack([reach, allowed])
         return cls(kind, size, period, instants, free, fixed, scale, start is None)
+
+    def moving(self, joints: Sequence[int]) -> MotionSpace:
+        """Motions of these joints only; the others stand at their place."""
+        swings = self.scale[1:] if self.placed else self.scale
+        standing = np.isin(np.arange(self.joints), list(joints), invert=True)
+        still = np.where(standing, 0.0, swings)
+        return replace(self, scale=np.vstack([self.scale[:1], still]) if self.placed else still)
 
     @property
     def joints(self) -> int:

@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.design.condition import ColumnCondition
-from flexcal.design.criteria import Criterion, DOptimal, SpectralCriterion, TraceOptimal
+from flexcal.design.condition import ColumnCondition, LeastEigenvalue
+from flexcal.design.criteria import Criterion, DOptimal, TraceOptimal
 from flexcal.design.torque_columns import DRIVE, TorqueColumns
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
@@ -57,6 +57,10 @@ class TorqueGoal:
         slope = self.criterion.gradient(self.unknowns.information(self.total(information)))
         directions = self.unknowns.directions
         return self.instants * directions @ slope @ directions.T
+
+    def about(self, wanted: Sequence[str]) -> TorqueGoal:
+        """The same of some of the unknowns only, the others eliminated (Ds-optimality)."""
+        return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(wanted))))
 
     def after(self, information: np.ndarray) -> TorqueGoal:
         """The goal of the next motion."""
@@ -117,7 +121,7 @@ def torque_goal(
     of_base = Unknowns(names, np.diag(1 / sizes), _FAINT * np.eye(columns.rank))
     kinds: dict[str, Criterion] = {
         "D": DOptimal(),
-        "E": SpectralCriterion("E"),
+        "E": LeastEigenvalue(),
         "A": TraceOptimal(np.eye(columns.rank), "A"),
     }
     return TorqueGoal(kinds[criterion], of_base, nothing, instants)
@@ -134,7 +138,7 @@ def declared_unknowns(columns: TorqueColumns, free: tuple[str, ...] = ()) -> Unk
     ]
     names += [f"{joint}.{key}" for key in DRIVE[1:] for joint in model.joint_names]
     held = model.nominal_payload
-    if held is not None and held.mass_std > 0 and columns.payload != 0:
+    if held is not None and held.mass_std > 0 and columns.payload is None:
         names.append("payload.mass")
     names += [name for name in free if name not in names]
     known = np.array([np.isfinite(declared(model, name).prior_std) and name not in free for name in names])

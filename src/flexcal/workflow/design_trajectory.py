@@ -8,14 +8,17 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import TrajectoryPlan, write_plan
-from flexcal.design import TrajectoryDesign, design_trajectories
+from flexcal.data import TrajectoryPlan, read_plan_of, write_plan
+from flexcal.design import TrajectoryDesign, design_trajectories, sequence
 from flexcal.design.condition import condition_number
 from flexcal.design.motion_space import Kind
+from flexcal.design.sequences import SequenceName
+from flexcal.design.torque_columns import TorqueColumns
 from flexcal.design.torque_goal import TrajectoryCriterion
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.trajectory_design import write_trajectory_page
 
 
 @dataclass(frozen=True)
@@ -25,6 +28,8 @@ class TrajectoryRequest:
     count: int = 3
     criterion: TrajectoryCriterion = "posterior"
     of: tuple[str, ...] = ()
+    sequence: SequenceName | None = None
+    after: Path | None = None
     kind: Kind = "fourier"
     duration: float = 10.0
     base_frequency_hz: float = 0.2
@@ -43,11 +48,14 @@ class TrajectoryRequest:
             raise InputError(
                 f"the start has {len(self.start)} positions, but {nominal.name} has {nominal.n} joints; give one each."
             )
+        loaded = self.loaded or any(name.startswith("payload.") for name in self.of)
         return design_trajectories(
             nominal,
             self.count,
             criterion=self.criterion,
             of=self.of,
+            sequence=() if self.sequence is None else sequence(TorqueColumns.of(nominal), self.sequence),
+            after=None if self.after is None else read_plan_of(self.after, TrajectoryPlan),
             kind=self.kind,
             duration=self.duration,
             base_frequency_hz=self.base_frequency_hz,
@@ -55,7 +63,7 @@ class TrajectoryRequest:
             rest=self.rest,
             start=np.array(self.start) if self.start else None,
             share=self.share,
-            payload=None if self.loaded or nominal.payload is None else 0.0,
+            payload=None if loaded or nominal.payload is None else 0.0,
             starts=self.starts,
             steps=self.steps,
             seed=self.seed,
@@ -70,6 +78,11 @@ class DesignedTrajectories:
     design: TrajectoryDesign
     file: Path
 
+    @property
+    def page(self) -> Path:
+        """Where the pictures are: beside the plan."""
+        return self.file.with_suffix(".html")
+
     def document(self) -> dict[str, Any]:
         """The JSON document."""
         design, plan = self.design, self.design.plan
@@ -83,6 +96,10 @@ class DesignedTrajectories:
             "base_parameters": design.columns.rank,
             "condition": condition_number(design.information[-1]),
             "merits": list(design.merits),
+            "largest_shares": design.largest_shares(),
+            "clearance": design.clearance,
+            "prior_gain": design.prior_gain(),
+            "page": self.page,
             "seed": plan.seed,
         }
 
@@ -90,10 +107,15 @@ class DesignedTrajectories:
 def plan_trajectories(
     robot: Path, out: Path, request: TrajectoryRequest, *, progress: Progress = silent
 ) -> DesignedTrajectories:
-    """Write exciting trajectories of the nominal robot to the file `out`. Raises `FlexcalError` as `design_trajectories` does."""
+    """Write exciting trajectories of the nominal robot to the file `out`, and a page of pictures beside it.
+
+    Raises `FlexcalError` as `design_trajectories` does.
+    """
     design = request.design(RobotModel.from_yaml(robot, estimates=False), progress)
+    found = DesignedTrajectories(design, out)
+    write_trajectory_page(found.page, design, found.document())
     write_plan(out, design.plan)
-    return DesignedTrajectories(design, out)
+    return found
 
 
 def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:
