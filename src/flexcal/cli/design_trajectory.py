@@ -49,7 +49,7 @@ class DesignTrajectory:
     searches: Annotated[int, arg(metavar="N")] = 1
     """Random beginnings, of which the best is followed; more take longer."""
     steps: Annotated[int, arg(metavar="N")] = 20
-    """Steps of a search at each height of its barrier; 60 come close to the end."""
+    """Steps of a search at each height of its barrier; 40 come close to the end."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the random beginnings."""
     json: Json = False
@@ -92,4 +92,5 @@ class DesignTrajectory:
             f"matrix; criterion {self.criterion}: "
             + ", ".join(f"{merit:.4g}" for merit in document["merits"])
         )
+        console.say(f"pictures: {document['page']}")
         console.finish(document, f"{measuring(self.out, self.robot, 'exciting')}, or record it on the robot")

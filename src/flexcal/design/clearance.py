@@ -35,68 +35,56 @@ class Clearance:
         )
         self._first, self._second = moves[ends[:, 0]], moves[ends[:, 1]]
         self._reach = (self._first != self._second) * _reaches(checker)
-        self._last: tuple[np.ndarray, np.ndarray] | None = None
+        self._distance, self._where = np.zeros((0, 0)), np.zeros((0, 0, 0))
 
     def wider(self, further: float) -> Clearance:
         """The same with margins that are larger by `further`, m, and nothing remembered."""
         return Clearance(self.checker, self.within, self.beyond + further)
 
-    def near(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def near(self, q: np.ndarray, least: float = -np.inf) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Instants (k,), distances (k,), negative where too near, and derivatives (k, n) by the joints, of what is below `within`.
 
-        `q` (N, n). A derivative is along the line between the nearest points; it jumps where these do.
+        `q` (N, n). Nothing more is looked at once a distance is below `least`. A derivative is along the line between the nearest
+        points; it jumps where these do.
         """
         import pinocchio as pin
 
-        perhaps = self._perhaps(q)
-        seen: list[tuple[int, int, float]] = []
+        if len(self._distance) != len(q):
+            self._distance = np.full((len(q), len(self._reach)), -np.inf)
+            self._where = np.zeros((len(q), *self._reach.shape))
+        moved = np.einsum("ipj,pj->ip", np.abs(q[:, None] - self._where), self._reach)
+        perhaps = self._distance - moved < self.within
+        robot, data, geometry, distances = self._robot, self._data, self._geometry, self._distances
         close: list[tuple[int, int]] = []
         points: list[np.ndarray] = []
         jacobians: list[np.ndarray] = []
-        results = self._distances.distanceResults
+        configurations = self.checker.configurations(q)
         for i in np.flatnonzero(perhaps.any(axis=1)).tolist():
-            values = self.checker.configurations(q[i : i + 1])[0]
-            pin.updateGeometryPlacements(self._robot, self._data, self._geometry, self._distances, values)
-            jacobian = None
-            for pair in np.flatnonzero(perhaps[i]).tolist():
-                distance = pin.computeDistance(self._geometry, self._distances, pair).min_distance
-                seen.append((i, pair, distance))
-                if distance < self.within + self._margins[pair]:
-                    if jacobian is None:
-                        jacobian = pin.computeJointJacobians(self._robot, self._data, values)[
-                            :, self._columns
-                        ]
-                    result = results[pair]
-                    close.append((i, pair))
-                    points.append(
-                        np.array([result.getNearestPoint1(), result.getNearestPoint2(), result.normal])
-                    )
-                    jacobians.append(jacobian)
-        self._remember(q, seen)
+            pairs = np.flatnonzero(perhaps[i])
+            pin.updateGeometryPlacements(robot, data, geometry, distances, configurations[i])
+            found = np.array(
+                [pin.computeDistance(geometry, distances, pair).min_distance for pair in pairs.tolist()]
+            )
+            found -= self._margins[pairs]
+            self._distance[i, pairs], self._where[i, pairs] = found, q[i]
+            within = pairs[found < self.within].tolist()
+            if within:
+                jacobian = pin.computeJointJacobians(robot, data, configurations[i])[:, self._columns]
+            for pair in within:
+                result = distances.distanceResults[pair]
+                close.append((i, pair))
+                points.append(np.array([result.getNearestPoint1(), result.getNearestPoint2(), result.normal]))
+                jacobians.append(jacobian)
+            if found.min(initial=np.inf) < least:
+                break
         instants, pairs = np.array(close, dtype=int).reshape(-1, 2).T
         one, other, normal = np.array(points).reshape(-1, 3, 3).transpose(1, 0, 2)
         moving = np.array(jacobians).reshape(len(close), 6, q.shape[1])
         slopes = np.zeros((len(close), q.shape[1]))
-        for point, moved, sign in ((one, self._first, -1.0), (other, self._second, 1.0)):
+        for point, carried, sign in ((one, self._first, -1.0), (other, self._second, 1.0)):
             turning = np.einsum("kc,kcj->kj", np.cross(point, normal), moving[:, 3:])
-            slopes += sign * moved[pairs] * (np.einsum("kc,kcj->kj", normal, moving[:, :3]) + turning)
-        assert self._last is not None
-        return instants, self._last[0][instants, pairs], slopes
-
-    def _perhaps(self, q: np.ndarray) -> np.ndarray:
-        """Which pairs (N, pairs) could be below `within`."""
-        if self._last is None or len(self._last[0]) != len(q):
-            return np.ones((len(q), len(self._reach)), dtype=bool)
-        distance, where = self._last
-        return distance - np.einsum("ipj,pj->ip", np.abs(q[:, None] - where), self._reach) < self.within
-
-    def _remember(self, q: np.ndarray, seen: list[tuple[int, int, float]]) -> None:
-        if self._last is None or len(self._last[0]) != len(q):
-            self._last = np.empty((len(q), len(self._reach))), np.empty((len(q), *self._reach.shape))
-        numbers = np.array(seen).reshape(-1, 3)
-        instants, pairs = numbers[:, :2].astype(int).T
-        self._last[0][instants, pairs] = numbers[:, 2] - self._margins[pairs]
-        self._last[1][instants, pairs] = q[instants]
+            slopes += sign * carried[pairs] * (np.einsum("kc,kcj->kj", normal, moving[:, :3]) + turning)
+        return instants, self._distance[instants, pairs], slopes
 
 
 def _reaches(checker: CollisionChecker) -> np.ndarray:

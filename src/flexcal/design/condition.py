@@ -1,4 +1,4 @@
-"""The condition number of the column-scaled observation matrix, as a criterion."""
+"""The least singular value and the condition number of an observation matrix as smooth criteria of M = WᵀW."""
 
 from __future__ import annotations
 
@@ -6,10 +6,31 @@ from dataclasses import dataclass
 
 import numpy as np
 
+_POWER = 8.0
+"""Extreme eigenvalues count as norms of this order, so that close ones are moved together: searches end sooner, and higher."""
+
+
+@dataclass(frozen=True)
+class LeastEigenvalue:
+    """½ log of the harmonic mean of order 8 of M's eigenvalues: E-optimality, smooth where eigenvalues meet."""
+
+    name: str = "E"
+    uses_prior: bool = True
+
+    def merit(self, information: np.ndarray) -> float:
+        """-inf where M is singular."""
+        values = np.linalg.eigvalsh(information)
+        return -_extreme(values, -_POWER)[0] if values[0] > 0 else -np.inf
+
+    def gradient(self, information: np.ndarray) -> np.ndarray:
+        """Derivative (p, p) by M, symmetric."""
+        values, vectors = np.linalg.eigh(information)
+        return -(vectors * _extreme(values, -_POWER)[1]) @ vectors.T
+
 
 @dataclass(frozen=True)
 class ColumnCondition:
-    """-log cond(W) of W with columns of unit norm, from M = WᵀW (Gautier & Khalil 1992; van der Sluis 1969 for the scaling)."""
+    """-log cond(W) of W with columns of unit norm (Gautier & Khalil 1992; van der Sluis 1969 for the scaling), with norms of order 8."""
 
     name: str = "condition"
     uses_prior: bool = False
@@ -17,21 +38,28 @@ class ColumnCondition:
     def merit(self, information: np.ndarray) -> float:
         """-inf where M is singular."""
         values = np.linalg.eigvalsh(_scaled(information)[0])
-        return float(0.5 * np.log(values[0] / values[-1])) if values[0] > 0 else -np.inf
+        return -_extreme(values, -_POWER)[0] - _extreme(values, _POWER)[0] if values[0] > 0 else -np.inf
 
     def gradient(self, information: np.ndarray) -> np.ndarray:
-        """Derivative (p, p) of the merit by M, symmetric; of simple extreme eigenvalues."""
+        """Derivative (p, p) by M, symmetric."""
         scaled, scale = _scaled(information)
         values, vectors = np.linalg.eigh(scaled)
-        least, most = vectors[:, :1] / np.sqrt(values[0]), vectors[:, -1:] / np.sqrt(values[-1])
-        slope = 0.5 * (least @ least.T - most @ most.T)
+        slope = -(vectors * (_extreme(values, -_POWER)[1] + _extreme(values, _POWER)[1])) @ vectors.T
         by_norm = np.einsum("ij,ij->i", slope, scaled)
         return scale[:, None] * slope * scale - np.diag(by_norm * scale**2)
 
 
 def condition_number(information: np.ndarray) -> float:
     """cond(W) of W with columns of unit norm from M = WᵀW (p, p); inf where M is singular."""
-    return float(np.exp(-ColumnCondition().merit(information)))
+    values = np.linalg.eigvalsh(_scaled(information)[0])
+    return float(np.sqrt(values[-1] / values[0])) if values[0] > 0 else np.inf
+
+
+def _extreme(values: np.ndarray, power: float) -> tuple[float, np.ndarray]:
+    """½ |1/power| log Σ λ^power: of the largest for a positive one, minus that of the least for a negative; and its slopes."""
+    logs = power * np.log(values)
+    total = np.logaddexp.reduce(logs)
+    return float(0.5 * total / abs(power)), 0.5 * np.sign(power) * np.exp(logs - total) / values
 
 
 def _scaled(information: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,7 @@ from flexcal.design.motion_space import MotionSpace
 from flexcal.design.torque_columns import TorqueColumns
 from flexcal.model import point_kinematics
 
-NEAR = 0.1
+NEAR = 0.05
 """Metres beyond the margin from which on a pair of shapes is watched."""
 
 
@@ -62,20 +62,21 @@ class ExcitingProgram:
         """Minus the merit, and the barrier of all limits, each counted by its mean over the instants."""
         motion = self.space.motion(x)
         q = motion[0]
+        outside = Valued(np.inf, lambda: np.zeros(x.size), lambda v: v)
+        linear = self._linear_uses(motion)
+        if np.abs(linear).max() >= 1:
+            return outside
         columns = self.columns.write(motion)
-        uses = self.uses(motion, columns)
-        nothing = Valued(np.inf, lambda: np.zeros(x.size), lambda v: v)
-        if any(np.abs(use).max() >= 1 for use in uses):
-            return nothing
+        uses = (*linear, self._torque_use(columns))
         point = _Point.of(self.columns, self.limits, motion)
-        if (point.constraints >= 0).any():
-            return nothing
-        instants, distances, nearing = self.clearance.near(q)
+        if np.abs(uses[-1]).max() >= 1 or (point.constraints >= 0).any():
+            return outside
+        instants, distances, nearing = self.clearance.near(q, 0.0)
         if (distances <= 0).any():
-            return nothing
+            return outside
         merit = self.merit.merit(information := self._information(columns))
         if not np.isfinite(merit):
-            return nothing
+            return outside
         closeness = distances / NEAR
         room = sum(np.sum(np.log1p(-(use**2))) for use in uses) + np.sum(np.log(-point.constraints))
         room += np.sum(np.log(closeness) + (1 - closeness) + (1 - closeness) ** 2 / 2)
@@ -112,18 +113,17 @@ class ExcitingProgram:
         """What Coulomb friction leaves of the motor torques (n,)."""
         return self.limits.torque - np.nan_to_num(self.columns.model.coulomb)
 
-    def uses(self, motion: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, ...]:
-        """Share (N, n) of what is allowed that positions, velocities, accelerations and motor torques take, between -1 and 1."""
-        q, dq, ddq = motion
-        limits = self.limits
-        middle = (limits.upper + limits.lower) / 2
-        torque = np.einsum("jrn,r->nj", columns, self.columns.smooth_values)
-        return (
-            (q - middle) / self._half,
-            dq / limits.velocity,
-            ddq / limits.acceleration,
-            torque / self._drive_share,
-        )
+    def uses(self, motion: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """Share (4, N, n) of what is allowed that positions, velocities, accelerations and motor torques take, between -1 and 1."""
+        return np.array([*self._linear_uses(motion), self._torque_use(columns)])
+
+    def _linear_uses(self, motion: np.ndarray) -> np.ndarray:
+        middle = (self.limits.upper + self.limits.lower) / 2
+        room = np.array([self._half, self.limits.velocity, self.limits.acceleration])
+        return (motion - np.array([middle, 0 * middle, 0 * middle])[:, None]) / room[:, None]
+
+    def _torque_use(self, columns: np.ndarray) -> np.ndarray:
+        return np.einsum("jrn,r->nj", columns, self.columns.smooth_values) / self._drive_share
 
     def excess(self, x: np.ndarray) -> Excess | None:
         """By how much a motion passes the limits at its worst instants; None where it keeps them."""

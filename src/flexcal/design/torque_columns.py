@@ -75,6 +75,11 @@ class TorqueColumns:
         return np.concatenate([inertial_parameters(loaded), drives.ravel()])
 
     @cached_property
+    def base_values(self) -> np.ndarray:
+        """Values of the base columns (r,)."""
+        return self.found.regrouping @ self.values
+
+    @cached_property
     def smooth_values(self) -> np.ndarray:
         """Values of the base columns (r,) that make the torque without Coulomb friction."""
         values = self.values.copy()

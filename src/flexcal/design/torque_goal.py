@@ -8,8 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.design.condition import ColumnCondition
-from flexcal.design.criteria import Criterion, DOptimal, SpectralCriterion, TraceOptimal
+from flexcal.design.condition import ColumnCondition, LeastEigenvalue
+from flexcal.design.criteria import Criterion, DOptimal, TraceOptimal
 from flexcal.design.torque_columns import DRIVE, TorqueColumns
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
@@ -117,7 +117,7 @@ def torque_goal(
     of_base = Unknowns(names, np.diag(1 / sizes), _FAINT * np.eye(columns.rank))
     kinds: dict[str, Criterion] = {
         "D": DOptimal(),
-        "E": SpectralCriterion("E"),
+        "E": LeastEigenvalue(),
         "A": TraceOptimal(np.eye(columns.rank), "A"),
     }
     return TorqueGoal(kinds[criterion], of_base, nothing, instants)

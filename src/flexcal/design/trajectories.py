@@ -16,7 +16,7 @@ from flexcal.design.interior_search import minimise
 from flexcal.design.motion_limits import MotionLimits
 from flexcal.design.motion_space import Kind, MotionSpace
 from flexcal.design.torque_columns import TorqueColumns
-from flexcal.design.torque_goal import TorqueGoal, TrajectoryCriterion, torque_goal
+from flexcal.design.torque_goal import TorqueGoal, TrajectoryCriterion, declared_unknowns, torque_goal
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -28,7 +28,7 @@ TORQUE_ERROR = 1e-3
 """1σ of an instant's torque, relative to the joint's effort, and how many of these a second are independent."""
 INDEPENDENT_HZ = 40.0
 _INSTANTS_A_HARMONIC = 20
-_SCREENING, _REFINING = (1.0, 0.3), (0.1, 0.03, 0.01)
+_SCREENING, _REFINING = (0.3,), (0.1, 0.03, 0.01)
 _REPAIRS = 12
 
 
@@ -37,6 +37,7 @@ class TrajectoryDesign:
     """A `plan`, and for each of its trajectories the information (r, r) on the base `columns` after it, all before it included.
 
     `limits` are those that it keeps, `goal` is what it was designed for, `merits` how much of that there is after each trajectory.
+    `clearance` is the least distance of bodies beyond their margins, m, up to 0.05.
     """
 
     model: RobotModel
@@ -46,6 +47,33 @@ class TrajectoryDesign:
     goal: TorqueGoal
     merits: tuple[float, ...]
     information: tuple[np.ndarray, ...]
+    clearance: float
+
+    def shares(self, motion: np.ndarray) -> dict[str, np.ndarray]:
+        """Shares (N, n) of the limits that q, q̇, q̈ (3, N, n) take; motor torques are with friction, what has no limit is left out."""
+        q, dq, ddq = motion
+        limits = self.limits
+        half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
+        torque = np.einsum("jrn,r->nj", self.columns.write(motion), self.columns.base_values)
+        found = {"position": (q - middle) / half, "velocity": dq / limits.velocity}
+        if np.isfinite(limits.acceleration).any():
+            found["acceleration"] = ddq / limits.acceleration
+        return found | {"torque": torque / limits.torque}
+
+    def largest_shares(self) -> dict[str, float]:
+        """The largest share of each over all trajectories, at instants 0.1 % of a period apart."""
+        plan = self.plan
+        time = np.arange(1000) / (1000 * plan.base_frequency_hz)
+        each = [self.shares(np.array(plan.motion(number, time))) for number in range(len(plan))]
+        return {key: max(float(np.abs(shares[key]).max()) for shares in each) for key in each[0]}
+
+    def prior_gain(self) -> dict[str, float]:
+        """Standard deviation after all trajectories over that of robot.yaml's prior, of everything that this knows."""
+        unknowns = declared_unknowns(self.columns)
+        known = np.diag(unknowns.prior) > 0
+        covariance = np.linalg.pinv(unknowns.information(self.information[-1]), hermitian=True)
+        after = np.sqrt(np.diag(covariance))
+        return {name: float(std) for name, std, has in zip(unknowns.names, after, known, strict=True) if has}
 
 
 def design_trajectories(
@@ -63,7 +91,7 @@ def design_trajectories(
     share: float = 1.0,
     payload: float | None = None,
     starts: int = 3,
-    steps: int = 60,
+    steps: int = 40,
     seed: int = 0,
     progress: Progress = silent,
 ) -> TrajectoryDesign:
@@ -100,6 +128,7 @@ def design_trajectories(
     program = ExcitingProgram(space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR))
     rng = np.random.default_rng(seed)
     coefficients, merits, information = [], [], []
+    least = NEAR
     for number in range(count):
         x = _designed(program, begin, starts, steps, rng, progress, number, count)
         found = program.information(program.finer(FINER).space.motion(x))
@@ -108,6 +137,10 @@ def design_trajectories(
         information.append(goal.gathered)
         program = replace(program, merit=goal)
         coefficients.append(space.coefficients(x))
+        least = min(
+            least,
+            program.finer(FINER).clearance.near(program.finer(FINER).space.motion(x)[0])[1].min(initial=NEAR),
+        )
     progress("trajectories", 1.0)
     of_kind = FourierPaths if kind == "fourier" else SplinePaths
     controller = model.controller
@@ -124,7 +157,9 @@ def design_trajectories(
         torque="held",
         seed=seed,
     )
-    return TrajectoryDesign(model, plan, columns, limits, goal, tuple(merits), tuple(information))
+    return TrajectoryDesign(
+        model, plan, columns, limits, goal, tuple(merits), tuple(information), float(least)
+    )
 
 
 def _periods(duration: float, frequency: float) -> int:

@@ -16,6 +16,7 @@ from flexcal.design.torque_goal import TrajectoryCriterion
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.trajectory_design import write_trajectory_page
 
 
 @dataclass(frozen=True)
@@ -70,6 +71,11 @@ class DesignedTrajectories:
     design: TrajectoryDesign
     file: Path
 
+    @property
+    def page(self) -> Path:
+        """Where the pictures are: beside the plan."""
+        return self.file.with_suffix(".html")
+
     def document(self) -> dict[str, Any]:
         """The JSON document."""
         design, plan = self.design, self.design.plan
@@ -83,6 +89,10 @@ class DesignedTrajectories:
             "base_parameters": design.columns.rank,
             "condition": condition_number(design.information[-1]),
             "merits": list(design.merits),
+            "largest_shares": design.largest_shares(),
+            "clearance": design.clearance,
+            "prior_gain": design.prior_gain(),
+            "page": self.page,
             "seed": plan.seed,
         }
 
@@ -90,10 +100,15 @@ class DesignedTrajectories:
 def plan_trajectories(
     robot: Path, out: Path, request: TrajectoryRequest, *, progress: Progress = silent
 ) -> DesignedTrajectories:
-    """Write exciting trajectories of the nominal robot to the file `out`. Raises `FlexcalError` as `design_trajectories` does."""
+    """Write exciting trajectories of the nominal robot to the file `out`, and a page of pictures beside it.
+
+    Raises `FlexcalError` as `design_trajectories` does.
+    """
     design = request.design(RobotModel.from_yaml(robot, estimates=False), progress)
+    found = DesignedTrajectories(design, out)
+    write_trajectory_page(found.page, design, found.document())
     write_plan(out, design.plan)
-    return DesignedTrajectories(design, out)
+    return found
 
 
 def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:
