@@ -32,8 +32,13 @@ class Judge:
         return BaseParameters.of(self.observation)
 
     @cached_property
-    def checker(self) -> CollisionChecker:
-        """Bodies nearer than 10 mm to each other or to the floor touch."""
+    def itself(self) -> CollisionChecker:
+        """Bodies nearer than 10 mm to each other touch."""
+        return CollisionChecker(self.model, floor=None)
+
+    @cached_property
+    def on_floor(self) -> CollisionChecker:
+        """Or to the floor."""
         return CollisionChecker(self.model)
 
     def matrix(self, motion: np.ndarray) -> np.ndarray:
@@ -62,7 +67,7 @@ class Judge:
         return float(values[0] / values[-1]), float(information)
 
     def violations(self, motion: np.ndarray) -> dict[str, float]:
-        """What is broken at any sample: the largest use of a limit (1 is all of it), or the share of collisions."""
+        """What is broken at any sample: the largest use of a limit (1 is all of it), or the share of samples that touch."""
         q, dq, ddq = motion
         joints = self.model.joints
         lower, upper, velocity, effort = np.array(
@@ -79,5 +84,6 @@ class Judge:
             "torque": np.abs(torque).max(axis=0) / effort,
         }
         broken = {name: float(np.max(share)) for name, share in used.items() if np.max(share) > 1 + 1e-9}
-        collisions = float(self.checker.collides(q).mean())
-        return {**broken, "collision": collisions} if collisions else broken
+        touches = self.itself.collides(q)
+        shares = {"itself": touches.mean(), "floor": (self.on_floor.collides(q) & ~touches).mean()}
+        return {**broken, **{name: float(share) for name, share in shares.items() if share}}

@@ -137,7 +137,7 @@ def figaroh(judge: Judge, robot: str, seed: int, seconds: float) -> Outcome:
         "urdf": str(judge.model.urdf),
         "packages": str(shared().parent),
         "locked": list(judge.model.config.locked),
-        "pairs": [pair for pair in judge.checker.pairs if "floor" not in pair],
+        "pairs": judge.itself.pairs,
         "duration": DURATION,
         "seed": seed,
         "seconds": seconds,

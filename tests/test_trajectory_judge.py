@@ -76,7 +76,7 @@ def test_random_trajectories_keep_all_limits_and_touch_nothing_where_they_were_l
     drawn = random_trajectories(judge.model, 10.0, 5, np.random.default_rng(1))
     for _, one in zip(range(20), drawn, strict=False):
         assert judge.violations(fourier_motion(*one, 10.0, TIME[::2])) == {}
-        assert judge.violations(fourier_motion(*one, 10.0, TIME)).keys() <= {"collision"}
+        assert judge.violations(fourier_motion(*one, 10.0, TIME)).keys() <= {"itself", "floor"}
 
 
 def test_fourier_motions_are_derivatives_of_each_other(motion: np.ndarray) -> None:
@@ -94,11 +94,14 @@ def test_what_is_broken_is_named(judge: Judge, motion: np.ndarray, order: int, b
     wrong[order, 7, 1] = (2.6, -7.0, 100.0)[order]
     found = judge.violations(wrong)
     assert broken in found and found[broken] > 1
-    assert set(found) <= {broken, "collision"}
+    assert set(found) <= {broken, "itself", "floor"}
 
 
-def test_uses_and_collisions_are_measured(judge: Judge, motion: np.ndarray) -> None:
+def test_uses_and_touches_are_measured(judge: Judge, motion: np.ndarray) -> None:
     wrong = motion.copy()
     wrong[1, 3, 0] = 2 * judge.model.joints[0].velocity
+    wrong[0] = 0.0
     wrong[0, :4] = np.array([0, 129, 144, 0, 0, 0]) * np.pi / 180  # folded onto itself
-    assert judge.violations(wrong) == pytest.approx({"velocity": 2.0, "collision": 4 / len(TIME)}, rel=1e-12)
+    wrong[0, 4:10] = np.array([0, 120, 0, 0, 0, 0]) * np.pi / 180  # below the floor
+    expected = {"velocity": 2.0, "itself": 4 / len(TIME), "floor": 6 / len(TIME)}
+    assert judge.violations(wrong) == pytest.approx(expected, rel=1e-12)
