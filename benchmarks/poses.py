@@ -1,4 +1,4 @@
-"""Calibration poses: how long the choice from 100 000 candidates takes, how near it comes to the best of many restarts, and figaroh's DETMAX.
+"""Calibration poses: time of the choice from 100 000 candidates, nearness to the best of many restarts, and figaroh's DETMAX.
 
 Processor time of one thread. The stored pool holds 2000 poses of the TX90L; figaroh runs in an environment of its own on the same rows.
 """
@@ -49,7 +49,7 @@ def run() -> list[tuple[str, float, str]]:
 
 
 def many(model: RobotModel) -> list[tuple[str, float, str]]:
-    """From 100 000 candidates: rows of all of them, reduction to base parameters, and the choice; drawing and checking them is told beside."""
+    """From 100 000 candidates: rows of all of them, reduction to base parameters, and the choice; drawing them is told beside."""
     checker = CollisionChecker(model)
     drawing, q = timed(lambda: random_candidates(checker, CANDIDATES, np.random.default_rng(1), preload=True))
     rows, base = best(lambda: base_sensitivity(pose_sensitivity(model, q)))

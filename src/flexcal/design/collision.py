@@ -122,7 +122,7 @@ class CollisionChecker:
             if second in self._obstacles:
                 link, obstacle = self._names((first, second))
                 raise InputError(
-                    f"the obstacle {obstacle} touches {link} of {self.model.name} in every configuration, so the robot stands in it; correct "
+                    f"the obstacle {obstacle} touches {link} of {self.model.name} in every configuration: it stands there; correct "
                     "its place in its URDF, which is in the robot's base frame, or remove it from `obstacles:`."
                 )
 

@@ -18,8 +18,8 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
 from flexcal.model import RobotModel
 
-AVERAGING = 0.1
-"""Where no choice of as many poses could predict a tool error smaller by more than this share, more poses only average."""
+AVERAGING = 0.2
+"""Above what no choice of as many poses could be below, relative: from there on more poses do little but average."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,8 +52,10 @@ def next_poses(
 ) -> NextPoses:
     """The `count` candidates that, one after the other, add most to what the `measured` poses and the tolerances tell.
 
-    `criterion` is c, A or D. Where the measured poses say how noisy they are, the next ones are taken to be as noisy. Raises `FlexcalError` for another
-    criterion, for fewer candidates, and for poses measured with another target, from another station, or with a draw-wire.
+    `criterion` is c, A or D. Where the measured poses say how noisy they are, the next ones are taken to be as noisy.
+
+    Raises `FlexcalError` for another criterion, for fewer candidates, and for poses measured with another target, from another station, or
+    with a draw-wire.
     """
     merit = criterion_named(criterion, found.tool_weight)
     if not isinstance(merit, DOptimal | TraceOptimal):
@@ -68,10 +70,10 @@ def next_poses(
     done = len(np.unique(measured.pose))
     steps = range(count + 1)
     errors = [tool_error(base, found.tool_weight, selection.chosen[:number]) for number in steps]
-    either = Sensitivity(np.concatenate([known.jacobian, rows]), before.parameters, before.prior_information)
-    least = least_trace(either, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
+    alone = replace(known, prior_information=before.prior_information)
+    least = least_trace(alone, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
     design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
-    return NextPoses(design, done, np.array(errors), least)
+    return NextPoses(design, done, np.array(errors), np.minimum(least, errors))
 
 
 def measured_rows(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
