@@ -163,7 +163,9 @@ class DesignPoses:
             f"(rms over {_where(document)}); no choice of as many reaches less than {least[0]:.4f} mm"
         )
         stop = document["stop_after"]
-        aim = "more poses only average" if self.wanted is None else f"it is at most {self.wanted:g} mm"
+        aim = (
+            "more poses do little but average" if self.wanted is None else f"it is at most {self.wanted:g} mm"
+        )
         if stop == 0:
             console.say(f"stop here: {aim}; no plan was written")
             console.finish(document, "flexcal calibrate with the measured poses")

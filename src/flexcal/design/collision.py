@@ -39,7 +39,7 @@ class CollisionChecker:
     them. Pairs that never come apart by the margin, as in a compact wrist, are compared without it. A mesh counts as its convex hull;
     `package://name/` is looked for in every folder above the URDF. A payload, the reflector's mount and cables have no shape and are
     not seen. Without collision shapes in the URDF nothing collides. `kinematics` and `geometry` are Pinocchio's. Raises `InputError`
-    where shapes or obstacles cannot be read.
+    where shapes or obstacles cannot be read, and for an obstacle that a link touches in each of the 200 configurations.
     """
 
     def __init__(self, model: RobotModel, *, margin: float = 0.01, floor: float | None = 0.0) -> None:
@@ -66,6 +66,7 @@ class CollisionChecker:
         pairs = self._comparable()
         overlap = self._always_touching(pairs, [0.0] * len(pairs))
         self.permanent = tuple(self._names(pair) for pair in overlap)
+        self._check_obstacles(overlap)
         pairs = [pair for pair in pairs if pair not in overlap]
         near = self._always_touching(pairs, [margin] * len(pairs))
         self._checked = self._set_pairs(pairs, [0.0 if pair in near else margin for pair in pairs])
@@ -128,6 +129,15 @@ class CollisionChecker:
                 if not neighbours or (j in self._obstacles and first != second):
                     result.append((i, j))
         return result
+
+    def _check_obstacles(self, overlap: list[tuple[int, int]]) -> None:
+        for first, second in overlap:
+            if second in self._obstacles:
+                link, obstacle = self._names((first, second))
+                raise InputError(
+                    f"the obstacle {obstacle} touches {link} of {self.model.name} in every configuration: it stands there; correct "
+                    "its place in its URDF, which is in the robot's base frame, or remove it from `obstacles:`."
+                )
 
     def _set_pairs(self, pairs: list[tuple[int, int]], margins: list[float]) -> Any:
         import pinocchio as pin

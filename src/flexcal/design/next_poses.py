@@ -11,16 +11,15 @@ from flexcal.design.best_possible import least_trace
 from flexcal.design.criteria import DOptimal, TraceOptimal
 from flexcal.design.exchange import greedy
 from flexcal.design.pose_candidates import PoseCandidates
-from flexcal.design.pose_sensitivity import geometry_jacobian
+from flexcal.design.pose_sensitivity import geometry_jacobian, measuring_noise
 from flexcal.design.poses import CriterionName, PoseDesign, criterion_named, tool_error
 from flexcal.design.setup import MeasuringSetup
-from flexcal.design.visibility import station_position
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.model import RobotModel
 
-AVERAGING = 0.1
-"""Where no choice of as many poses could predict a tool error smaller by more than this share, more poses only average."""
+AVERAGING = 0.2
+"""Above what no choice of as many poses could be below, relative: from there on more poses do little but average."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,30 +52,32 @@ def next_poses(
 ) -> NextPoses:
     """The `count` candidates that, one after the other, add most to what the `measured` poses and the tolerances tell.
 
-    `criterion` is c, A or D. Measured noise counts where the poses have it, else that of the setup. Raises `FlexcalError` for another
-    criterion, for fewer candidates, and for poses measured with another target, from another station, or with a draw-wire.
+    `criterion` is c, A or D. Where the measured poses say how noisy they are, the next ones are taken to be as noisy.
+
+    Raises `FlexcalError` for another criterion, for fewer candidates, and for poses measured with another target, from another station, or
+    with a draw-wire.
     """
     merit = criterion_named(criterion, found.tool_weight)
     if not isinstance(merit, DOptimal | TraceOptimal):
         raise FlexcalError(f"the next poses are chosen by c, A or D, not by {criterion}.")
     before = found.base.sensitivity
-    rows = measured_rows(found, measured)
+    rows, noisier = measured_rows(found, measured)
     flat = rows.reshape(-1, rows.shape[2])
     information = before.prior_information + flat.T @ flat
-    known = Sensitivity(before.jacobian, before.parameters, information)
+    known = Sensitivity(before.jacobian / noisier, before.parameters, information)
     base = replace(found.base, sensitivity=known)
     selection = greedy(known, count, merit)
     done = len(np.unique(measured.pose))
     steps = range(count + 1)
     errors = [tool_error(base, found.tool_weight, selection.chosen[:number]) for number in steps]
-    either = Sensitivity(np.concatenate([before.jacobian, rows]), before.parameters, before.prior_information)
-    least = least_trace(either, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
+    alone = replace(known, prior_information=before.prior_information)
+    least = least_trace(alone, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
     design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
-    return NextPoses(design, done, np.array(errors), least)
+    return NextPoses(design, done, np.array(errors), np.minimum(least, errors))
 
 
-def measured_rows(found: PoseCandidates, measured: PoseSet) -> np.ndarray:
-    """Whitened rows (N, 3, rank) of measured poses in the combinations that the candidates tell apart."""
+def measured_rows(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
+    """Whitened rows (N, 3, rank) of measured poses in the combinations that the candidates tell apart, and their noise by the setup's."""
     model, setup = found.model, found.setup
     _check(model, measured, setup)
     payload = np.full(len(measured), np.nan) if measured.payload is None else measured.payload
@@ -85,22 +86,10 @@ def measured_rows(found: PoseCandidates, measured: PoseSet) -> np.ndarray:
         held = np.isnan(payload) if np.isnan(mass) else payload == mass
         own = replace(setup, payload=setup.payload if np.isnan(mass) else float(mass))
         jacobian = found.base.columns(geometry_jacobian(model, measured.q[held], own)[1])
-        rows[held] = jacobian / _noise(model, measured.subset(held), own)[:, :, None]
-    return rows
-
-
-def _noise(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> np.ndarray:
-    """1σ (N, 3), m, of the measured coordinates."""
-    if measured.sigma_given:
-        return measured.sigma
-    origin = station_position(model, setup.station)
-    position = point_kinematics(model, measured.q, point=setup.point, jacobians=False).position
-    apart = (
-        np.full(len(position), 2 * model.reach)
-        if origin is None
-        else np.linalg.norm(position - origin, axis=1)
-    )
-    return np.repeat(setup.noise.std(apart)[:, None], 3, axis=1)
+        rows[held] = jacobian
+    expected = measuring_noise(model, measured.q, setup)[:, None]
+    std = measured.sigma if measured.sigma_given else expected
+    return rows / std[..., None], float(np.median(std / expected))
 
 
 def _check(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> None:

@@ -66,10 +66,7 @@ def pose_sensitivity(
     Where robot.yaml does not say where the instrument stands, its distance is taken as twice the robot's reach.
     """
     names, _ = geometry_jacobian(model, q[:1], setup)
-    origin = station_position(model, setup.station)
-    position = point_kinematics(model, q, point=setup.point, jacobians=False).position
-    apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
-    std = setup.noise.std(apart)
+    std = measuring_noise(model, q, setup)
     parameters = Parameters(
         Parameter(name, unit_of(name), 0.0, prior_std=_tolerance(name, tolerances)) for name in names
     )
@@ -78,6 +75,14 @@ def pose_sensitivity(
         part = slice(first, first + BLOCK)
         whitened[part] = geometry_jacobian(model, q[part], setup)[1] / std[part, None, None]
     return Sensitivity(whitened, parameters, parameters.prior_information())
+
+
+def measuring_noise(model: RobotModel, q: np.ndarray, setup: MeasuringSetup = STANDARD) -> np.ndarray:
+    """1σ (samples,), m, of the coordinates that the instrument measures at `q` (samples, n)."""
+    origin = station_position(model, setup.station)
+    position = point_kinematics(model, q, point=setup.point, jacobians=False).position
+    apart = np.full(len(q), 2 * model.reach) if origin is None else np.linalg.norm(position - origin, axis=1)
+    return setup.noise.std(apart)
 
 
 def _tolerance(name: str, tolerances: Tolerances) -> float:

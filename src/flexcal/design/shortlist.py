@@ -14,7 +14,7 @@ from flexcal.design.exchange import CHOOSING, Selection, exchange
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
-SHORT = 1500
+SHORT = 1000
 """Candidates among which is exchanged."""
 MANY = 5000
 """Candidates above which a shortlist pays."""
@@ -28,7 +28,7 @@ _LIGHT = 1e-3
 def choose(
     sensitivity: Sensitivity, count: int, criterion: Criterion, *, progress: Progress = silent
 ) -> Selection:
-    """As `exchange`, from any number of candidates; above 5000 the exchange sees 1500 at a time.
+    """As `exchange`, from any number of candidates; above 5000 the exchange sees 1000 at a time.
 
     It begins among candidates drawn at random (always the same ones), then goes on among those that promise most beside the set found,
     until that set stays or after six rounds. Raises `FlexcalError` as `exchange` does.

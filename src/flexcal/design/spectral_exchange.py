@@ -17,7 +17,9 @@ from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
 SCREENED = 16
-"""Candidates whose eigenvalues are found exactly in every step."""
+"""Candidates whose eigenvalues are found exactly in every step, at most."""
+FIRST = 4
+"""Of these, how many before all others: the score bounds the merit, so that those below the best of them are settled."""
 LONGEST = 4
 """Members that an excursion exchanges at once, at most."""
 _ENOUGH = 1e-9
@@ -44,15 +46,33 @@ class _Pool:
     def best_addition(self, information: np.ndarray, banned: list[int]) -> tuple[int, float]:
         """The candidate whose addition to `information` gives the best merit, and that merit."""
         values, vectors = np.linalg.eigh(information)
-        score = self._diagonal_merit(self.flat, values, vectors, 1.0)
+        low = self._low(values, vectors)
+        score = self._diagonal_merit(self.flat, values[:low], vectors[:, :low], 1.0)
         score[banned] = -np.inf
         few = np.argpartition(-score, min(SCREENED, self.candidates - 1))[:SCREENED]
+        few = few[np.argsort(-score[few])]
         few = few[np.isfinite(score[few])]
-        rows = self.jacobian[few]
-        exact = np.linalg.eigvalsh(information + np.swapaxes(rows, 1, 2) @ rows)
-        merits = self.criterion.of_eigenvalues(exact)
+        merits = self._exact(information, few[:FIRST])
+        left = few[FIRST:][score[few[FIRST:]] > merits.max(initial=-np.inf)]
+        if len(left):
+            few = np.concatenate([few[:FIRST], left])
+            merits = np.concatenate([merits, self._exact(information, left)])
         best = int(np.argmax(merits))
         return int(few[best]), float(merits[best])
+
+    def _low(self, values: np.ndarray, vectors: np.ndarray) -> int:
+        """How many of the lowest eigenvectors settle the score: where only the least entry counts, none above what the lowest reaches."""
+        if self.criterion.name not in ("E", "O3"):
+            return len(values)
+        lowest = (self.flat @ vectors[:, 0]).reshape(-1, self.rows)
+        reached = values[0] + np.einsum("ij,ij->i", lowest, lowest).max()
+        return max(1, int(np.searchsorted(values, reached)))
+
+    def _exact(self, information: np.ndarray, candidates: np.ndarray) -> np.ndarray:
+        """The merit with each of some `candidates` added."""
+        rows = self.jacobian[candidates]
+        eigenvalues = np.linalg.eigvalsh(information + np.swapaxes(rows, 1, 2) @ rows)
+        return self.criterion.of_eigenvalues(eigenvalues)
 
     def worst_member(self, information: np.ndarray, chosen: list[int]) -> tuple[int, float]:
         """The place in `chosen` of the member that is missed least, and the merit without it."""
@@ -70,7 +90,7 @@ class _Pool:
     ) -> np.ndarray:
         seen = flat @ vectors
         np.multiply(seen, seen, out=seen)
-        diagonal = seen.reshape(-1, self.rows, self.size).sum(axis=1)
+        diagonal = seen.reshape(-1, self.rows, len(values)).sum(axis=1)
         diagonal *= sign
         diagonal += values
         return self.criterion.of_eigenvalues(diagonal)

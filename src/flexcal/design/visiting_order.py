@@ -44,7 +44,7 @@ def visiting_order(checker: CollisionChecker, q: np.ndarray, *, point: str | Non
         for first, second in new:
             known[first, second] = blocked(checker, q[first], q[second], point=point)
             if known[first, second]:
-                cost[first, second] = cost[second, first] = dear
+                cost[[first, second], [second, first]] += dear
         if not any(known[move] for move in new):
             break
         order = short_tour(cost, start=order)

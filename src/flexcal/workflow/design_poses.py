@@ -137,7 +137,9 @@ def plan_calibration_poses(
     seed: int = 0,
     progress: Progress = silent,
 ) -> ChosenPoses:
-    """Choose `count` poses for the calibration of the robot as it is known, in an order of short moves; write the plan to `out`, its page beside it.
+    """Choose `count` poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
+
+    The poses are in an order of short moves.
 
     `candidates`: so many random poses to choose from, or a file of poses. `working`: where the tool error counts, as in `working_volume`.
     With `wanted`, m, only as many poses as bring the predicted tool error down to it. `payload` in kg, None for the file's, else the

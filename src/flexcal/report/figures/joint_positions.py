@@ -22,8 +22,8 @@ def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
         share = (q[:, i] - ends[0]) / (ends[1] - ends[0])
         figure.add_trace(
             go.Scatter(
-                x=[0, 1], y=[joint.name] * 2, mode="lines+text", line={"color": AXIS, "width": 2},
-                text=[f"{end / unit:.0f} {name}".replace("-", "−") for end in ends], textposition=["bottom right", "bottom left"],
+                x=[0, 1], y=[joint.name] * 2, mode="lines+text", cliponaxis=False, line={"color": AXIS, "width": 2},
+                text=[f"{end / unit:.0f} {name}".replace("-", "−") for end in ends], textposition=["middle left", "middle right"],
                 hoverinfo="skip",
             )
         )  # fmt: skip
@@ -36,7 +36,7 @@ def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
             )
         )  # fmt: skip
     figure.update_xaxes(
-        range=[-0.02, 1.02], showticklabels=False, ticks="", showgrid=False, title_text="between the limits"
+        range=[-0.1, 1.1], showticklabels=False, ticks="", showgrid=False, title_text="between the limits"
     )
     figure.update_yaxes(autorange="reversed", showgrid=False)
     return figure

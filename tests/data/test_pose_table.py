@@ -1,0 +1,70 @@
+"""Plans of poses as CSV, and files that say where the robot will work."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of, read_working, write_plan
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+
+
+@pytest.mark.parametrize("payload", [None, np.array([0.0, 2.5, 6.0])])
+def test_a_plan_comes_back_bit_by_bit(
+    tmp_path: Path, rng: np.random.Generator, payload: np.ndarray | None
+) -> None:
+    plan = PosePlan(rng.normal(size=(3, 6)), payload, seed=4, name="calibration")
+    write_plan(tmp_path / "poses.csv", plan)
+    found = read_plan_of(tmp_path / "poses.csv", PosePlan)
+    np.testing.assert_array_equal(found.q, plan.q)
+    assert (found.payload is None) == (payload is None)
+    if payload is not None:
+        np.testing.assert_array_equal(found.payload, payload)
+    assert found.name == "poses"
+    assert (tmp_path / "poses.csv").read_text().startswith("pose,q1,q2,q3,q4,q5,q6")
+
+
+WRONG = [
+    ("pose,q1,q3\n1,0,0\n", "line 1: the column 'q2' is missing"),
+    ("pose,x\n1,0\n", "line 1: the column 'q1' is missing"),
+    ("pose,q1,speed\n1,0,2\n", "the column 'speed' is not known"),
+    ("pose,q1\n1,a\n", "line 2, column q1: 'a' is not a number"),
+    ("pose,q1,payload\n1,0,-2\n", "the payload is -2 kg"),
+]
+
+
+@pytest.mark.parametrize(("text", "sentence"), WRONG)
+def test_what_is_wrong_is_said(tmp_path: Path, text: str, sentence: str) -> None:
+    (tmp_path / "p.csv").write_text(text)
+    with pytest.raises(InputError, match=sentence):
+        read_plan(tmp_path / "p.csv")
+
+
+def test_only_poses_can_be_csv(tmp_path: Path) -> None:
+    plan = object.__new__(MultisinePlan)
+    with pytest.raises(InputError, match="only a plan of poses can be a CSV"):
+        write_plan(tmp_path / "plan.csv", plan)
+    assert not (tmp_path / "plan.csv").exists()
+
+
+def test_working_points_and_working_poses(tmp_path: Path, tx90l: RobotModel) -> None:
+    points, poses = tmp_path / "points.csv", tmp_path / "poses.csv"
+    points.write_text("x,y,z\n0.5,0,0.4\n0.6,0.1,0.4\n")
+    q, places = read_working(points, tx90l)
+    assert q is None
+    np.testing.assert_array_equal(places, [[0.5, 0, 0.4], [0.6, 0.1, 0.4]])
+    poses.write_text("pose,q1,q2,q3,q4,q5,q6\n1,0,0.1,0.2,0,0,0\n")
+    q, places = read_working(poses, tx90l)
+    assert places is None
+    np.testing.assert_array_equal(q, [[0, 0.1, 0.2, 0, 0, 0]])
+    poses.write_text("pose,q1,q2,q3,q4,q5,q6\n1,0,2.9,0.2,0,0,0\n")
+    with pytest.raises(
+        InputError, match=r"line 2, column q2: pose 1, at 2\.9 rad, is outside the limits of joint_2"
+    ):
+        read_working(poses, tx90l)
+    points.write_text("x,y,height\n0.5,0,0.4\n")
+    with pytest.raises(InputError, match="column 'pose' is missing"):
+        read_working(points, tx90l)
