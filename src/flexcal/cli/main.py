@@ -89,7 +89,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         )
     except SystemExit as stop:  # --help, or arguments that do not parse: tyro has said so
         return stop.code if isinstance(stop.code, int) else FAILED
-    with outputs(parsed.out, verb.leaves):
+    with outputs(parsed.out, verb.leaves, page=verb.page):
         parsed.run()
     return 0
 

@@ -16,8 +16,10 @@ LEDGER = ".flexcal"
 
 
 @contextmanager
-def outputs(out: Path | None, names: Sequence[str] = ()) -> Iterator[None]:
+def outputs(out: Path | None, names: Sequence[str] = (), *, page: bool = False) -> Iterator[None]:
     """Around a verb that writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing.
+
+    With `page`, it also writes an HTML file of the same name beside `out`.
 
     Raises `InputError` beforehand where the folder cannot be written to, and where one of the files is there already that flexcal did
     not write or that was changed since. When the verb fails, what it made is removed again; when it succeeds, so is what an earlier run
@@ -27,7 +29,9 @@ def outputs(out: Path | None, names: Sequence[str] = ()) -> Iterator[None]:
         yield
         return
     folder = out if names else out.parent
-    patterns = names or [glob.escape(out.name)]
+    patterns = names or [
+        glob.escape(path.name) for path in (out, *([out.with_suffix(".html")] if page else []))
+    ]
     made = _make(folder)
     known = _ledger(folder)
     before = _present(folder, patterns)

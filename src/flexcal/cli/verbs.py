@@ -11,7 +11,8 @@ from dataclasses import dataclass
 class Verb:
     """A verb: its words, the module and class that carry it out, what it does in a line, and a command line to copy.
 
-    `leaves` are the files (glob patterns) that it leaves in the folder of --out; none where --out is the file itself.
+    `leaves` are the files (glob patterns) that it leaves in the folder of --out; none where --out is the file itself, beside which it may
+    leave a `page` of the same name.
     """
 
     words: tuple[str, ...]
@@ -20,6 +21,7 @@ class Verb:
     summary: str
     example: str
     leaves: tuple[str, ...] = ()
+    page: bool = False
 
     @property
     def name(self) -> str:
@@ -106,6 +108,7 @@ STEPS = (
                 "DesignFrequency",
                 "plan the frequency experiments",
                 "flexcal design frequency robot.yaml --out frequency.yaml",
+                page=True,
             ),
             Verb(
                 ("measure",),
