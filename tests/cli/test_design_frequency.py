@@ -17,7 +17,7 @@ def test_a_designed_plan_says_what_it_will_tell(run, tx90l_folder):
         "--choose",
         "3",
         "--candidates",
-        "4",
+        "6",
         "--amplitude",
         "flat",
         "--detection-lines",
@@ -55,6 +55,10 @@ def test_given_poses_have_a_prediction_too(run, tx90l_folder):
 @pytest.mark.parametrize(
     ("options", "sentence"),
     [
+        (
+            ("--amplitude", "shaped"),
+            "drives with backlash in pose 3 enough: their gaps would stay closed only with 0 %",
+        ),
         (("--choose", "4"), "--choose is for --plan designed or quick without --poses"),
         (("--std", "-1"), "--std is -1; it must be positive"),
         (("--std", "0.0001"), "0.01 % is not reached however long is measured: 24 realisations leave"),

@@ -23,13 +23,12 @@ from flexcal.report.frequency_design import FrequencyDesignStudy, write_frequenc
 from flexcal.workflow.designed_frequency import (
     CANDIDATES,
     POSES,
+    PlanName,
     designed_excitation,
     response_sensors,
     unplaced_plan,
 )
 from flexcal.workflow.frequency_plans import frequency_plan, read_frequency_poses
-
-PlanKind = Literal["default", "paper", "designed", "quick"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +79,7 @@ class DesignedFrequency:
         if self.choice is None or self.curve is None:
             return result
         return result | {
-            "candidates": len(self.choice.candidates),
+            "candidates": self.choice.drawn,
             "curve": [
                 {"poses": int(n), "chosen": float(chosen), "random": float(random)}
                 for n, chosen, random in self.curve.T
@@ -92,7 +91,7 @@ def plan_frequency_experiments(
     robot: Path,
     out: Path,
     *,
-    kind: PlanKind = "default",
+    kind: PlanName = "default",
     poses: Path | None = None,
     choose: int | None = None,
     candidates: int = CANDIDATES,
@@ -150,6 +149,6 @@ def plan_frequency_experiments(
 
 
 def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:
-    most = min(2 * len(choice.poses), len(choice.candidates))
+    most = min(2 * len(choice.poses), choice.drawn)
     counts = np.arange(1, most + 1)
     return np.array([counts, *stiffness_curve(choice, counts, np.random.default_rng([seed, 7]))])
