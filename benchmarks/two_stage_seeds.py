@@ -27,7 +27,8 @@ from flexcal.elasticity.residual import StageOneResidual
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
 from flexcal.report.study import TwoStageStudy
-from flexcal.workflow.two_stage import PlanName, run_two_stage
+from flexcal.workflow.designed_frequency import PlanName
+from flexcal.workflow.two_stage import run_two_stage
 from flexcal.yaml_reader import read_yaml
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"

@@ -49,6 +49,8 @@ class DesignFrequency:
     """Phases as drawn, or shifted from there so that the torque's peaks are small."""
     detection_lines: bool = False
     """Leave out one line in four; what is seen there is the robot's odd nonlinear distortion."""
+    place_payload: bool = False
+    """Predict what holding the payload elsewhere about the last axis, as far off it, would change in these poses."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the random phases."""
     json: Json = False
@@ -80,10 +82,18 @@ class DesignFrequency:
                 wanted=self.std,
                 crest=self.crest,
                 detection_lines=self.detection_lines,
+                place_payload=self.place_payload,
                 seed=self.seed,
                 progress=progress,
             ).document()
         console.show(predicted_table(document["predicted_std"]))
+        places = document.get("payload_placements", ())
+        if places:
+            best = min(places, key=lambda place: place["largest_std"])
+            console.say(
+                f"payload: as declared, the largest standard deviation of a stiffness is {100 * places[0]['largest_std']:.2f} %; with its "
+                f"centre of mass at [{', '.join(f'{x:.3f}' for x in best['com'])}] it would be {100 * best['largest_std']:.2f} %"
+            )
         console.say(
             f"wrote {self.out} and {document['page']}: {document['poses']} poses, {document['lines']} lines from "
             f"{document['lowest_hz']:g} to {document['highest_hz']:g} Hz, {document['recordings']} recordings, "

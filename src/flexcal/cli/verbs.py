@@ -108,6 +108,7 @@ STEPS = (
                 "DesignFrequency",
                 "plan the frequency experiments",
                 "flexcal design frequency robot.yaml --out frequency.yaml",
+                page=True,
             ),
             Verb(
                 ("measure",),

@@ -7,14 +7,14 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.design.gap_crossing import gap_load, share
+from flexcal.design.gap_crossing import gap_load, share, within_preload
 from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.spring_criterion import spring_criterion
 from flexcal.model import RobotModel
 
 LEAST, MOST = 0.4, 4.0
-"""Amplitude of any line over that of the flat spectrum: below, the response's logarithm would be biased at that line; above, friction
-would no longer be the disturbance that was predicted."""
+"""Amplitude of any line over that of the flat spectrum, before all are lowered for the gaps: below, the response's logarithm would be
+biased at that line; above, friction would no longer be the disturbance that was predicted."""
 ROOM = 2.0
 """Largest root mean square of an axis' torque over that of the flat plan: 8 % of its effort, with peaks of a quarter."""
 ITERATIONS = 20
@@ -23,15 +23,14 @@ ITERATIONS = 20
 def shaped(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
     """The plan, whose spectrum is flat, with amplitudes that make `spring_criterion` small in its poses.
 
-    No axis gets more power than it has, and no gap is strained beyond what `gap_load` allows. The multiplicative algorithm for optimal
-    designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of what more of it would gain over what it costs,
-    its share of the axis' power plus its share in the gap that is strained most.
+    No axis gets more than `ROOM` times its torque, and no gap is strained beyond what `gap_load` allows. The multiplicative algorithm for
+    optimal designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of what more of it would gain over what
+    it costs, its share of the axis' power plus its share in the gap that is strained most. Raises `FlexcalError` as `within_preload` does.
     """
-    criterion, plan = spring_criterion(planned.parameters), planned.plan
+    criterion, plan = spring_criterion(planned.parameters), within_preload(model, planned.plan)
     allowed = ROOM**2 * np.sum(plan.amplitude**2, axis=1, keepdims=True)
     flat = plan.amplitude**2
     load = np.array([gap_load(model, q, plan) for q in plan.poses]).reshape(-1, *flat.shape)
-    plan = replace(plan, amplitude=_feasible(flat, allowed, load))
     best, lowest = plan, np.inf
     for _ in range(ITERATIONS):
         power = plan.amplitude**2

@@ -11,10 +11,7 @@ from flexcal.design.collision import CollisionChecker
 from flexcal.design.exchange import exchange, greedy
 from flexcal.design.frequency_candidates import ExcitablePoses
 from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
-from flexcal.design.response_sensitivity import (
-    response_parameters,
-    response_sensitivity,
-)
+from flexcal.design.response_sensitivity import response_parameters, response_sensitivity
 from flexcal.design.spring_criterion import largest_stiffness_std, spring_criterion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
@@ -33,10 +30,12 @@ UNKNOWN = 0.255
 
 @dataclass(frozen=True, eq=False)
 class ChosenPoses:
-    """`poses` (P, n) rad out of `candidates` (C, n), which they are (P,), and the screening sensitivity of all candidates."""
+    """`poses` (P, n) rad, numbers `chosen` (P,) of the `candidates` (C, n), of which the first `drawn` are random and the others near the
+    chosen ones; `screened` is the sensitivity of all candidates."""
 
     poses: np.ndarray
     candidates: np.ndarray
+    drawn: int
     chosen: np.ndarray
     screened: Sensitivity
 
@@ -62,7 +61,7 @@ def choose_frequency_poses(
     criterion = spring_criterion(parameters)
     pool = excitable.random(max(candidates, count), rng, progress)
     screened = response_sensitivity(model, pool, plan, parameters, sensors, every=SCREEN, progress=progress)
-    chosen = exchange(screened, count, criterion, progress=progress).chosen
+    drawn, chosen = len(pool), exchange(screened, count, criterion, progress=progress).chosen
     for number, spread in enumerate(REFINED):
         progress("refining", number / len(REFINED))
         near = excitable.near(pool[chosen], NEIGHBOURS, spread, rng)
@@ -78,7 +77,7 @@ def choose_frequency_poses(
             f"{count} poses cannot determine {worst}: its predicted standard deviation is {100 * std:.0f} %; choose more poses, "
             "or hold a payload off the wrist's axis."
         )
-    return ChosenPoses(pool[chosen], pool, chosen, screened)
+    return ChosenPoses(pool[chosen], pool, drawn, chosen, screened)
 
 
 def stiffness_curve(
@@ -90,7 +89,7 @@ def stiffness_curve(
     random = [
         np.median(
             [
-                largest_stiffness_std(screened, rng.choice(len(screened), k, replace=False))[1]
+                largest_stiffness_std(screened, rng.choice(chosen.drawn, k, replace=False))[1]
                 for _ in range(random_sets)
             ]
         )

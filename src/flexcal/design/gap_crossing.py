@@ -54,10 +54,11 @@ def gap_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarra
     period = 1 / plan.reference_frequency_hz if omega else 1.0
     held = periodic_torque(model, *motion, period=period, payload=plan.payload)
     held = held[:, [plan.joints[k] for k in drives]]
+    still = static_equilibrium(model, q[None], plan.payload).torque[0, [plan.joints[k] for k in drives]]
     one_sided = (held > 0).all(axis=0) | (held < 0).all(axis=0)
     least = np.where(one_sided, np.abs(held).min(axis=0), 0.0)
     with np.errstate(divide="ignore"):
-        needed = np.maximum(SELDOM / least, CREST / np.abs(held.mean(axis=0)))
+        needed = np.maximum(SELDOM / least, CREST / np.abs(still))
     return _strain(model, q, plan)[drives] * needed[:, None, None] ** 2
 
 

@@ -13,6 +13,7 @@ from flexcal.design.amplitude import shaped
 from flexcal.design.frequency_poses import ChosenPoses, stiffness_curve
 from flexcal.design.gap_crossing import within_preload
 from flexcal.design.multisines import room
+from flexcal.design.payload_placement import Placement, payload_placements
 from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.spring_criterion import largest_stiffness_std
 from flexcal.frequency import leave_out_detection_lines
@@ -22,13 +23,12 @@ from flexcal.report.frequency_design import FrequencyDesignStudy, write_frequenc
 from flexcal.workflow.designed_frequency import (
     CANDIDATES,
     POSES,
+    PlanName,
     designed_excitation,
     response_sensors,
     unplaced_plan,
 )
 from flexcal.workflow.frequency_plans import frequency_plan, read_frequency_poses
-
-PlanKind = Literal["default", "paper", "designed", "quick"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +44,7 @@ class DesignedFrequency:
     file: Path
     choice: ChosenPoses | None = None
     curve: np.ndarray | None = None
+    placements: tuple[Placement, ...] = ()
 
     @property
     def plan(self) -> MultisinePlan:
@@ -73,10 +74,12 @@ class DesignedFrequency:
             "predicted_std_flat": self.flat.std(),
             "largest_stiffness_std": {"name": name, "std": largest},
         }
+        if self.placements:
+            result["payload_placements"] = [{"com": p.com, "largest_std": p.std} for p in self.placements]
         if self.choice is None or self.curve is None:
             return result
         return result | {
-            "candidates": len(self.choice.candidates),
+            "candidates": self.choice.drawn,
             "curve": [
                 {"poses": int(n), "chosen": float(chosen), "random": float(random)}
                 for n, chosen, random in self.curve.T
@@ -88,7 +91,7 @@ def plan_frequency_experiments(
     robot: Path,
     out: Path,
     *,
-    kind: PlanKind = "default",
+    kind: PlanName = "default",
     poses: Path | None = None,
     choose: int | None = None,
     candidates: int = CANDIDATES,
@@ -96,6 +99,7 @@ def plan_frequency_experiments(
     wanted: float | None = None,
     crest: Literal["random", "optimised"] = "random",
     detection_lines: bool = False,
+    place_payload: bool = False,
     seed: int = 0,
     progress: Progress = silent,
 ) -> DesignedFrequency:
@@ -105,7 +109,7 @@ def plan_frequency_experiments(
     take the poses of frequency_poses.csv beside robot.yaml and flat amplitudes. `poses`: a file of poses to take instead, the rows of
     this plan. `amplitude` overrides how they are. `wanted`: relative standard deviation that every stiffness shall have; realisations and
     periods follow. `crest`: random phases, or ones with small peaks; with `detection_lines` one line in four is left out, to see odd
-    distortion.
+    distortion; with `place_payload` it is predicted what holding the payload elsewhere about the last axis would change in these poses.
 
     Raises `FlexcalError` where the robot declares no elastic joint or no controller, the poses cannot be read or excited, too few can be
     found, or the wanted standard deviation is out of reach.
@@ -135,14 +139,16 @@ def plan_frequency_experiments(
     if wanted is not None:
         planned = planned.reaching(wanted)
     planned = replace(planned, plan=replace(planned.plan, crest=crest))
+    curve = None if choice is None else _curve(choice, seed)
+    places = payload_placements(model, planned.plan, sensors, progress) if place_payload else ()
+    found = DesignedFrequency(planned, flat, out, choice, curve, places)
     write_plan(out, planned.plan)
-    found = DesignedFrequency(planned, flat, out, choice, None if choice is None else _curve(choice, seed))
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
     write_frequency_page(out.with_suffix(".html"), study)
     return found
 
 
 def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:
-    most = min(2 * len(choice.poses), len(choice.candidates))
+    most = min(2 * len(choice.poses), choice.drawn)
     counts = np.arange(1, most + 1)
     return np.array([counts, *stiffness_curve(choice, counts, np.random.default_rng([seed, 7]))])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.workflow.frequency_plans import REFERENCE
 from flexcal.yaml_reader import read_yaml
+
+PlanName = Literal["default", "paper", "designed", "quick"]
+"""All plans that there are; poses and amplitudes of the last two are chosen for the robot."""
 
 POSES = 6
 CANDIDATES = 300

@@ -7,7 +7,6 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -25,7 +24,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.publication import TX90L_PAPER
 from flexcal.report.study import CadAlone, TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
-from flexcal.workflow.designed_frequency import designed_excitation, response_sensors, unplaced_plan
+from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
@@ -35,8 +34,6 @@ from flexcal.yaml_reader import read_yaml
 CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)
 VERIFICATION_POSES = 150
-
-PlanName = Literal["default", "paper", "designed", "quick"]
 
 STAGES = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "cad_alone", "report")
 
@@ -70,7 +67,8 @@ def run_two_stage(
 
     `robot` is a robot.yaml with cell.yaml and frequency_poses.csv beside it. The hidden truth is drawn from `seed`, or taken from the file
     `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and stored. `inertias_known` gives
-    the identification the true link inertias, to see what CAD costs. Raises `FlexcalError` for files that do not fit.
+    the identification the true link inertias, to see what CAD costs. The plans `designed` and `quick` are chosen for the robot as stage 0
+    left it; `quick` takes half the time, and 25 calibration poses instead of 40. Raises `FlexcalError` for files that do not fit.
     """
     watch = Stopwatch()
     nominal = RobotModel.from_yaml(robot, estimates=False)
