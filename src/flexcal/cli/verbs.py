@@ -165,6 +165,13 @@ STEPS = (
                 ("results.json", "report.html"),
             ),
             Verb(
+                ("compensate",),
+                "compensate",
+                "Compensate",
+                "tool targets to the motor commands that put the real tool there",
+                "flexcal compensate robot.yaml targets.csv --out commands.csv",
+            ),
+            Verb(
                 ("report",),
                 "report",
                 "Report",
@@ -244,6 +251,8 @@ _ALSO_CALLED = {
     "plan": "design frequency",
     "frf": "identify response",
     "damping": "identify stiffness",
+    "correct": "compensate",
+    "apply": "compensate",
 }
 
 

@@ -12,7 +12,9 @@ from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import PoseSet, concatenate
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import read_recording, read_recording_blocks, write_recording
+from flexcal.data.target_files import read_targets, write_commands
 from flexcal.data.time_base import TimeBase
+from flexcal.data.tool_targets import ToolTargets
 from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.estimates_file import (
     provenance,
@@ -31,6 +33,7 @@ __all__ = [
     "Recording",
     "RecordingLabel",
     "TimeBase",
+    "ToolTargets",
     "TrajectoryPlan",
     "check_motion",
     "concatenate",
@@ -43,7 +46,9 @@ __all__ = [
     "read_poses",
     "read_recording",
     "read_recording_blocks",
+    "read_targets",
     "sha256_of",
+    "write_commands",
     "write_estimates",
     "write_measured_poses",
     "write_plan",

@@ -11,7 +11,6 @@ from flexcal.design.criteria import (
     observability,
 )
 from flexcal.design.exchange import Selection, exchange, greedy
-from flexcal.design.joint_space import joint_ranges
 from flexcal.design.pose_curve import PoseCurve, pose_curve
 from flexcal.design.pose_sensitivity import (
     BaseSensitivity,
@@ -26,6 +25,7 @@ from flexcal.design.setup import Acceptance, MeasuringSetup, TrackerNoise
 from flexcal.design.skeleton import joint_origins, link_frames
 from flexcal.design.trajectories import design_trajectories
 from flexcal.design.visibility import visible
+from flexcal.model.joint_space import joint_ranges
 
 __all__ = [
     "Acceptance",

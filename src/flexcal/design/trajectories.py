@@ -8,10 +8,10 @@ import numpy as np
 
 from flexcal.data import TrajectoryPlan
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.joint_space import joint_ranges
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
 from flexcal.model.declared import declared, uncertain_inertials
+from flexcal.model.joint_space import joint_ranges
 
 BASE_FREQUENCY_HZ = 0.2
 HARMONICS = 5
