@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
 from flexcal.compensation.newton import find_commands
 from flexcal.compensation.postures import best_posture, from_postures
-from flexcal.compensation.reasons import nominal_reasons, real_reasons
+from flexcal.compensation.reasons import given_past_limit, nominal_reasons, real_reasons
 from flexcal.compensation.wanted import wanted_pose
 from flexcal.data import ToolTargets
 from flexcal.model import RobotModel, carried_mass
@@ -80,12 +80,13 @@ def _solve(
     else:
         assert start is not None
         known, reached, elsewhere = from_postures(nominal, aim, start)
-    payload = carried_mass(model, targets.payload, size)
     q, before = np.full((size, model.n), np.nan), np.full(size, np.nan)
     unambiguous, reason = np.zeros(size, dtype=bool), np.full(size, "", dtype=object)
-    lost = np.flatnonzero(~reached)
+    if targets.q is not None:
+        reason[:] = given_past_limit(nominal, targets.q)
+    lost = np.flatnonzero(~reached & (reason == ""))
     reason[lost] = nominal_reasons(nominal, aim.subset(lost), known[lost])
-    rows = np.flatnonzero(reached)
+    rows = np.flatnonzero(reason == "")
     commands = find_commands(
         model,
         aim.subset(rows),
@@ -99,6 +100,8 @@ def _solve(
     )
     done = rows[commands.found]
     q[done] = commands.q[commands.found]
-    certain = certain_flank(model, q[done], commands.torque[commands.found], payload[done])
+    certain = certain_flank(
+        model, q[done], commands.torque[commands.found], carried_mass(model, targets.payload, size)[done]
+    )
     unambiguous[done] = certain[:, list(model.backlash_joints)].all(axis=1)
     return Compensation(q, known, before, unambiguous, elsewhere, reason.astype(str))

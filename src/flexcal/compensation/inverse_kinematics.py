@@ -15,8 +15,9 @@ Forward = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 _ITERATIONS = 300
 _LONGEST_STEP = 0.3
-_SHORTEST_STEP = 1e-6
-_SLOW = 1e-3
+_SMALL_GAIN = 1e-3
+_PATIENCE = 12
+"""Steps of a small gain, one after the other, until a row is at its end: a singular posture takes some to get going."""
 _DAMPING = (1e-7, 1e-1)
 """Smallest and first damping, relative to the reach."""
 
@@ -36,30 +37,28 @@ def nearest_positions(
     """Joint positions (N, n) within the limits at which the residuals (N, m) of `forward` are least, and these residuals.
 
     Levenberg-Marquardt from `start` (N, n): Δq = Jᵀ (J Jᵀ + λ²)⁻¹ r, of least joint change, at most 0.3 rad or m a step; a joint
-    at a limit that the step would leave stands still. A row is at its end where a step gains less than a thousandth, or does not
-    help though it is shorter than 1e-6.
+    at a limit that the step would leave stands still. A row is at its end where steps keep gaining less than a thousandth.
     """
     lower, upper = joint_limits(model)
     weight = aim.weight(model)
     q = np.clip(start, lower, upper)
     residual, jacobian = forward(np.arange(len(q)), q)
     damping = np.full(len(q), _DAMPING[1] * model.reach)
-    stuck = np.zeros(len(q), dtype=bool)
+    idle = np.zeros(len(q), dtype=int)
     for _ in range(_ITERATIONS):
-        rows = np.flatnonzero(~aim.reached(residual) & ~stuck)
+        rows = np.flatnonzero(~aim.reached(residual) & (idle < _PATIENCE))
         if not len(rows):
             break
         r, j = residual[rows] * weight, jacobian[rows] * weight[:, None]
         pull = np.matmul(r[:, None, :], j)[:, 0]
         held = ((q[rows] <= lower) & (pull < 0)) | ((q[rows] >= upper) & (pull > 0))
         step = damped_step(np.where(held[:, None, :], 0.0, j), r, damping[rows])
-        length = np.abs(step).max(axis=1)
-        step *= np.minimum(1.0, _LONGEST_STEP / np.maximum(length, _LONGEST_STEP))[:, None]
+        step *= (_LONGEST_STEP / np.maximum(np.abs(step).max(axis=1), _LONGEST_STEP))[:, None]
         tried = np.clip(q[rows] + step, lower, upper)
         new_residual, new_jacobian = forward(rows, tried)
         before, after = (np.linalg.norm(x, axis=1) for x in (r, new_residual * weight))
         better = after < before
-        stuck[rows] = np.where(better, after > (1 - _SLOW) * before, length < _SHORTEST_STEP)
+        idle[rows] = np.where(after > (1 - _SMALL_GAIN) * before, idle[rows] + 1, 0)
         won = rows[better]
         q[won], residual[won], jacobian[won] = tried[better], new_residual[better], new_jacobian[better]
         damping[rows] = np.where(

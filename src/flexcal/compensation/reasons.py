@@ -14,55 +14,66 @@ _SHARE = 0.3
 """Of the largest part in a motion, from which on a joint is named."""
 
 
+def given_past_limit(model: RobotModel, q: np.ndarray) -> list[str]:
+    """For joint positions (K, n) that a file gives, where one is past its limit; empty for the others."""
+    return [reason or "" for reason in (_past_limit(model, row, "is") for row in q)]
+
+
 def nominal_reasons(model: RobotModel, aim: Aim, nearest: np.ndarray) -> list[str]:
     """What keeps the nominal robot from K aims: `nearest` (K, n) is as near as it comes within its limits."""
     residual, _ = aim.nominal(model, nearest)
-    weakest = _weakest_motion(model, aim, nearest)
     return [
-        f"out of reach: the nominal tool {_nearest(model, q, away, motion)}"
-        for q, away, motion in zip(nearest, residual, weakest, strict=True)
+        f"out of reach: {_nearest(away)}" + (f", with {_named(model, stuck)} at the limit" if stuck else "")
+        for away, stuck in zip(residual, _at_limits(model, nearest), strict=True)
     ]
 
 
 def real_reasons(model: RobotModel, aim: Aim, nominal: np.ndarray, commands: Commands) -> list[str]:
-    """What keeps the real robot from K aims that the nominal one takes at `nominal` (K, n): `commands` that were not found."""
-    there = aim.reached(commands.after)
-    weakest = _weakest_motion(model, aim, np.where(there[:, None], nominal, commands.q))
-    return [
-        f"out of reach: the real tool {_nearest(model, q, away, motion)}"
-        if not near
-        else _past_limit(model, q) or _singular(model, q - start, motion)
-        for q, away, near, start, motion in zip(
-            commands.q, commands.after, there, nominal, weakest, strict=True
-        )
-    ]
+    """What keeps the real robot from K aims that the nominal one takes at `nominal` (K, n): `commands` that were not found.
+
+    The two robots differ by millimetres, so it is a limit, or a singularity that asks for much motion to make up for little.
+    """
+    reasons = []
+    there, stuck = aim.reached(commands.after), _at_limits(model, commands.q)
+    weakest = _weakest_motion(model, aim, nominal)
+    for k, q in enumerate(commands.q):
+        if there[k]:
+            reasons.append(
+                _past_limit(model, q, "would be") or _large(model, q - nominal[k], _tied(model, weakest[k]))
+            )
+        elif stuck[k]:
+            reasons.append(
+                f"joint limit: {_nearest(commands.after[k])}, with {_named(model, stuck[k])} at the limit"
+            )
+        else:
+            reasons.append(f"singular: {_tied(model, weakest[k])}, and {_nearest(commands.after[k])}")
+    return reasons
 
 
-def _nearest(model: RobotModel, q: np.ndarray, away: np.ndarray, weakest: np.ndarray) -> str:
+def _at_limits(model: RobotModel, q: np.ndarray) -> list[list[int]]:
     lower, upper = joint_limits(model)
-    place = f"comes no nearer than {np.linalg.norm(away[:3]) / MILLIMETRE:.3g} mm"
-    if len(away) > 3:
-        place += f" and {np.linalg.norm(away[3:]):.3g} rad"
-    stuck = [j for j in range(model.n) if q[j] in (lower[j], upper[j])]
-    if stuck:
-        return f"{place}, with {_named(model, stuck)} at the limit"
-    return f"{place}, where {_tied(model, weakest)}"
+    return [np.flatnonzero(row).tolist() for row in (q == lower) | (q == upper)]
 
 
-def _past_limit(model: RobotModel, q: np.ndarray) -> str | None:
+def _nearest(away: np.ndarray) -> str:
+    turn = f" and {np.linalg.norm(away[3:]):.3g} rad" if len(away) > 3 else ""
+    return f"the tool comes no nearer than {np.linalg.norm(away[:3]) / MILLIMETRE:.3g} mm{turn}"
+
+
+def _past_limit(model: RobotModel, q: np.ndarray, verb: str) -> str | None:
     lower, upper = joint_limits(model)
     beyond = np.maximum(lower - q, q - upper)
     joint = int(np.argmax(beyond))
     if not beyond[joint] > 0:
         return None
     unit, limit = _unit(model, joint), lower[joint] if q[joint] < lower[joint] else upper[joint]
-    return f"joint limit: {model.joint_names[joint]} would be {beyond[joint]:.2g} {unit} past its limit of {limit:.5g} {unit}"
+    return f"joint limit: {model.joint_names[joint]} {verb} {beyond[joint]:.2g} {unit} past its limit of {limit:.5g} {unit}"
 
 
-def _singular(model: RobotModel, correction: np.ndarray, weakest: np.ndarray) -> str:
+def _large(model: RobotModel, correction: np.ndarray, tied: str) -> str:
     joint = int(np.argmax(np.abs(correction)))
     size = f"{abs(correction[joint]):.2g} {_unit(model, joint)}"
-    return f"singular: {_tied(model, weakest)}, and the correction would move {model.joint_names[joint]} by {size}"
+    return f"singular: {tied}, and the correction would move {model.joint_names[joint]} by {size}"
 
 
 def _tied(model: RobotModel, weakest: np.ndarray) -> str:
