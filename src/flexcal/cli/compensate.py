@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_robot
+from flexcal.cli.options import Json, Numbers, Robot, require_robot
 
 _LISTED = 10
 
@@ -34,7 +34,7 @@ class Compensate:
     ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
     start: Annotated[
-        tuple[float, ...], arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
+        Numbers, arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
     ] = ()
     """Joint positions (rad or m) from which targets without q1, q2 and so on are sought, in the configuration that the arm is to keep."""
     json: Json = False
@@ -72,7 +72,8 @@ class Compensate:
                 f"at {document['ambiguous']} commands gravity does not surely settle the flank of a backlash: unambiguous is false there"
             )
         for item in document["refused"][:_LISTED]:
-            console.say(f"left out: pose {item['pose']} is {item['reason']}")
+            place = ", ".join(f"{key} {item[key]}" for key in ("pose", "line", "row") if key in item)
+            console.say(f"left out: {place}: {item['reason']}")
         if len(document["refused"]) > _LISTED:
             console.say(
                 f"left out: {len(document['refused']) - _LISTED} more, with their reasons under refused in --json"

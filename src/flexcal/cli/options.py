@@ -20,6 +20,15 @@ _PATHS = PrimitiveConstructorSpec(
 )
 Paths = Annotated[tuple, _PATHS]
 """Any number of paths; `tuple[Path, ...]` would make tyro load a type checker, which takes longer than some fits."""
+_NUMBERS = PrimitiveConstructorSpec(
+    nargs="*",
+    metavar="X...",
+    instance_from_str=lambda texts: tuple(float(text) for text in texts),
+    is_instance=lambda value: isinstance(value, tuple),
+    str_from_instance=lambda numbers: [str(number) for number in numbers],
+)
+Numbers = Annotated[tuple, _NUMBERS]
+"""Any number of numbers, as `Paths` are."""
 PoseFiles = Annotated[
     Positional[Paths],
     arg(

@@ -172,6 +172,13 @@ STEPS = (
                 "flexcal compensate robot.yaml targets.csv --out commands.csv",
             ),
             Verb(
+                ("predict",),
+                "predict",
+                "Predict",
+                "motor commands to where the real tool is, under its payload",
+                "flexcal predict robot.yaml commands.csv --out tool.csv",
+            ),
+            Verb(
                 ("report",),
                 "report",
                 "Report",

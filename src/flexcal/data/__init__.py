@@ -12,7 +12,7 @@ from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import PoseSet, concatenate
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import read_recording, read_recording_blocks, write_recording
-from flexcal.data.target_files import read_targets, write_commands
+from flexcal.data.target_files import read_commands, read_targets, write_commands, write_targets
 from flexcal.data.time_base import TimeBase
 from flexcal.data.tool_targets import ToolTargets
 from flexcal.data.trajectory_plan import TrajectoryPlan
@@ -39,6 +39,7 @@ __all__ = [
     "concatenate",
     "labels",
     "provenance",
+    "read_commands",
     "read_estimates",
     "read_plan",
     "read_plan_of",
@@ -55,4 +56,5 @@ __all__ = [
     "write_poses",
     "write_recording",
     "write_recordings",
+    "write_targets",
 ]

@@ -16,9 +16,9 @@ from flexcal.data.pose_columns import (
     whole_numbers,
 )
 from flexcal.data.signals import assign, standard_columns
-from flexcal.data.table import Table, open_table, write_table
+from flexcal.data.table import Table, TableFile, open_table, write_table
 from flexcal.data.tool_targets import ToolTargets
-from flexcal.model.rotations import wxyz_rotation
+from flexcal.model.rotations import rotation_wxyz, wxyz_rotation
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
@@ -50,31 +50,63 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     if "station" in texts:
         _check_stations(table, model)
     pose = whole_numbers(table, signals["pose"], found["pose"][:, 0])
-    _check_once(table, pose)
     quaternion = (
         unit_quaternions(table, signals["quaternion"], found["quaternion"]) if "quaternion" in found else None
     )
-    return ToolTargets(
+    targets = ToolTargets(
         pose=pose,
-        target=target_column(table, model)
-        if "target" in texts
-        else np.full(len(table), first_point(file, model)),
+        target=_points(file, table, model),
         q=found.get("q"),
         position=found.get("xyz"),
         rotation=None if quaternion is None else wxyz_rotation(quaternion),
         station=table.columns["station"] if "station" in texts else None,
         payload=payload_column(table, signals, model),
     )
+    _check_once(table, pose)
+    return targets
 
 
-def write_commands(path: str | Path, targets: ToolTargets, q: np.ndarray, unambiguous: np.ndarray) -> None:
-    """Write motor commands `q` (N, n) for `targets` as CSV or Parquet: `pose`, q1…qn, `target`, `payload` where given, `unambiguous`."""
+def write_commands(path: str | Path, commands: ToolTargets, unambiguous: np.ndarray) -> None:
+    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` where given, `unambiguous` (N,)."""
+    write_table(path, _columns(commands) | {"unambiguous": unambiguous})
+
+
+def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
+    """Read motor commands: `pose`, q1…qn, and where given `target` and `payload`; `unambiguous` is not looked at.
+
+    Raises `InputError` as `read_targets` does.
+    """
+    file = open_table(path)
+    texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
+    signals = assign(file, model, ("pose", "q"), ("payload",), texts)
+    table = file.read(texts)
+    q = signals["q"].values(table)
+    check_joint_units(model, table, signals["q"], q)
+    pose = whole_numbers(table, signals["pose"], signals["pose"].values(table)[:, 0])
+    _check_once(table, pose)
+    return ToolTargets(pose, _points(file, table, model), q, payload=payload_column(table, signals, model))
+
+
+def write_targets(path: str | Path, targets: ToolTargets) -> None:
+    """Write targets as CSV or Parquet, with the columns that `read_targets` reads."""
+    write_table(path, _columns(targets))
+
+
+def _columns(targets: ToolTargets) -> dict[str, np.ndarray]:
     columns: dict[str, np.ndarray] = {"pose": targets.pose}
-    columns |= {name: q[:, i] for i, name in enumerate(standard_columns("q", q.shape[1]))}
-    columns["target"] = targets.target
-    if targets.payload is not None:
-        columns["payload"] = targets.payload
-    write_table(path, columns | {"unambiguous": unambiguous})
+    turn = None if targets.rotation is None else rotation_wxyz(targets.rotation)
+    for quantity, values in (("q", targets.q), ("xyz", targets.position), ("quaternion", turn)):
+        if values is not None:
+            names = standard_columns(quantity, values.shape[1])
+            columns |= {name: values[:, i] for i, name in enumerate(names)}
+    texts = {"target": targets.target, "station": targets.station, "payload": targets.payload}
+    return columns | {name: values for name, values in texts.items() if values is not None}
+
+
+def _points(file: TableFile, table: Table, model: RobotModel) -> np.ndarray:
+    if "target" in file.columns:
+        return target_column(table, model)
+    return np.full(len(table), first_point(file, model))
 
 
 def _check_once(table: Table, pose: np.ndarray) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.compensation import Compensation, best_posture, compensate
 from flexcal.data import ToolTargets, read_targets, write_commands
+from flexcal.data.table import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 from flexcal.model.joint_space import joint_limits
@@ -21,18 +22,25 @@ from flexcal.workflow.calibrated_robot import calibrated_robot
 
 @dataclass(frozen=True, eq=False)
 class RobotCompensation:
-    """The commands for `targets`; `start` (n,) is where inverse kinematics started, None where the file says joint positions."""
+    """The commands for the `targets` of a `file`; `start` (n,): where inverse kinematics started, None where it says joint positions."""
 
     model: RobotModel
+    file: TableFile
     targets: ToolTargets
     result: Compensation
     start: np.ndarray | None
 
     @property
     def refused(self) -> list[dict[str, Any]]:
-        """Number of the pose and reason of every target without a command."""
-        rows = np.flatnonzero(~self.result.found)
-        return [{"pose": int(self.targets.pose[k]), "reason": str(self.result.reason[k])} for k in rows]
+        """Number of the pose, line or row of the file, and reason of every target without a command."""
+        return [
+            {
+                "pose": int(self.targets.pose[k]),
+                self.file.row_word: int(self.file.first + k),
+                "reason": str(self.result.reason[k]),
+            }
+            for k in np.flatnonzero(~self.result.found)
+        ]
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
@@ -88,11 +96,12 @@ def compensate_robot(
     result = compensate(model, nominal, targets, start=origin, progress=progress)
     if not result.found.any():
         raise FlexcalError(
-            f"{file}: none of the {len(targets)} targets can be compensated; pose {targets.pose[0]} is {result.reason[0]}."
+            f"{file}: none of the {len(targets)} targets can be compensated; pose {targets.pose[0]}: {result.reason[0]}."
         )
     found = targets.subset(result.found)
-    write_commands(out, found, result.q[result.found], result.unambiguous[result.found])
-    return RobotCompensation(model, targets, result, origin)
+    commands = ToolTargets(found.pose, found.target, result.q[result.found], payload=found.payload)
+    write_commands(out, commands, result.unambiguous[result.found])
+    return RobotCompensation(model, open_table(file), targets, result, origin)
 
 
 def _start(model: RobotModel, values: Sequence[float]) -> np.ndarray:
