@@ -147,3 +147,24 @@ def test_without_a_calibration(run, examples: Path, tmp_path: Path) -> None:
     for verb in ("compensate", "predict"):
         done = run(verb, folder / "robot.yaml", folder / "random.csv", "--out", tmp_path / "none.csv")
         assert done.status == 2 and f"so there is nothing to {verb} with; run 'flexcal calibrate" in done.err
+
+
+def test_commands_stand_in_the_columns_of_the_controller(run, ur5: Path) -> None:
+    """Motor angles in degrees, mixed by a matrix: the same commands, in the same columns and unit."""
+    mixed = np.eye(6)
+    mixed[5, 4] = 0.5
+    np.savetxt(ur5 / "joint_from_motor.csv", mixed, delimiter=",")
+    plain = ur5 / "robot.yaml"
+    motors = [f"m{i}" for i in range(1, 7)]
+    mapped = ur5 / "mapped.yaml"
+    signal = f"{{columns: [{', '.join(motors)}], unit: deg, matrix: joint_from_motor.csv, offset: [0, -90, 90, 0, 0, 0]}}"
+    mapped.write_text(plain.read_text() + f"signals: {{q: {signal}}}\n")
+    _, rows = read_csv(ur5 / "targets.csv")
+    angles = np.linalg.solve(mixed, np.degrees(rows[:, 1:]).T - np.array([[0, -90, 90, 0, 0, 0]]).T).T
+    foreign = write_csv(ur5 / "motors.csv", ["pose", *motors], np.column_stack([rows[:, 0], angles]))
+    assert run("compensate", mapped, foreign, "--out", ur5 / "there.csv").status == 0
+    assert run("compensate", plain, ur5 / "targets.csv", "--out", ur5 / "here.csv").status == 0
+    there, here = pl.read_csv(ur5 / "there.csv"), pl.read_csv(ur5 / "here.csv").select(Q).to_numpy()
+    assert there.columns[:7] == ["pose", *motors] and not set(Q) & set(there.columns)
+    read = there.select(motors).to_numpy() @ mixed.T + [0, -90, 90, 0, 0, 0]
+    np.testing.assert_allclose(np.radians(read), here, atol=1e-9)

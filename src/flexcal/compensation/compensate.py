@@ -83,7 +83,7 @@ def _solve(
     q, before = np.full((size, model.n), np.nan), np.full(size, np.nan)
     unambiguous, reason = np.zeros(size, dtype=bool), np.full(size, "", dtype=object)
     if targets.q is not None:
-        reason[:] = given_past_limit(nominal, targets.q)
+        reason = given_past_limit(nominal, targets.q)
     lost = np.flatnonzero(~reached & (reason == ""))
     reason[lost] = nominal_reasons(nominal, aim.subset(lost), known[lost])
     rows = np.flatnonzero(reason == "")

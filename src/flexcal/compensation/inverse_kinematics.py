@@ -16,10 +16,11 @@ Forward = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 _ITERATIONS = 300
 _LONGEST_STEP = 0.3
 _SMALL_GAIN = 1e-3
-_PATIENCE = 12
+_PATIENCE = 8
 """Steps of a small gain, one after the other, until a row is at its end: a singular posture takes some to get going."""
-_DAMPING = (1e-7, 1e-1)
-"""Smallest and first damping, relative to the reach."""
+_LEAST_DAMPING = 1e-7
+_FAR, NEAR = 1e-1, 1e-3
+"""Dampings relative to the reach: to start with where the aim may be anywhere, and where it is near."""
 
 
 def inverse_kinematics(model: RobotModel, aim: Aim, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -27,23 +28,26 @@ def inverse_kinematics(model: RobotModel, aim: Aim, start: np.ndarray) -> tuple[
 
     As `nearest_positions` finds them from `start` (N, n).
     """
-    q, residual = nearest_positions(model, aim, start, lambda rows, q: aim.subset(rows).nominal(model, q))
+    q, residual = nearest_positions(
+        model, aim, start, _FAR, lambda rows, q: aim.subset(rows).nominal(model, q)
+    )
     return q, aim.reached(residual)
 
 
 def nearest_positions(
-    model: RobotModel, aim: Aim, start: np.ndarray, forward: Forward
+    model: RobotModel, aim: Aim, start: np.ndarray, first_damping: float, forward: Forward
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joint positions (N, n) within the limits at which the residuals (N, m) of `forward` are least, and these residuals.
 
-    Levenberg-Marquardt from `start` (N, n): Δq = Jᵀ (J Jᵀ + λ²)⁻¹ r, of least joint change, at most 0.3 rad or m a step; a joint
-    at a limit that the step would leave stands still. A row is at its end where steps keep gaining less than a thousandth.
+    Levenberg-Marquardt from `start` (N, n): Δq = Jᵀ (J Jᵀ + λ²)⁻¹ r, of least joint change, at most 0.3 rad or m a step, and first with
+    λ = `first_damping` · reach; a joint at a limit that the step would leave stands still. A row is at its end where steps keep gaining
+    less than a thousandth.
     """
     lower, upper = joint_limits(model)
     weight = aim.weight(model)
     q = np.clip(start, lower, upper)
     residual, jacobian = forward(np.arange(len(q)), q)
-    damping = np.full(len(q), _DAMPING[1] * model.reach)
+    damping = np.full(len(q), first_damping * model.reach)
     idle = np.zeros(len(q), dtype=int)
     for _ in range(_ITERATIONS):
         rows = np.flatnonzero(~aim.reached(residual) & (idle < _PATIENCE))
@@ -62,7 +66,7 @@ def nearest_positions(
         won = rows[better]
         q[won], residual[won], jacobian[won] = tried[better], new_residual[better], new_jacobian[better]
         damping[rows] = np.where(
-            better, np.maximum(damping[rows] / 4, _DAMPING[0] * model.reach), damping[rows] * 4
+            better, np.maximum(damping[rows] / 4, _LEAST_DAMPING * model.reach), damping[rows] * 4
         )
     return q, residual
 

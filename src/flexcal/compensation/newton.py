@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from flexcal.compensation.aim import Aim
-from flexcal.compensation.inverse_kinematics import damped_step, nearest_positions
+from flexcal.compensation.inverse_kinematics import NEAR, damped_step, nearest_positions
 from flexcal.model import RobotModel, ToolAtRest, tool_at_rest
 from flexcal.model.joint_space import joint_limits
 
@@ -94,7 +94,9 @@ class _Search:
 
         for _ in range(2):
             aim = self.aim.subset(rows)
-            self.q[rows], self.after[rows] = nearest_positions(self.model, aim, self.nominal[rows], forward)
+            self.q[rows], self.after[rows] = nearest_positions(
+                self.model, aim, self.nominal[rows], NEAR, forward
+            )
             there = rows[self.aim.reached(self.after[rows])]
             self._evaluate(there, self.q[there], jacobians=False)
             turns = self._turn_flanks(there)

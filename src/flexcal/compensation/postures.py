@@ -7,24 +7,26 @@ import numpy as np
 from flexcal.compensation.aim import Aim
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
 from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.joint_space import even_configurations
+from flexcal.model.joint_space import even_configurations, joint_ranges
 
 _POSTURES = 256
 _OTHER_STARTS = 32
 
 
 def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
-    """The posture (n,) out of 256 spread over the joint ranges that is farthest from a singularity.
+    """The posture (n,) out of 256 spread over the joint ranges that is farthest from singularities and limits.
 
-    That is: the smallest singular value of its Jacobian is the largest, rotations being weighted by the reach; an arm that cannot turn its
-    tool every way is judged by positions alone.
+    That is: the smallest singular value of its Jacobian, rotations being weighted by the reach, times the share of its range that the
+    nearest limit leaves a joint, is the largest. An arm that cannot turn its tool every way is judged by positions alone.
     """
     postures = even_configurations(model, _POSTURES)
     jacobian = point_kinematics(model, postures, point=target).motion_jacobian[:, :, :, 2]
     whole = np.linalg.svd(jacobian * np.repeat([1.0, model.reach], 3)[:, None], compute_uv=False)[:, -1]
     if model.n < 6 or not whole.max() > 0:
         whole = np.linalg.svd(jacobian[:, :3], compute_uv=False)[:, -1]
-    return postures[int(np.argmax(whole))]
+    lower, upper = joint_ranges(model)
+    room = (np.minimum(postures - lower, upper - postures) / (upper - lower)).min(axis=1)
+    return postures[int(np.argmax(whole * room))]
 
 
 def from_postures(

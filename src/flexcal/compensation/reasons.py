@@ -14,9 +14,13 @@ _SHARE = 0.3
 """Of the largest part in a motion, from which on a joint is named."""
 
 
-def given_past_limit(model: RobotModel, q: np.ndarray) -> list[str]:
-    """For joint positions (K, n) that a file gives, where one is past its limit; empty for the others."""
-    return [reason or "" for reason in (_past_limit(model, row, "is") for row in q)]
+def given_past_limit(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """For joint positions (N, n) that a file gives, where one is past its limit; empty texts for the others (N,)."""
+    lower, upper = joint_limits(model)
+    reasons = np.full(len(q), "", dtype=object)
+    for k in np.flatnonzero(((q < lower) | (q > upper)).any(axis=1)):
+        reasons[k] = _past_limit(model, q[k], "is")
+    return reasons
 
 
 def nominal_reasons(model: RobotModel, aim: Aim, nearest: np.ndarray) -> list[str]:

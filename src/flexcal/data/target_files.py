@@ -15,7 +15,7 @@ from flexcal.data.pose_columns import (
     unit_quaternions,
     whole_numbers,
 )
-from flexcal.data.signals import assign, standard_columns
+from flexcal.data.signals import assign, mapped_signals, standard_columns
 from flexcal.data.table import Table, TableFile, open_table, write_table
 from flexcal.data.tool_targets import ToolTargets
 from flexcal.model.rotations import rotation_wxyz, wxyz_rotation
@@ -66,9 +66,21 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     return targets
 
 
-def write_commands(path: str | Path, commands: ToolTargets, unambiguous: np.ndarray) -> None:
-    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` where given, `unambiguous` (N,)."""
-    write_table(path, _columns(commands) | {"unambiguous": unambiguous})
+def write_commands(
+    path: str | Path, model: RobotModel, commands: ToolTargets, unambiguous: np.ndarray, like: TableFile
+) -> None:
+    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` where given, `unambiguous` (N,).
+
+    Where the file `like` has the columns that `signals:` maps to q, the commands stand in these, in their units. Raises `InputError`
+    where the mapping has no inverse.
+    """
+    mapped = mapped_signals(model).get("q")
+    columns = _columns(commands)
+    if mapped is not None and commands.q is not None and set(mapped.columns) <= set(like.columns):
+        own = standard_columns("q", model.n)
+        kept = {name: values for name, values in columns.items() if name not in own}
+        columns = {"pose": kept.pop("pose")} | mapped.columns_of(commands.q) | kept
+    write_table(path, columns | {"unambiguous": unambiguous})
 
 
 def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:

@@ -100,8 +100,9 @@ def compensate_robot(
         )
     found = targets.subset(result.found)
     commands = ToolTargets(found.pose, found.target, result.q[result.found], payload=found.payload)
-    write_commands(out, commands, result.unambiguous[result.found])
-    return RobotCompensation(model, open_table(file), targets, result, origin)
+    table = open_table(file)
+    write_commands(out, model, commands, result.unambiguous[result.found], table)
+    return RobotCompensation(model, table, targets, result, origin)
 
 
 def _start(model: RobotModel, values: Sequence[float]) -> np.ndarray:
