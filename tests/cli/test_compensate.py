@@ -124,6 +124,20 @@ def test_names_that_do_not_fit(run, ur5: Path, column: str, value: str, sentence
     assert done.status == 2 and sentence in done.err
 
 
+def test_measured_points_are_in_the_instruments_frame(run, ur5: Path) -> None:
+    """Taken as they are they lie elsewhere, which is said; with the station named they are where the commands beside them lead."""
+    measured = ur5 / "random.csv"
+    done = run("compensate", ur5 / "robot.yaml", measured, "--out", ur5 / "none.csv")
+    assert done.status == 2 and "name its station in a column 'station'" in done.err
+    lines = measured.read_text().splitlines()
+    (ur5 / "seen.csv").write_text(
+        "\n".join([lines[0] + ",station", *(f"{row},tracker" for row in lines[1:])]) + "\n"
+    )
+    assert run("compensate", ur5 / "robot.yaml", ur5 / "seen.csv", "--out", ur5 / "there.csv").status == 0
+    change = pl.read_csv(ur5 / "there.csv").select(Q).to_numpy() - pl.read_csv(measured).select(Q).to_numpy()
+    assert np.abs(change).max() < 0.05  # what is left is the orientation, of which the nominal one is wanted
+
+
 def test_starts_that_do_not_fit(run, ur5: Path) -> None:
     points = write_csv(ur5 / "points.csv", ["pose", "x", "y", "z"], np.array([[1, 0.4, 0.2, 0.3]]))
     for arguments, sentence in (

@@ -15,9 +15,13 @@ from flexcal.data.table import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 from flexcal.model.joint_space import joint_limits
+from flexcal.model.tool_at_rest import points_kinematics
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import calibrated_robot
+
+_FAR = 0.25
+"""Of the reach: points that are farther than this from the joint positions beside them do not belong to them."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +82,8 @@ def compensate_robot(
 
     A target without a command is left out there, and stands with its reason in the result; the others keep their numbers and order. `start`
     (n values, rad or m; none: a posture far from singular) is where inverse kinematics starts for targets without joint positions.
-    Raises `FlexcalError` where there is no calibration, a file does not fit, or no target can be compensated: then nothing is written.
+    Raises `FlexcalError` where there is no calibration, a file does not fit, points are in another frame than said, or no target can be
+    compensated: then nothing is written.
     """
     calibrated = calibrated_robot(robot, estimates, "compensate with")
     model, nominal = calibrated.model, calibrated.nominal
@@ -88,6 +93,7 @@ def compensate_robot(
             raise InputError(
                 f"{file}: the station '{station}' was not calibrated, so its place is unknown; give points in the base frame."
             )
+    _check_frame(file, nominal, targets)
     origin = None
     if targets.q is None:
         origin = _start(nominal, start) if len(start) else best_posture(nominal, str(targets.target[0]))
@@ -103,6 +109,19 @@ def compensate_robot(
     table = open_table(file)
     write_commands(out, model, commands, result.unambiguous[result.found], table)
     return RobotCompensation(model, table, targets, result, origin)
+
+
+def _check_frame(file: Path, nominal: RobotModel, targets: ToolTargets) -> None:
+    """Raise `InputError` where points said to be in the base frame are far from where the joint positions beside them put the tool."""
+    if targets.q is None or targets.position is None or targets.station is not None:
+        return
+    at = points_kinematics(nominal, targets.q, None, targets.target, jacobians=False).position
+    away = float(np.median(np.linalg.norm(targets.position - at, axis=1)))
+    if away > _FAR * nominal.reach:
+        raise InputError(
+            f"{file}: x, y, z are {away:.3g} m (median) from where the nominal tool is at q1…q{nominal.n}; if they are in an instrument's "
+            "frame, name its station in a column 'station', else correct one of them or leave q out."
+        )
 
 
 def _start(model: RobotModel, values: Sequence[float]) -> np.ndarray:
