@@ -9,10 +9,10 @@ from flexcal.design import (
     random_candidates,
     visible,
 )
-from flexcal.design.joint_space import LIMIT_MARGIN
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
 from flexcal.model.config import AcceptanceConfig
+from flexcal.model.joint_space import LIMIT_MARGIN
 from flexcal.units import DEGREE
 
 

@@ -11,6 +11,7 @@ from flexcal.model.rotations import (
     rotation_wxyz,
     rpy_rotation,
     vector_rotation,
+    wxyz_rotation,
 )
 
 ANGLE = st.floats(-3.14, 3.14)
@@ -34,3 +35,12 @@ def test_rotation_vector_and_quaternion(a: float, b: float, c: float) -> None:
     np.testing.assert_allclose(
         rotation_wxyz(matrix), quaternion * (1 if quaternion[0] >= 0 else -1), atol=1e-7
     )
+
+
+def test_many_at_once() -> None:
+    rotations = Rotation.random(200, random_state=1)
+    matrices = rotations.as_matrix().reshape(20, 10, 3, 3)
+    vectors, quaternions = rotation_vector(matrices), rotation_wxyz(matrices)
+    np.testing.assert_allclose(vectors.reshape(-1, 3), rotations.as_rotvec(), atol=1e-12)
+    np.testing.assert_allclose(wxyz_rotation(quaternions), matrices, atol=1e-14)
+    assert (quaternions[..., 0] >= 0).all() and not rotation_vector(np.eye(3)).any()

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.prediction import Prediction, payload_masses
+from flexcal.calibration.prediction import Prediction
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
+from flexcal.model import RobotModel, carried_mass
 from flexcal.model.flank import certain_flank
 
 
@@ -15,7 +15,7 @@ def ambiguous_poses(model: RobotModel, prediction: Prediction) -> np.ndarray:
 
     The torque is that of the `prediction` at rest; its standard deviation comes from what `model` knows of masses and centres of mass.
     """
-    payload = payload_masses(model, prediction.poses)
+    payload = carried_mass(model, prediction.poses.payload, len(prediction.poses))
     certain = certain_flank(model, prediction.poses.q, prediction.rest.torque, payload)
     return np.any(~certain[:, list(model.backlash_joints)], axis=1)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
-from flexcal.model import Equilibrium, PointKinematics, RobotModel, point_kinematics, static_equilibrium
+from flexcal.model import Equilibrium, PointKinematics, RobotModel, carried_mass, tool_at_rest
 from flexcal.model.names import GEOMETRY, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
@@ -96,7 +96,7 @@ class Prediction:
                 held = self.model.payload
                 assert held is not None
                 block = self.rest.regressor[:, :, 4 * held.joint : 4 * held.joint + 4]
-                masses = payload_masses(self.model, self.poses)[:, None]
+                masses = carried_mass(self.model, self.poses.payload, len(self.poses))[:, None]
                 if key == "mass":
                     share = masses / held.mass if held.mass > 0 else 1.0
                     return share * (block[:, :, 0] + block[:, :, 1:] @ held.com_in_link)
@@ -120,17 +120,6 @@ def _left_jacobian(vector: np.ndarray) -> np.ndarray:
     )
 
 
-def payload_masses(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Payload held at each pose (N,), kg: what the poses say, or the declared one where they say nothing.
-
-    Where the payload was found to weigh more or less than declared, the values of the poses are as much off.
-    """
-    nominal, found = model.nominal_payload, float(model.payload_mass[0])
-    if poses.payload is None:
-        return np.full(len(poses), found)
-    return poses.payload * (found / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
-
-
 def predict(
     model: RobotModel,
     poses: PoseSet,
@@ -144,36 +133,12 @@ def predict(
     `flank` (N, n) fixes the side of the backlash; without, the drive torque at rest decides. Without `elastic` the arm is rigid.
     Raises `FlexcalError` for unknown targets and stations, and payloads without a declaration.
     """
-    if poses.payload is not None and poses.payload.any() and model.nominal_payload is None:
-        raise FlexcalError(
-            f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass."
-        )
-    payload = payload_masses(model, poses)
-    rest = static_equilibrium(model, poses.q, payload, flank=flank, elastic=elastic, sensitivities=jacobians)
-    kinematics = _points(model, poses, rest.deflection, jacobians)
+    tool = tool_at_rest(
+        model, poses.q, poses.payload, poses.target, flank=flank, elastic=elastic, jacobians=jacobians
+    )
     at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
     for name in poses.stations:
         own, place = poses.station == name, model.station[model.station_index(name)]
         at[own], base[own] = place[:3], vector_rotation(place[3:])
-    position = np.matmul(base, kinematics.position[:, :, None])[:, :, 0] + at
-    return Prediction(model, poses, position, base, rest, kinematics)
-
-
-def _points(model: RobotModel, poses: PoseSet, deflection: np.ndarray, jacobians: bool) -> PointKinematics:
-    targets = list(dict.fromkeys(poses.target))
-    if len(targets) == 1:
-        return point_kinematics(model, poses.q, deflection, point=targets[0], jacobians=jacobians)
-    parts = {t: np.flatnonzero(poses.target == t) for t in targets}
-    found = {
-        t: point_kinematics(model, poses.q[own], deflection[own], point=t, jacobians=jacobians)
-        for t, own in parts.items()
-    }
-    order = np.argsort(np.concatenate(list(parts.values())), kind="stable")
-
-    def joined(field: str) -> np.ndarray:
-        stacked = np.concatenate([getattr(found[t], field) for t in targets])
-        return stacked[order] if len(stacked) else stacked
-
-    return PointKinematics(
-        *(joined(f) for f in ("position", "orientation", "geometry_jacobian", "motion_jacobian"))
-    )
+    position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
+    return Prediction(model, poses, position, base, tool.rest, tool.kinematics)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
@@ -11,15 +12,21 @@ from tyro.constructors import PrimitiveConstructorSpec
 from flexcal.errors import InputError
 
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
-_PATHS = PrimitiveConstructorSpec(
-    nargs="*",
-    metavar="FILE...",
-    instance_from_str=lambda texts: tuple(Path(text) for text in texts),
-    is_instance=lambda value: isinstance(value, tuple),
-    str_from_instance=lambda paths: [str(path) for path in paths],
-)
-Paths = Annotated[tuple, _PATHS]
-"""Any number of paths; `tuple[Path, ...]` would make tyro load a type checker, which takes longer than some fits."""
+
+
+def _any_number(metavar: str, kind: Callable[[str], Any]) -> PrimitiveConstructorSpec:
+    """Any number of values; `tuple[Path, ...]` would make tyro load a type checker, which takes longer than some fits."""
+    return PrimitiveConstructorSpec(
+        nargs="*",
+        metavar=metavar,
+        instance_from_str=lambda texts: tuple(kind(text) for text in texts),
+        is_instance=lambda value: isinstance(value, tuple),
+        str_from_instance=lambda values: [str(value) for value in values],
+    )
+
+
+Paths = Annotated[tuple, _any_number("FILE...", Path)]
+Numbers = Annotated[tuple, _any_number("X...", float)]
 PoseFiles = Annotated[
     Positional[Paths],
     arg(

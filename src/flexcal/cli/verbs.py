@@ -169,6 +169,20 @@ STEPS = (
                 ("results.json", "report.html"),
             ),
             Verb(
+                ("compensate",),
+                "compensate",
+                "Compensate",
+                "tool targets to the motor commands that put the real tool there",
+                "flexcal compensate robot.yaml targets.csv --out commands.csv",
+            ),
+            Verb(
+                ("predict",),
+                "predict",
+                "Predict",
+                "motor commands to where the real tool is, under its payload",
+                "flexcal predict robot.yaml commands.csv --out tool.csv",
+            ),
+            Verb(
                 ("report",),
                 "report",
                 "Report",
@@ -248,6 +262,8 @@ _ALSO_CALLED = {
     "plan": "design frequency",
     "frf": "identify response",
     "damping": "identify stiffness",
+    "correct": "compensate",
+    "apply": "compensate",
 }
 
 

@@ -12,7 +12,9 @@ from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import PoseSet, concatenate
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.recording_files import read_recording, read_recording_blocks, write_recording
+from flexcal.data.target_files import read_commands, read_targets, write_commands, write_targets
 from flexcal.data.time_base import TimeBase
+from flexcal.data.tool_targets import ToolTargets
 from flexcal.data.trajectory_paths import FourierPaths, SplinePaths
 from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.data.working_files import read_working
@@ -35,11 +37,13 @@ __all__ = [
     "RecordingLabel",
     "SplinePaths",
     "TimeBase",
+    "ToolTargets",
     "TrajectoryPlan",
     "check_motion",
     "concatenate",
     "labels",
     "provenance",
+    "read_commands",
     "read_estimates",
     "read_plan",
     "read_plan_of",
@@ -47,12 +51,15 @@ __all__ = [
     "read_poses",
     "read_recording",
     "read_recording_blocks",
+    "read_targets",
     "read_working",
     "sha256_of",
+    "write_commands",
     "write_estimates",
     "write_measured_poses",
     "write_plan",
     "write_poses",
     "write_recording",
     "write_recordings",
+    "write_targets",
 ]

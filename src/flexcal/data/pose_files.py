@@ -10,12 +10,19 @@ import numpy as np
 
 from flexcal.data.joint_limits import check_joint_limits, check_joint_units
 from flexcal.data.pose_checks import check_metres, check_motion, check_same_pose
+from flexcal.data.pose_columns import (
+    check_positive,
+    first_point,
+    payload_column,
+    target_column,
+    unit_quaternions,
+    whole_numbers,
+)
 from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
-from flexcal.data.signals import Signal, assign, standard_columns
-from flexcal.data.table import Table, TableFile, open_table, write_table
+from flexcal.data.signals import assign, standard_columns
+from flexcal.data.table import TableFile, open_table, write_table
 from flexcal.errors import InputError
-from flexcal.structuring import suggestion
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
@@ -58,10 +65,10 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     check_joint_units(model, table, signals["q"], q)
     columns = [signals["q"].column_of(joint) for joint in range(model.n)]
     check_joint_limits(model, table, np.arange(len(q)), columns, q)
-    pose = _whole_numbers(table, signals["pose"], signals["pose"].values(table)[:, 0])
+    pose = whole_numbers(table, signals["pose"], signals["pose"].values(table)[:, 0])
     check_same_pose(pose, q, table)
     first = np.sort(np.unique(pose, return_index=True)[1])
-    held = _payload(table, signals, model)
+    held = payload_column(table, signals, model)
     if held is not None and np.ptp(held) > 0:
         row = int(np.argmax(held != held[0]))
         sentence = f"{held[row]:g} kg follow {held[0]:g} kg; choose from poses with one payload at a time."
@@ -110,20 +117,20 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
     sigma = found.get("sigma_xyz", found.get("sigma"))
     for name in ("sigma", "sigma_xyz", "length"):
         if name in found:
-            _check_positive(table, signals[name], found[name], zero=False)
-    target = _targets(table, model) if "target" in texts else np.full(rows, _first_point(file, model))
+            check_positive(table, signals[name], found[name], zero=False)
+    target = target_column(table, model) if "target" in texts else np.full(rows, first_point(file, model))
     station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
     poses = PoseSet(
         q=found["q"],
         position=position,
         sigma=np.broadcast_to(DEFAULT_SIGMA if sigma is None else sigma, (rows, 3)).copy(),
         torque=found.get("tau"),
-        payload=_payload(table, signals, model),
+        payload=payload_column(table, signals, model),
         target=target,
         station=station,
         temperature=found["temperature"][:, 0] if "temperature" in found else None,
-        pose=_whole_numbers(table, signals["pose"], found["pose"][:, 0]),
-        quaternion_wxyz=_unit(table, signals["quaternion"], found["quaternion"])
+        pose=whole_numbers(table, signals["pose"], found["pose"][:, 0]),
+        quaternion_wxyz=unit_quaternions(table, signals["quaternion"], found["quaternion"])
         if "quaternion" in found
         else None,
         length=found["length"][:, 0] if "length" in found else None,
@@ -144,64 +151,5 @@ def _place(file: TableFile, model: RobotModel) -> str:
     return "length" if wire else "xyz"
 
 
-def _first_point(file: TableFile, model: RobotModel) -> str:
-    if not model.points:
-        raise file.error("robot.yaml declares no point; add the measured one under `points:`.")
-    return next(iter(model.points))
-
-
 def _first_station(model: RobotModel) -> str:
     return next(iter(getattr(model, "stations", ())), "tracker")
-
-
-def _payload(table: Table, signals: dict[str, Signal], model: RobotModel) -> np.ndarray | None:
-    if "payload" not in signals:
-        return None
-    if model.payload is None:
-        raise table.file.error(
-            "there is a column 'payload', but robot.yaml declares none; add `payload:` with its centre of mass."
-        )
-    held = signals["payload"].values(table)
-    _check_positive(table, signals["payload"], held, zero=True)
-    return held[:, 0]
-
-
-def _targets(table: Table, model: RobotModel) -> np.ndarray:
-    target = table.columns["target"]
-    for row, name in enumerate(target.tolist()):
-        if name not in model.points:
-            known = list(model.points)
-            hint = suggestion(name, known) or f"; known are {', '.join(known) or 'none'}."
-            raise table.error(row, "target", f"there is no point '{name}' under `points:`{hint}")
-    return target
-
-
-def _check_positive(table: Table, signal: Signal, values: np.ndarray, *, zero: bool) -> None:
-    wrong = values < 0 if zero else values <= 0
-    if wrong.any():
-        row, column = (int(i) for i in np.argwhere(wrong)[0])
-        word = "not negative" if zero else "positive"
-        raise table.error(
-            row,
-            signal.column_of(column),
-            f"{signal.quantity} is {values[row, column]:g}, but must be {word}; correct it.",
-        )
-
-
-def _whole_numbers(table: Table, signal: Signal, values: np.ndarray) -> np.ndarray:
-    if (values != np.rint(values)).any():
-        row = int(np.argmax(values != np.rint(values)))
-        raise table.error(row, signal.columns[0], f"{values[row]:g} is no whole number; number the poses.")
-    return values.astype(np.int64)
-
-
-def _unit(table: Table, signal: Signal, quaternion: np.ndarray) -> np.ndarray:
-    norm = np.linalg.norm(quaternion, axis=1)
-    if (np.abs(norm - 1) > 1e-3).any():
-        row = int(np.argmax(np.abs(norm - 1) > 1e-3))
-        raise table.error(
-            row,
-            signal.columns[0],
-            f"the quaternion has the norm {norm[row]:.4g}, not 1; check the columns qw, qx, qy, qz.",
-        )
-    return quaternion / norm[:, None]

@@ -70,6 +70,18 @@ class Signal:
         scaled = raw * self.factor
         return (scaled if self.matrix is None else scaled @ self.matrix.T) + self.offset
 
+    def columns_of(self, values: np.ndarray) -> dict[str, np.ndarray]:
+        """The columns (N,) that a file would have for a quantity (N, m), by name; raises `InputError` where the matrix has no inverse."""
+        raw = values - self.offset
+        if self.matrix is not None:
+            if self.matrix.shape[0] != self.matrix.shape[1] or np.linalg.cond(self.matrix) > 1e12:
+                raise InputError(
+                    f"the matrix of signals.{self.quantity} has no inverse, so {', '.join(self.columns)} cannot be written; "
+                    f"give the targets in {', '.join(standard_columns(self.quantity, len(self.offset)))}."
+                )
+            raw = np.linalg.solve(self.matrix, raw.T).T
+        return {name: raw[:, i] / self.factor[i] for i, name in enumerate(self.columns)}
+
     def column_of(self, value: int) -> str:
         """The column that value number `value` comes from."""
         return self.columns[value] if self.matrix is None else self.columns[0]

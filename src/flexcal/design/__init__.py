@@ -11,7 +11,6 @@ from flexcal.design.criteria import (
     observability,
 )
 from flexcal.design.exchange import Selection, exchange, greedy
-from flexcal.design.joint_space import joint_ranges
 from flexcal.design.next_poses import NextPoses, next_poses
 from flexcal.design.pose_candidates import PoseCandidates, pose_candidates
 from flexcal.design.pose_curve import PoseCurve, pose_curve
@@ -38,6 +37,7 @@ from flexcal.design.trajectories import TrajectoryDesign, design_trajectories
 from flexcal.design.visibility import station_position, visible
 from flexcal.design.visiting_order import VisitingOrder, visiting_order
 from flexcal.design.working_volume import WorkingVolume, working_box, working_points
+from flexcal.model.joint_space import joint_ranges
 
 __all__ = [
     "BaseSensitivity",

@@ -7,12 +7,12 @@ from collections.abc import Callable
 import numpy as np
 
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.joint_space import joint_ranges
 from flexcal.design.preload import preloaded
 from flexcal.design.setup import STANDARD, MeasuringSetup
 from flexcal.design.visibility import visible
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
+from flexcal.model.joint_space import joint_ranges
 from flexcal.progress import Progress, silent
 
 _TRIES = 100

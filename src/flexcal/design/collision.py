@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.design.joint_space import even_configurations
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
+from flexcal.model.joint_space import even_configurations
 from flexcal.model.kinematics import joint_batch
 from flexcal.model.urdf import locked_joints
 

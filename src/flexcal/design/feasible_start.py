@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.design.exciting_program import ExcitingProgram
-from flexcal.design.joint_space import even_configurations
 from flexcal.errors import FlexcalError, InputError
+from flexcal.model.joint_space import even_configurations
 
 FINER = 10
 """How much finer the grid is on which limits are to hold than that of the search."""

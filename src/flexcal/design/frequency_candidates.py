@@ -7,10 +7,10 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.design.collision import CollisionChecker
 from flexcal.design.gap_crossing import gap_load, share
-from flexcal.design.joint_space import joint_ranges
 from flexcal.design.multisines import room
 from flexcal.design.preload import preloaded
 from flexcal.errors import FlexcalError
+from flexcal.model.joint_space import joint_ranges
 from flexcal.progress import Progress, silent
 
 _BATCH = 256

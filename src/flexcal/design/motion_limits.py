@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.design.joint_space import joint_ranges
 from flexcal.model import RobotModel
+from flexcal.model.joint_space import joint_ranges
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.design.joint_space import even_configurations
 from flexcal.model import RobotModel, gravity_torque
 from flexcal.model.flank import certain_flank
+from flexcal.model.joint_space import even_configurations
 
 LEAST_TORQUE = 10.0
 """N m of gravity below which a backlash does not count as preloaded."""

@@ -8,9 +8,9 @@ import numpy as np
 
 from flexcal.design.candidates import above_floor
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.joint_space import joint_ranges
 from flexcal.errors import FlexcalError
 from flexcal.model import reach_points
+from flexcal.model.joint_space import joint_ranges
 
 TRIES = 12
 """Starts from which a point is tried to be reached."""

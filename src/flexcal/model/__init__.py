@@ -11,6 +11,7 @@ from flexcal.model.point import Payload, Point
 from flexcal.model.regressor import inertial_names, inertial_parameters, torque_regressor
 from flexcal.model.regressor_adjoint import torque_regressor_adjoint
 from flexcal.model.robot_model import RobotModel
+from flexcal.model.tool_at_rest import ToolAtRest, carried_mass, tool_at_rest
 
 __all__ = [
     "ElasticJoint",
@@ -21,6 +22,8 @@ __all__ = [
     "Point",
     "PointKinematics",
     "RobotModel",
+    "ToolAtRest",
+    "carried_mass",
     "energy_regressor",
     "gravity_torque",
     "inertial_names",
@@ -28,6 +31,7 @@ __all__ = [
     "point_kinematics",
     "reach_points",
     "static_equilibrium",
+    "tool_at_rest",
     "torque_regressor",
     "torque_regressor_adjoint",
 ]

@@ -43,33 +43,38 @@ def vector_rotation(vector: np.ndarray) -> np.ndarray:
 
 
 def rotation_vector(rotation: np.ndarray) -> np.ndarray:
-    """Rotation vector (3,), rad, of a rotation (3, 3)."""
-    w, x, y, z = rotation_wxyz(rotation)
-    sine = float(np.linalg.norm([x, y, z]))
-    if sine < 1e-15:
-        return np.zeros(3)
-    return 2 * np.arctan2(sine, w) / sine * np.array([x, y, z])
+    """Rotation vectors (..., 3), rad, of rotations (..., 3, 3)."""
+    wxyz = rotation_wxyz(rotation)
+    sine = np.linalg.norm(wxyz[..., 1:], axis=-1, keepdims=True)
+    angle = 2 * np.arctan2(sine, wxyz[..., :1])
+    return np.where(sine < 1e-15, 0.0, angle / np.maximum(sine, 1e-15)) * wxyz[..., 1:]
 
 
 def rotation_wxyz(rotation: np.ndarray) -> np.ndarray:
-    """Unit quaternion (4,), w first and not negative, of a rotation (3, 3): Shepperd's choice of the largest component."""
-    r = rotation
-    squares = np.array(
+    """Unit quaternions (..., 4), w first and not negative, of rotations (..., 3, 3): Shepperd's choice of the largest component."""
+    (a, b, c), (d, e, f), (g, h, i) = np.moveaxis(rotation, (-2, -1), (0, 1))
+    squares = np.stack([1 + a + e + i, 1 + a - e - i, 1 - a + e - i, 1 - a - e + i], axis=-1)
+    rows = np.stack(
         [
-            1 + np.trace(r),
-            1 + r[0, 0] - r[1, 1] - r[2, 2],
-            1 - r[0, 0] + r[1, 1] - r[2, 2],
-            1 - r[0, 0] - r[1, 1] + r[2, 2],
-        ]
+            np.stack([squares[..., 0], h - f, c - g, d - b], axis=-1),
+            np.stack([h - f, squares[..., 1], b + d, c + g], axis=-1),
+            np.stack([c - g, b + d, squares[..., 2], f + h], axis=-1),
+            np.stack([d - b, c + g, f + h, squares[..., 3]], axis=-1),
+        ],
+        axis=-2,
     )
-    k = int(np.argmax(squares))
-    rows = np.array(
-        [
-            [squares[0], r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]],
-            [r[2, 1] - r[1, 2], squares[1], r[0, 1] + r[1, 0], r[0, 2] + r[2, 0]],
-            [r[0, 2] - r[2, 0], r[0, 1] + r[1, 0], squares[2], r[1, 2] + r[2, 1]],
-            [r[1, 0] - r[0, 1], r[0, 2] + r[2, 0], r[1, 2] + r[2, 1], squares[3]],
-        ]
-    )
-    q = rows[k] / np.linalg.norm(rows[k])
-    return -q if q[0] < 0 else q
+    largest = np.argmax(squares, axis=-1)[..., None, None]
+    q = np.take_along_axis(rows, largest, axis=-2)[..., 0, :]
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    return np.where(q[..., :1] < 0, -q, q)
+
+
+def wxyz_rotation(quaternion: np.ndarray) -> np.ndarray:
+    """Rotations (..., 3, 3) of unit quaternions (..., 4), w first."""
+    w, x, y, z = np.moveaxis(quaternion, -1, 0)
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+        [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+        [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

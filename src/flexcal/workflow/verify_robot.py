@@ -10,13 +10,12 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, Verification, require_points, verify
-from flexcal.data import PoseSet, provenance, read_estimates, read_poses, sha256_of
-from flexcal.errors import FlexcalError, InputError
-from flexcal.model import RobotModel
-from flexcal.model.stored import with_blocks
+from flexcal.data import PoseSet, provenance, read_poses, sha256_of
+from flexcal.errors import FlexcalError
 from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
+from flexcal.workflow.calibrated_robot import calibrated_robot
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.results import write_results
@@ -79,14 +78,8 @@ def verify_robot(
     measured, or a file does not fit.
     """
     require_distinct(files)
-    bare = RobotModel.from_yaml(robot, estimates=False)
-    stored = _estimates_file(bare, estimates)
-    blocks = read_estimates(stored)
-    if "calibration" not in blocks:
-        raise InputError(
-            f"{stored}: there is no calibration in it; run 'flexcal calibrate {robot} POSES…' first."
-        )
-    model = with_blocks(bare, blocks, stored)
+    calibrated = calibrated_robot(robot, estimates, "verify")
+    model, bare, blocks = calibrated.model, calibrated.nominal, calibrated.blocks
     poses = read_poses(list(files), model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
     for station in poses.stations:
@@ -102,20 +95,10 @@ def verify_robot(
     if out is not None:
         document = result.document()
         write_results(out, document)
-        origin = provenance([robot, bare.urdf, *files], None, stored, tuple(blocks))
+        origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
         study = VerificationStudy(model, poses, result.result, before, origin, results=document)
         write_verification_report(out / "report.html", study)
     return result
-
-
-def _estimates_file(model: RobotModel, given: Path | None) -> Path:
-    path = model.path.parent / model.config.estimates if given is None else given
-    path = path / "estimates.yaml" if path.is_dir() else path
-    if not path.exists():
-        raise InputError(
-            f"{path} does not exist, so there is nothing to verify; run 'flexcal calibrate {model.path} POSES…' first."
-        )
-    return path
 
 
 def _rms(distance: np.ndarray) -> float:

@@ -5,10 +5,17 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
+from flexcal.model.robot_model import RobotModel
 
 LIMIT_MARGIN = 0.02
 """Share of a joint's range that is kept free at either end."""
+
+
+def joint_limits(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
+    """Lower and upper limit (n,) of every joint, rad or m; infinite where there is none."""
+    return np.array([joint.lower for joint in model.joints]), np.array(
+        [joint.upper for joint in model.joints]
+    )
 
 
 def joint_ranges(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
@@ -16,8 +23,7 @@ def joint_ranges(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
 
     Raises `FlexcalError` for limits that cross, or an unlimited prismatic joint.
     """
-    lower = np.array([joint.lower for joint in model.joints])
-    upper = np.array([joint.upper for joint in model.joints])
+    lower, upper = joint_limits(model)
     for i, joint in enumerate(model.joints):
         if lower[i] >= upper[i]:
             raise FlexcalError(

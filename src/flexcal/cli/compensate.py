@@ -1,0 +1,88 @@
+"""`flexcal compensate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Numbers, Robot, require_robot
+
+_LISTED = 10
+
+
+@dataclass(frozen=True)
+class Compensate:
+    """Find the motor commands with which the real tool is where it should be: geometry, deflection under its payload, backlash.
+
+    TARGETS has the column pose, and q1, q2 and so on: where the nominal robot would be commanded, which says the pose that is wanted of the
+    tool and the arm's configuration; or x, y, z in the base frame, with qw, qx, qy, qz where the orientation counts; or both. payload
+    and target are optional.
+
+    A target that cannot be reached is left out of the commands and listed with the reason; the others are written.
+    """
+
+    robot: Robot
+    targets: Annotated[Positional[Path], arg(metavar="TARGETS", help="file of targets (CSV or Parquet)")]
+    out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("commands.csv")
+    """File for the commands (CSV or Parquet)."""
+    estimates: Annotated[
+        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+    ] = None
+    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    start: Annotated[
+        Numbers, arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
+    ] = ()
+    """Joint positions (rad or m) from which targets without q1, q2 and so on are sought, in the configuration that the arm is to keep."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Compensate, and say what it changes and what cannot be reached."""
+        from flexcal.workflow.compensate_robot import compensate_robot
+
+        require_robot(self.robot, self.targets)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = compensate_robot(
+                self.robot,
+                self.targets,
+                self.out,
+                estimates=self.estimates,
+                start=self.start,
+                progress=progress,
+            )
+        document = found.document()
+        if document["start"] is not None:
+            listed = ", ".join(f"{joint} {value:.4g}" for joint, value in document["start"].items())
+            console.say(f"targets without joint positions were sought from {listed} (rad or m; --start)")
+        if document["from_other_postures"]:
+            console.say(
+                f"{len(document['from_other_postures'])} of them were found from another posture only, where the arm may stand in another "
+                "configuration: from_other_postures in --json"
+            )
+        before = document["error_before_mm"]
+        console.say(
+            f"with nominal commands the tool would be off by {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"
+        )
+        if document["ambiguous"]:
+            console.say(
+                f"at {document['ambiguous']} commands gravity does not surely settle the flank of a backlash: unambiguous is false there"
+            )
+        for item in document["refused"][:_LISTED]:
+            place = ", ".join(f"{key} {item[key]}" for key in ("pose", "line", "row") if key in item)
+            console.say(f"left out: {place}: {item['reason']}")
+        if len(document["refused"]) > _LISTED:
+            console.say(
+                f"left out: {len(document['refused']) - _LISTED} more, with their reasons under refused in --json"
+            )
+        console.say(
+            f"wrote {self.out}: commands for {document['compensated']} of {document['targets']} targets"
+        )
+        where = "" if self.estimates is None else f" --estimates {self.estimates}"
+        console.finish(
+            document,
+            f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} MEASURED.csv{where}",
+        )

@@ -1,0 +1,53 @@
+"""`flexcal predict`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, Robot, require_robot
+
+
+@dataclass(frozen=True)
+class Predict:
+    """Find where the real tool is when the motors stand as commanded: geometry, deflection under its payload, backlash.
+
+    The reverse of 'flexcal compensate', whose commands it reads: pose, q1, q2 and so on; payload and target are optional. It writes
+    x, y, z and qw, qx, qy, qz in the base frame, which 'flexcal compensate' reads.
+    """
+
+    robot: Robot
+    commands: Annotated[Positional[Path], arg(metavar="COMMANDS", help="file of commands (CSV or Parquet)")]
+    out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("tool.csv")
+    """File for the tool's poses (CSV or Parquet)."""
+    estimates: Annotated[
+        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+    ] = None
+    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Predict, and say how far the tool is from where the nominal robot has it."""
+        from flexcal.workflow.predict_robot import predict_robot
+
+        require_robot(self.robot, self.commands)
+        console = Console(self.json)
+        document = predict_robot(self.robot, self.commands, self.out, estimates=self.estimates).document()
+        beside = document["beside_nominal"]
+        console.say(
+            f"the tool is {beside['mean_mm']:.3f} mm on average, {beside['max_mm']:.3f} mm at most, from where the nominal robot has it"
+        )
+        if document["ambiguous_poses"]:
+            listed = len(document["ambiguous_poses"])
+            console.say(
+                f"in {listed} poses gravity does not surely settle the flank of a backlash: ambiguous_poses in --json"
+            )
+        console.say(f"wrote {self.out}: {document['poses']} poses of the tool in the base frame")
+        console.finish(
+            document,
+            f"flexcal compensate {self.robot} TARGETS.csv, for the commands that bring the tool where it should be",
+        )

@@ -1,0 +1,60 @@
+"""Where a tool is to go."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from typing import Any
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+
+
+@dataclass(frozen=True, eq=False)
+class ToolTargets:
+    """N places for the tool of an n-joint robot, one a row.
+
+    pose: (N,) their numbers, each once; target: (N,) names of the points that are to be there.
+    q: (N, n) nominal commands, rad or m. Without `position` they say what is wanted: the pose that the nominal robot takes there.
+    position: (N, 3) m, rotation: (N, 3, 3) of the point's frame; in the robot's base frame, or that of the instrument at `station` (N,).
+    payload: (N,) kg at the declared payload's centre of mass; None: as declared in robot.yaml.
+
+    Raises `FlexcalError` where shapes do not fit or nothing says where the tool is to go.
+    """
+
+    pose: np.ndarray
+    target: np.ndarray
+    q: np.ndarray | None = None
+    position: np.ndarray | None = None
+    rotation: np.ndarray | None = None
+    station: np.ndarray | None = None
+    payload: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if self.q is None and self.position is None:
+            raise FlexcalError("targets need joint positions or points; give q or position.")
+        if self.position is None and (self.rotation is not None or self.station is not None):
+            raise FlexcalError("an orientation or a station of targets needs points; give position.")
+        rows = len(self.pose)
+        shapes: dict[str, tuple[int, ...]] = {
+            "target": (rows,),
+            "position": (rows, 3),
+            "rotation": (rows, 3, 3),
+            "station": (rows,),
+            "payload": (rows,),
+        }
+        for name, shape in shapes.items():
+            values = getattr(self, name)
+            if values is not None and values.shape != shape:
+                raise FlexcalError(f"{name} of targets has shape {values.shape}; {shape} is needed.")
+        if self.q is not None and (self.q.ndim != 2 or len(self.q) != rows):
+            raise FlexcalError(f"q of targets has shape {self.q.shape}; ({rows}, joints) is needed.")
+
+    def __len__(self) -> int:
+        return len(self.pose)
+
+    def subset(self, rows: np.ndarray | slice) -> ToolTargets:
+        """The rows with these indices, or where this mask is true, in their order."""
+        changed: dict[str, Any] = {field.name: getattr(self, field.name) for field in fields(self)}
+        changed |= {name: values[rows] for name, values in changed.items() if values is not None}
+        return ToolTargets(**changed)
