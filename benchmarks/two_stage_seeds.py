@@ -20,6 +20,7 @@ from typing import Any, get_args
 import numpy as np
 
 from flexcal.cell import CellConfig, draw_truth, write_truth
+from flexcal.design.planned_responses import PlannedResponses
 from flexcal.elasticity import CovarianceWeighting, ResponseModel, Tolerances
 from flexcal.elasticity.experiment_effect import ExperimentEffect
 from flexcal.elasticity.model_error import ModelError
@@ -27,7 +28,7 @@ from flexcal.elasticity.residual import StageOneResidual
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
 from flexcal.report.study import TwoStageStudy
-from flexcal.workflow.designed_frequency import PlanName
+from flexcal.workflow.designed_frequency import PlanName, response_sensors
 from flexcal.workflow.two_stage import run_two_stage
 from flexcal.yaml_reader import read_yaml
 
@@ -59,8 +60,15 @@ def one_seed(seed: int, plan: PlanName, inertias_known: bool, half_gap: float | 
         "springs": _springs(study),
         "inertials": _inertials(study),
         "geometry": _geometry(study),
+        "predicted": _predicted(study),
         "results": study.results,
     }
+
+
+def _predicted(study: TwoStageStudy) -> float:
+    """Largest standard deviation of a stiffness that is predicted for the plan, from what was known before it was carried out."""
+    planned = PlannedResponses.of(study.informed, study.plan, response_sensors(ROBOT))
+    return max(std for name, std in planned.std().items() if name.endswith(".stiffness"))
 
 
 def _springs(study: TwoStageStudy) -> dict[str, dict[str, Any]]:
@@ -116,7 +124,7 @@ def _geometry(study: TwoStageStudy) -> list[float]:
 
 
 def summary(runs: list[dict[str, Any]]) -> str:
-    """The issue's numbers as a text table."""
+    """The numbers of all runs as a text table."""
     names = list(runs[0]["springs"])
     stiff = [n for n in names if n.endswith("stiffness")]
     lines = [f"{len(runs)} seeds {runs[0]['seed']}..{runs[-1]['seed']}"]
@@ -135,6 +143,10 @@ def summary(runs: list[dict[str, Any]]) -> str:
             f"{name:32s} {100 * np.median(error):13.2f} % {100 * error.max():7.1f} % "
             f"{100 * np.median([row['std'] for row in rows]):9.2f} % {known:8d}/{len(rows)}"
         )
+    predicted = [r["predicted"] for r in runs]
+    lines.append(
+        f"largest predicted standard deviation of a stiffness: median {100 * np.median(predicted):.2f} %, worst {100 * max(predicted):.2f} %"
+    )
     if runs[0]["results"]["cad_alone"] is not None:
         lines.append(_cad_alone(runs))
     for label, z in (
