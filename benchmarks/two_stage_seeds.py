@@ -145,7 +145,8 @@ def summary(runs: list[dict[str, Any]]) -> str:
         )
     predicted = [r["predicted"] for r in runs]
     lines.append(
-        f"largest predicted standard deviation of a stiffness: median {100 * np.median(predicted):.2f} %, worst {100 * max(predicted):.2f} %"
+        f"largest predicted standard deviation of a stiffness: median {100 * np.median(predicted):.2f} %, "
+        f"worst {100 * max(predicted):.2f} %"
     )
     if runs[0]["results"]["cad_alone"] is not None:
         lines.append(_cad_alone(runs))

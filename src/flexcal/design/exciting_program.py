@@ -104,6 +104,10 @@ class ExcitingProgram:
         )
         return Valued(-merit - share * float(room), gradient, self.space.solver(np.array(weights)))
 
+    def within(self, x: np.ndarray) -> bool:
+        """Whether the motion is inside all limits at all instants."""
+        return bool(np.isfinite(self.evaluate(x, 1.0).value))
+
     @property
     def _half(self) -> np.ndarray:
         return (self.limits.upper - self.limits.lower) / 2
@@ -134,6 +138,10 @@ class ExcitingProgram:
         if max(use.max() for use in uses) < 1 and point < 0 and distance > 0:
             return None
         return Excess(np.maximum(np.array(uses), 1 - _EDGE), max(float(point), -_EDGE), max(-distance, 0.0))
+
+    def kept_by(self, x: np.ndarray) -> bool:
+        """Whether a motion passes no limit."""
+        return self.excess(x) is None
 
     def tightened(self, excess: Excess) -> ExcitingProgram:
         """With limits that are smaller by what was too much, and a little more."""

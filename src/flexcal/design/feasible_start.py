@@ -59,7 +59,7 @@ def feasible_swing(
             swing[0] = 0.0
         for _ in range(_HALVINGS):
             x = (still + swing).ravel()
-            if np.isfinite(program.evaluate(x, 1.0).value) and fine.excess(x) is None:
+            if program.within(x) and fine.kept_by(x):
                 return x
             swing /= 2
     raise FlexcalError(

@@ -90,6 +90,13 @@ class MotionSpace:
         """The first coordinates (n,) of a motion about `q` (n,)."""
         return q / self.scale[0]
 
+    def still(self, x: np.ndarray) -> np.ndarray:
+        """The coordinates of no motion at the place of the motion `x`, flat."""
+        place = np.zeros(self.shape)
+        if self.placed:
+            place[0] = x.reshape(self.shape)[0]
+        return place.ravel()
+
     def coefficients(self, x: np.ndarray) -> np.ndarray:
         """(c, n)."""
         return self.fixed + self.free @ (self.scale * x.reshape(self.shape))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,8 +29,12 @@ TORQUE_ERROR = 1e-3
 """1σ of an instant's torque, relative to the joint's effort, and how many of these a second are independent."""
 INDEPENDENT_HZ = 40.0
 _INSTANTS_A_HARMONIC = 20
+_INSTANTS_HZ = 20.0
+"""Least number of instants a second: with fewer, a fast arm passes through itself between two of them, and the repair costs more."""
 _SCREENING, _REFINING = (0.3,), (0.1, 0.03, 0.01)
 _REPAIRS = 12
+_SHRINKING, _SMALLEST = 0.97, 0.05
+"""A motion that passes a limit is made smaller in such steps, and given up when it is smaller than that."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +127,7 @@ def design_trajectories(
         kind,
         size,
         1 / frequency,
-        _INSTANTS_A_HARMONIC * harmonics,
+        max(_INSTANTS_A_HARMONIC * harmonics, int(np.ceil(_INSTANTS_HZ / frequency))),
         limits,
         rest=rest or begin is not None,
         start=begin,
@@ -215,7 +219,7 @@ def _designed(
     number: int,
     count: int,
 ) -> np.ndarray:
-    """Coordinates of one trajectory."""
+    """Coordinates of one trajectory: from the most promising start, and from the next ones where its repair cost more than lies between."""
     if begin is None:
         places = feasible_places(program)
     else:
@@ -226,15 +230,27 @@ def _designed(
         progress("trajectories", (number + 0.7 * k / starts) / count)
         first = feasible_swing(program, places, rng)
         x = minimise(program, first, list(_SCREENING), steps)
-        tried.append((program.merit.merit(program.information(program.space.motion(x))), k, x, first))
-    _, _, x, first = max(tried)
-    progress("trajectories", (number + 0.7) / count)
-    x = minimise(program, x, list(_REFINING), steps)
-    return _kept(program, x, first, steps)
+        tried.append((_merit(program, x), k, x, first))
+    best, most = tried[0][3], -np.inf
+    for promised, k, x, first in sorted(tried, reverse=True):
+        if promised <= most:
+            break
+        progress("trajectories", (number + 0.7 + 0.3 * k / starts) / count)
+        kept = _kept(program, minimise(program, x, list(_REFINING), steps), first, steps)
+        if (merit := _merit(program, kept)) > most:
+            best, most = kept, merit
+    return best
+
+
+def _merit(program: ExcitingProgram, x: np.ndarray) -> float:
+    return program.merit.merit(program.information(program.space.motion(x)))
 
 
 def _kept(program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, steps: int) -> np.ndarray:
-    """`x` changed so that all limits hold on the finer grid: the coarse one gets tighter where they did not."""
+    """`x` changed so that all limits hold on the finer grid: the coarse one gets tighter where they did not.
+
+    `inside` keeps them.
+    """
     fine = program.finer(FINER)
     tight = program
     for _ in range(_REPAIRS):
@@ -242,10 +258,21 @@ def _kept(program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, steps: in
         if excess is None:
             return x
         tight = tight.tightened(excess)
+        within = _smaller(tight, x, inside, tight.within)
+        x = minimise(tight, within, [_REFINING[-1]], steps // 2)
+    return _smaller(program, x, inside, fine.kept_by)
+
+
+def _smaller(
+    program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, keeps: Callable[[np.ndarray], bool]
+) -> np.ndarray:
+    """Of the motions between `x` and the same place without a swing, and between `x` and `inside`, the best of the first two that keep
+    the limits."""
+    found = [inside]
+    for towards in (program.space.still(x), inside):
         share = 1.0
-        while not np.isfinite(tight.evaluate(inside + share * (x - inside), 1.0).value) and share > 1e-3:
-            share *= 0.98
-        x = minimise(tight, inside + share * (x - inside), [_REFINING[-1]], steps // 2)
-    while fine.excess(x) is not None:
-        x = inside + 0.9 * (x - inside)
-    return x
+        while share > _SMALLEST and not keeps(towards + share * (x - towards)):
+            share *= _SHRINKING
+        if share > _SMALLEST:
+            found.append(towards + share * (x - towards))
+    return max(found, key=lambda y: _merit(program, y))
