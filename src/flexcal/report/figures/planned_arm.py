@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import plotly.graph_objects as go
 
@@ -14,8 +16,8 @@ from flexcal.report.palette import ELASTIC
 
 def planned_arm(model: RobotModel, q: np.ndarray) -> go.Figure:
     """Skeletons from the base through every joint to the measured point, one a pose of `q` (P, n) rad."""
-    figure = canvas(520)
-    for number, corners in enumerate(joint_origins(model, q), start=1):
+    figure, arms = canvas(520), joint_origins(model, q)
+    for number, corners in enumerate(arms, start=1):
         figure.add_trace(
             go.Scatter3d(
                 x=single(corners[:, 0]),
@@ -28,5 +30,15 @@ def planned_arm(model: RobotModel, q: np.ndarray) -> go.Figure:
                 opacity=0.35 + 0.65 * number / len(q),
             )
         )
-    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
+    figure.update_layout(scene=_cube(arms), margin={"l": 0, "r": 0, "t": 40, "b": 0})
     return figure
+
+
+def _cube(corners: np.ndarray) -> dict[str, Any]:
+    """Axes of equal length about all `corners` (..., 3), m: arms that stand in one plane would else be drawn as large as it is thin."""
+    scene = space_axes() | {"aspectmode": "cube"}
+    low, high = corners.reshape(-1, 3).min(axis=0), corners.reshape(-1, 3).max(axis=0)
+    half = 0.55 * (high - low).max()
+    for axis, middle in zip("xyz", (low + high) / 2, strict=True):
+        scene[f"{axis}axis"] |= {"range": [middle - half, middle + half]}
+    return scene
