@@ -15,7 +15,7 @@ Forward = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 _ITERATIONS = 300
 _LONGEST_STEP = 0.3
-_SMALL_GAIN = 1e-3
+_SMALL_GAIN = 1e-2
 _PATIENCE = 8
 """Steps of a small gain, one after the other, until a row is at its end: a singular posture takes some to get going."""
 _LEAST_DAMPING = 1e-7
@@ -41,7 +41,7 @@ def nearest_positions(
 
     Levenberg-Marquardt from `start` (N, n): Δq = Jᵀ (J Jᵀ + λ²)⁻¹ r, of least joint change, at most 0.3 rad or m a step, and first with
     λ = `first_damping` · reach; a joint at a limit that the step would leave stands still. A row is at its end where steps keep gaining
-    less than a thousandth.
+    less than a hundredth.
     """
     lower, upper = joint_limits(model)
     weight = aim.weight(model)
