@@ -132,7 +132,7 @@ def test_a_working_volume_and_an_acceptance_that_are_none(run, tx90l_folder: Pat
     robot.write_text(text + "working_volume: {lower: [1, 0, 0], upper: [0, 1, 1]}\n")
     assert (
         "robot.yaml line" in (sentence := refused(run, tx90l_folder, *arguments))
-        and "lower corner" in sentence
+        and "cross along x" in sentence
     )
     declared = "xyz: [0.10, 0.00, 0.15], acceptance: {axis: [0, 0, 0]}}"
     robot.write_text(text.replace("xyz: [0.10, 0.00, 0.15]}", declared))

@@ -10,8 +10,8 @@ import pytest
 
 from flexcal.cell import CellConfig, SensorConfig, VirtualCell
 from flexcal.data import write_recording
-from flexcal.design import design_trajectories
 from flexcal.model import RobotModel
+from flexcal.workflow.design_trajectory import exciting_plan
 
 ArmSideLogs = Callable[[Path, Mapping[str, float], int, int], tuple[Path, list[Path]]]
 
@@ -28,7 +28,7 @@ def arm_side_logs(examples: Path) -> ArmSideLogs:
         robot.write_text("\n".join(lines) + "\n")
         (folder / "tx90l.urdf").write_text((examples / "tx90l" / "tx90l.urdf").read_text())
         nominal = RobotModel.from_yaml(robot, estimates=False)
-        plan = design_trajectories(nominal, count, candidates=20, seed=seed)
+        plan = exciting_plan(nominal, count=count, seed=seed)
         plan = replace(plan, periods=1, settle_periods=0)
         config = CellConfig(sensors=SensorConfig(arm_encoders=True))
         known = {name: value for name, value in truth.items() if not name.startswith("payload.")}

@@ -77,7 +77,7 @@ def test_drives_of_the_virtual_robot(recorded, truth: dict[str, float], tmp_path
 
 
 def test_what_is_not_looked_for_shows_elsewhere(recorded, truth: dict[str, float]) -> None:
-    """A gap makes a drive soft; half a sample of hold counts as damping, K T/2 with T = 1/4000 s."""
+    """A gap makes a drive soft, the less the more torque it carries; half a sample of hold counts as damping, K T/2 with T = 1/4000 s."""
     robot, logs = recorded
     blind, late = robot.with_name("blind.yaml"), robot.with_name("late.yaml")
     blind.write_text(robot.read_text().replace("backlash: [joint_2, joint_3]", "backlash: []"))
@@ -85,7 +85,7 @@ def test_what_is_not_looked_for_shows_elsewhere(recorded, truth: dict[str, float
     here, there = flexible(blind, logs), flexible(late, logs)
     ratio = stiffness(here) / [truth[f"{drive}.stiffness"] for drive in DRIVES]
     assert abs(ratio[0] - 1) < 1e-3
-    assert max(ratio[1:]) < 0.99
+    assert max(ratio[1:]) < 0.995
     excess = there.values["joint_1.drive.damping"] - here.values["joint_1.drive.damping"]
     assert excess == pytest.approx(here.values["joint_1.drive.stiffness"] / 8000, rel=0.15)
 

@@ -36,7 +36,7 @@ def planned_arm(model: RobotModel, q: np.ndarray) -> go.Figure:
 
 def _cube(corners: np.ndarray) -> dict[str, Any]:
     """Axes of equal length about all `corners` (..., 3), m: arms that stand in one plane would else be drawn as large as it is thin."""
-    scene = space_axes() | {"aspectmode": "cube"}
+    scene: dict[str, Any] = {**space_axes(), "aspectmode": "cube"}
     low, high = corners.reshape(-1, 3).min(axis=0), corners.reshape(-1, 3).max(axis=0)
     half = 0.55 * (high - low).max()
     for axis, middle in zip("xyz", (low + high) / 2, strict=True):
