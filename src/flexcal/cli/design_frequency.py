@@ -38,7 +38,9 @@ class DesignFrequency:
     """Random poses that they choose from."""
     amplitude: Annotated[
         Literal["flat", "shaped"] | None,
-        arg(help_behavior_hint="(default: shaped for designed and quick, else flat)"),
+        arg(
+            metavar="{flat,shaped}", help_behavior_hint="(default: shaped for designed and quick, else flat)"
+        ),
     ] = None
     """The same torque on every line, or more where the response depends on the springs."""
     std: Annotated[float | None, arg(metavar="SHARE", help_behavior_hint="(default: as the plan has it)")] = (

@@ -11,7 +11,7 @@ from tyro.conf import arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring
-from flexcal.cli.options import Json, Robot, require_at_least, require_robot
+from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_robot
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
 
@@ -43,7 +43,7 @@ class DesignPoses:
         ),
     ] = None
     """Stop as soon as the predicted tool error is so small, mm."""
-    measured: Annotated[tuple[Path, ...], arg(metavar="FILE", help_behavior_hint="(default: none)")] = ()
+    measured: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
     """Measured poses, to choose the next ones, best first."""
     pool: Annotated[
         Path | None, arg(name="from", metavar="FILE", help_behavior_hint="(default: random poses)")

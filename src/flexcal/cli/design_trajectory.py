@@ -26,9 +26,12 @@ class DesignTrajectory:
     """posterior: masses, centres of mass and rotors beside robot.yaml's prior; c: the variances of the parameters --of, beside it.
     Of the base parameters without prior: condition number of the column-scaled observation matrix, log det (D), least eigenvalue of the
     information (E), trace of the covariance (A)."""
-    of: Annotated[tuple[str, ...], arg(metavar="NAME")] = ()
+    of: Annotated[tuple[str, ...], arg(metavar="NAME...", help_behavior_hint="")] = ()
     """Parameters that the criterion c is of, as link_3.mass or payload.mass."""
-    sequence: Literal["links", "axes", "kinds"] | None = None
+    sequence: Annotated[
+        Literal["links", "axes", "kinds"] | None,
+        arg(metavar="{links,axes,kinds}", help_behavior_hint="(default: none)"),
+    ] = None
     """One trajectory for each link from the last on, for wrist and main axes, or for inertia, gravity and friction; with --criterion D."""
     after: Annotated[Path | None, arg(metavar="PLAN", help_behavior_hint="")] = None
     """A plan that is recorded already: what it tells counts as known."""
