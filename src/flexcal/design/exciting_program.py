@@ -16,8 +16,8 @@ from flexcal.model import point_kinematics
 
 NEAR = 0.05
 """Metres beyond the margin from which on a pair of shapes is watched."""
-
-
+_SLACK = 2e-4
+"""Metres that bodies keep beyond the margin at the instants of a grid, for what happens between them."""
 _EDGE = 1e-3
 """Share of a limit that is kept free where it was passed between the instants."""
 
@@ -135,9 +135,11 @@ class ExcitingProgram:
         uses = [np.abs(use).max(axis=0) for use in self.uses(motion, self.columns.write(motion))]
         point = _Point.of(self.columns, self.limits, motion).constraints.max(initial=-1.0)
         distance = self.clearance.near(motion[0])[1].min(initial=NEAR)
-        if max(use.max() for use in uses) < 1 and point < 0 and distance > 0:
+        if max(use.max() for use in uses) < 1 and point < 0 and distance > _SLACK:
             return None
-        return Excess(np.maximum(np.array(uses), 1 - _EDGE), max(float(point), -_EDGE), max(-distance, 0.0))
+        return Excess(
+            np.maximum(np.array(uses), 1 - _EDGE), max(float(point), -_EDGE), max(_SLACK - distance, 0.0)
+        )
 
     def kept_by(self, x: np.ndarray) -> bool:
         """Whether a motion passes no limit."""
