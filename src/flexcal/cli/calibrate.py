@@ -3,13 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, PoseFiles, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import (
+    Json,
+    MaybePath,
+    PoseFiles,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
 
 
 @dataclass(frozen=True)
@@ -32,7 +39,7 @@ class Calibrate:
     """Relative 1σ by which a drive may be stiffer or softer under gravity than in its frequency response; 0.1 is usual."""
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
     """How the uncertainty of stiffness and inertia enters; both give the same geometry to first order."""
-    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Numbers, Robot, require_robot
+from flexcal.cli.options import Json, MaybePath, Numbers, Robot, require_robot
 
 _LISTED = 10
 
@@ -30,7 +30,7 @@ class Compensate:
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("commands.csv")
     """File for the commands (CSV or Parquet)."""
     estimates: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
     ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
     start: Annotated[

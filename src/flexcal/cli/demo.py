@@ -9,7 +9,7 @@ from typing import Annotated, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, require_at_least
+from flexcal.cli.options import Json, MaybePath, require_at_least
 
 
 @dataclass(frozen=True)
@@ -21,15 +21,15 @@ class Demo:
     plan: Literal["default", "paper", "designed", "quick"] = "default"
     """default: six poses with a payload; paper: three poses without, which leave more unknown; designed: poses and amplitudes chosen for
     this robot; quick: the same in half the time, and 25 calibration poses."""
-    truth: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")
-    ] = None
+    truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
+        None
+    )
     """Hidden truth from outside, in the form of estimates.yaml."""
     out: Annotated[Path, arg(metavar="DIR")] = Path("demo")
     """Folder for everything, report.html and results.json among it."""
     json: Json = False
     robot: Annotated[
-        Path | None, arg(metavar="ROBOT", help_behavior_hint="(default: the TX90L of flexcal's examples)")
+        MaybePath, arg(metavar="ROBOT", help_behavior_hint="(default: the TX90L of flexcal's examples)")
     ] = None
     """Another robot.yaml, with cell.yaml and frequency_poses.csv beside it."""
 

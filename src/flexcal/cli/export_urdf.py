@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_robot
+from flexcal.cli.options import Json, MaybePath, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class ExportUrdf:
     out: Annotated[Path, arg(metavar="FILE")]
     """The URDF to write."""
     estimates: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
     ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
     json: Json = False

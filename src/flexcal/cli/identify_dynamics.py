@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -61,7 +60,7 @@ class IdentifyDynamics:
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
-    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -31,7 +30,7 @@ class IdentifyGains:
     ]
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
-    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for results.json."""
     json: Json = False
 

@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere
-from flexcal.cli.options import Json, Robot, require_robot
+from flexcal.cli.options import Json, MaybePath, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class IdentifyInertials:
     folder: Annotated[
         Positional[Path], arg(metavar="DIR", help="folder with plan.yaml and one joint log per trajectory")
     ]
-    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
     json: Json = False
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere
-from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class IdentifyStiffness:
     """For a start: exact derivatives from several starts, or a population over wide bounds, in place of the paper's genetic algorithm."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the search for a start."""
-    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for results.json and estimates.yaml (then not beside robot.yaml); 'flexcal report' makes a page of it."""
     json: Json = False
 

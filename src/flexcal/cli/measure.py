@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, require_at_least
+from flexcal.cli.options import Json, MaybePath, require_at_least
 
 
 @dataclass(frozen=True)
@@ -22,17 +22,17 @@ class Measure:
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for the measurements."""
     robot: Annotated[
-        Path | None,
+        MaybePath,
         arg(metavar="ROBOT", help_behavior_hint="(default: beside PLAN, else in the current folder)"),
     ] = None
     """robot.yaml."""
     config: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: cell.yaml beside robot.yaml)")
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: cell.yaml beside robot.yaml)")
     ] = None
     """Settings of the virtual cell."""
-    truth: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")
-    ] = None
+    truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
+        None
+    )
     """Hidden truth of the virtual cell."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the virtual cell's hidden truth and noise: the same robot has the same seed in every measurement."""

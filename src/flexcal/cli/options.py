@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Optional
 
 from tyro.conf import Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
 
 from flexcal.errors import InputError
 
+MaybePath = Optional[Path]  # noqa: UP045
+"""Of `Path | None` tyro would ask a type checker, which takes longer to load than some fits; not so of this, nor of `Paths` below."""
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
 
 
 def _any_number(metavar: str, kind: Callable[[str], Any]) -> PrimitiveConstructorSpec:
-    """Any number of values; `tuple[Path, ...]` would make tyro load a type checker, which takes longer than some fits."""
+    """Any number of values."""
     return PrimitiveConstructorSpec(
         nargs="*",
         metavar=metavar,

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, Robot, require_robot
+from flexcal.cli.options import Json, MaybePath, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Predict:
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("tool.csv")
     """File for the tool's poses (CSV or Parquet)."""
     estimates: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
     ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
     json: Json = False

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Annotated
 
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, PoseFiles, Robot, require_files, require_robot
+from flexcal.cli.options import Json, MaybePath, PoseFiles, Robot, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -19,10 +18,10 @@ class Verify:
     robot: Robot
     poses: PoseFiles
     estimates: Annotated[
-        Path | None, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
     ] = None
     """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
-    out: Annotated[Path | None, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html and results.json; without it there is no report."""
     json: Json = False
 
