@@ -9,7 +9,7 @@ import pytest
 from flexcal.data import Recording, write_recording
 from flexcal.dynamics import JointLog, Motion, Observation
 from flexcal.errors import InputError
-from flexcal.model import RobotModel, torque_regressor
+from flexcal.model import RobotModel, inertial_parameters, torque_regressor
 from flexcal.workflow.log_torques import require_joint_torques
 
 STEP = 1 / 200
@@ -49,3 +49,20 @@ def test_torques_of_the_other_sign(recording: Recording, tx40: RobotModel, tmp_p
             InputError, match=f"the torque of {joint} pulls with its weight instead of holding it"
         ):
             require_joint_torques([log], tx40)
+
+
+def test_accelerations_against_the_weight_are_no_other_sign(tx90l: RobotModel, tmp_path: Path) -> None:
+    """An arm that hangs and swings fast pushes back at its ends with more than its weight pulls."""
+    time = STEP * np.arange(2000)
+    swing = 0.4 * np.sin(2 * np.pi * 2.0 * time)
+    q, dq, ddq = np.zeros((3, len(time), 6))
+    hanging, rate = np.pi, 2 * np.pi * 2.0
+    q[:, 1] = hanging + swing
+    dq[:, 1], ddq[:, 1] = np.gradient(swing, STEP), -(rate**2) * swing
+    noise = np.random.default_rng(5).normal(size=q.shape)
+    torque = torque_regressor(tx90l, q, dq, ddq) @ inertial_parameters(tx90l) + 0.1 * noise
+    log = log_of(Recording(STEP, q, torque), tx90l, tmp_path)
+    weight = log.weight
+    correlation = weight.of_both[1] / np.sqrt(weight.of_weight[1] * weight.of_torque[1])
+    assert correlation < -0.9
+    require_joint_torques([log], tx90l)

@@ -16,7 +16,9 @@ _TOO_WEAK = 1 / 20
 _HEAVY = 1 / 10
 """Share of the heaviest joint's weight that a joint must carry to tell which way it pulls."""
 _AGAINST = -1 / 2
-"""Correlation below which torques pull the way that the weight does; friction and inertia bring it near zero, but not beyond."""
+"""Correlation below which torques pull the way that the weight does; friction brings it near zero, but not beyond."""
+_LIVELY = 2.0
+"""Torques of more than so many times the weight are those of accelerations, which may well go against it: they tell nothing of the sign."""
 _SMALL = 1 / 8
 """Of the weight's; friction may add that to torques of motors."""
 
@@ -65,8 +67,9 @@ class CarriedWeight:
     def reversed(self) -> int | None:
         """The first joint of some weight whose torques do not hold it but pull it down; None where there is none."""
         heavy = self.of_weight > _HEAVY**2 * self.of_weight.max()
+        told = self.of_torque < _LIVELY**2 * self.of_weight
         against = self.of_both < _AGAINST * np.sqrt(self.of_weight * self.of_torque)
-        return next((int(k) for k in np.flatnonzero(heavy & against)), None)
+        return next((int(k) for k in np.flatnonzero(heavy & told & against)), None)
 
     @property
     def by_motors(self) -> bool:
