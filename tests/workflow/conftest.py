@@ -11,16 +11,21 @@ import pytest
 from flexcal.cell import CellConfig, SensorConfig, VirtualCell
 from flexcal.data import write_recording
 from flexcal.model import RobotModel
-from flexcal.workflow.design_trajectory import exciting_plan
+from flexcal.workflow.design_trajectory import TrajectoryRequest
 
-ArmSideLogs = Callable[[Path, Mapping[str, float], int, int], tuple[Path, list[Path]]]
+ArmSideLogs = Callable[..., tuple[Path, list[Path]]]
 
 
 @pytest.fixture(scope="session")
 def arm_side_logs(examples: Path) -> ArmSideLogs:
-    """arm_side_logs(folder, truth, seed, count): robot.yaml, and the logs of so many trajectories of 5 s that do not repeat."""
+    """arm_side_logs(folder, truth, seed, count, share): robot.yaml, and the logs of so many trajectories of 5 s that do not repeat.
 
-    def make(folder: Path, truth: Mapping[str, float], seed: int, count: int) -> tuple[Path, list[Path]]:
+    `share` of velocities and torques is used.
+    """
+
+    def make(
+        folder: Path, truth: Mapping[str, float], seed: int, count: int, share: float = 0.8
+    ) -> tuple[Path, list[Path]]:
         text = (examples / "tx90l" / "robot.yaml").read_text()
         lines = [line for line in text.splitlines() if not line.startswith(("payload:", "dynamics:"))]
         lines.append("dynamics: {friction: classic, cutoff_hz: 100, decimation: 200, tau: held}")
@@ -28,7 +33,7 @@ def arm_side_logs(examples: Path) -> ArmSideLogs:
         robot.write_text("\n".join(lines) + "\n")
         (folder / "tx90l.urdf").write_text((examples / "tx90l" / "tx90l.urdf").read_text())
         nominal = RobotModel.from_yaml(robot, estimates=False)
-        plan = exciting_plan(nominal, count=count, seed=seed)
+        plan = TrajectoryRequest(count=count, seed=seed, share=share).design(nominal).plan
         plan = replace(plan, periods=1, settle_periods=0)
         config = CellConfig(sensors=SensorConfig(arm_encoders=True))
         known = {name: value for name, value in truth.items() if not name.startswith("payload.")}

@@ -32,8 +32,8 @@ def truth(tx90l: RobotModel) -> dict[str, float]:
 
 @pytest.fixture(scope="module")
 def recorded(arm_side_logs, truth, tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Path]]:
-    """The encoders on the arm side start elsewhere than those of the motors."""
-    robot, logs = arm_side_logs(tmp_path_factory.mktemp("logs"), truth, SEED, 4)
+    """The encoders on the arm side start elsewhere than those of the motors; calm motions, in which gaps weigh."""
+    robot, logs = arm_side_logs(tmp_path_factory.mktemp("logs"), truth, SEED, 4, share=0.5)
     for log in logs:
         shifted = [pl.col(f"qa{i}") + zero for i, zero in enumerate(ZEROS, start=1)]
         pl.read_parquet(log).with_columns(shifted).write_parquet(log)
@@ -85,7 +85,7 @@ def test_what_is_not_looked_for_shows_elsewhere(recorded, truth: dict[str, float
     here, there = flexible(blind, logs), flexible(late, logs)
     ratio = stiffness(here) / [truth[f"{drive}.stiffness"] for drive in DRIVES]
     assert abs(ratio[0] - 1) < 1e-3
-    assert max(ratio[1:]) < 0.995
+    assert max(ratio[1:]) < 0.99
     excess = there.values["joint_1.drive.damping"] - here.values["joint_1.drive.damping"]
     assert excess == pytest.approx(here.values["joint_1.drive.stiffness"] / 8000, rel=0.15)
 

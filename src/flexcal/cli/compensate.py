@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, Numbers, Robot, require_robot
+from flexcal.cli.options import Estimates, Json, Numbers, Robot, require_robot
 
 _LISTED = 10
 
@@ -29,10 +29,7 @@ class Compensate:
     targets: Annotated[Positional[Path], arg(metavar="TARGETS", help="file of targets (CSV or Parquet)")]
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("commands.csv")
     """File for the commands (CSV or Parquet)."""
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     start: Annotated[
         Numbers, arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
     ] = ()

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, TypeVar
 
 from tyro.conf import arg
 
@@ -14,6 +15,8 @@ from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_robot
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
+
+Planned = TypeVar("Planned")
 
 
 @dataclass(frozen=True)
@@ -94,11 +97,9 @@ class DesignPoses:
             f"{measuring(self.out, self.robot, 'unseen')}, or measure them on the robot",
         )
 
-    def _choose(self, console: Console) -> None:
-        from flexcal.workflow.design_poses import plan_calibration_poses
-
+    def _planned(self, console: Console, plan: Callable[..., Planned]) -> Planned:
         with console.progress() as progress:
-            found = plan_calibration_poses(
+            return plan(
                 self.robot,
                 self.out,
                 self.count,
@@ -110,6 +111,11 @@ class DesignPoses:
                 seed=self.seed,
                 progress=progress,
             )
+
+    def _choose(self, console: Console) -> None:
+        from flexcal.workflow.design_poses import plan_calibration_poses
+
+        found = self._planned(console, plan_calibration_poses)
         document = found.document()
         seen = document["identifiability"]
         console.say(
@@ -142,20 +148,7 @@ class DesignPoses:
     def _continue(self, console: Console) -> None:
         from flexcal.workflow.next_poses import plan_next_poses
 
-        with console.progress() as progress:
-            found = plan_next_poses(
-                self.robot,
-                self.out,
-                self.measured,
-                self.count,
-                criterion=self.criterion,
-                candidates=self.candidates if self.pool is None else self.pool,
-                working=self.working,
-                wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
-                payload=self.payload,
-                seed=self.seed,
-                progress=progress,
-            )
+        found = self._planned(console, partial(plan_next_poses, measured=self.measured))
         document = found.document()
         errors, least = document["tool_error_mm"], document["least_possible_mm"]
         console.say(

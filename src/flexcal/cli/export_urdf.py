@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, Robot, require_robot
+from flexcal.cli.options import Estimates, Json, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -23,10 +23,7 @@ class ExportUrdf:
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE")]
     """The URDF to write."""
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     json: Json = False
 
     def run(self) -> None:

@@ -37,6 +37,14 @@ PoseFiles = Annotated[
         help_behavior_hint="",
     ),
 ]
+Estimates = Annotated[
+    MaybePath,
+    arg(
+        metavar="FILE",
+        help="estimates.yaml to use, or the folder that 'calibrate --out' wrote.",
+        help_behavior_hint="(default: beside robot.yaml)",
+    ),
+]
 Folder = Annotated[Path, arg(metavar="DIR")]
 Json = Annotated[
     bool,

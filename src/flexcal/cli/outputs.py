@@ -8,7 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flexcal.data import sha256_of
+from flexcal.data import page_beside, sha256_of
 from flexcal.errors import InputError
 
 LEDGER = ".flexcal"
@@ -29,9 +29,7 @@ def outputs(out: Path | None, names: Sequence[str] = (), *, page: bool = False) 
         yield
         return
     folder = out if names else out.parent
-    patterns = names or [
-        glob.escape(path.name) for path in (out, *([out.with_suffix(".html")] if page else []))
-    ]
+    patterns = names or [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
     made = _make(folder)
     known = _ledger(folder)
     before = _present(folder, patterns)

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, Robot, require_robot
+from flexcal.cli.options import Estimates, Json, Robot, require_robot
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,7 @@ class Predict:
     commands: Annotated[Positional[Path], arg(metavar="COMMANDS", help="file of commands (CSV or Parquet)")]
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("tool.csv")
     """File for the tool's poses (CSV or Parquet)."""
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     json: Json = False
 
     def run(self) -> None:

@@ -8,7 +8,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, PoseFiles, Robot, require_files, require_robot
+from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -17,10 +17,7 @@ class Verify:
 
     robot: Robot
     poses: PoseFiles
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html and results.json; without it there is no report."""
     json: Json = False

@@ -4,7 +4,7 @@ from flexcal.data.cell import Cell
 from flexcal.data.experiment_folder import labels, write_measured_poses, write_recordings
 from flexcal.data.folder_cell import FolderCell
 from flexcal.data.multisine_plan import MultisinePlan
-from flexcal.data.plan_files import read_plan, read_plan_of, write_plan
+from flexcal.data.plan_files import page_beside, read_plan, read_plan_of, write_plan
 from flexcal.data.pose_checks import check_motion
 from flexcal.data.pose_files import read_pose_pool, read_poses, write_poses
 from flexcal.data.pose_plan import PosePlan
@@ -42,6 +42,7 @@ __all__ = [
     "check_motion",
     "concatenate",
     "labels",
+    "page_beside",
     "provenance",
     "read_commands",
     "read_estimates",

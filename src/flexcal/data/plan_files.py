@@ -49,6 +49,11 @@ def read_plan_of(path: str | Path, kind: type[P]) -> P:
     return plan
 
 
+def page_beside(plan: Path) -> Path:
+    """The page with pictures of a plan."""
+    return plan.with_suffix(".html")
+
+
 def write_plan(path: str | Path, plan: Plan) -> None:
     """Write a plan, atomically, as CSV where the file ends so; `read_plan` gives back the same numbers bit by bit.
 

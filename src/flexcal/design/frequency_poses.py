@@ -15,6 +15,7 @@ from flexcal.design.response_sensitivity import response_parameters, response_se
 from flexcal.design.spring_criterion import largest_stiffness_std, spring_criterion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
+from flexcal.estimation.uncertainty import LOG_STD_LIMIT
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 
@@ -24,8 +25,6 @@ REFINED = (0.3, 0.12)
 """Spread (rad) of the further candidates about the chosen poses, round by round."""
 NEIGHBOURS = 8
 """Further candidates about each chosen pose in a round, as far as they can be excited."""
-UNKNOWN = 0.255
-"""Relative standard deviation from which on a stiffness is not known to a factor of two."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +71,7 @@ def choose_frequency_poses(
         chosen = exchange(screened, count, criterion, start=chosen).chosen
     progress("refining", 1.0)
     worst, std = largest_stiffness_std(screened, chosen)
-    if std > UNKNOWN:
+    if std > LOG_STD_LIMIT:
         raise FlexcalError(
             f"{count} poses cannot determine {worst}: its predicted standard deviation is {100 * std:.0f} %; choose more poses, "
             "or hold a payload off the wrist's axis."

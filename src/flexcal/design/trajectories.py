@@ -151,15 +151,14 @@ def design_trajectories(
         aim = goal.about(stage.wanted) if stage.wanted else goal
         program = replace(program, merit=aim, space=space.moving(stage.moving))
         x = _designed(program, begin, starts, steps, rng, progress, number, len(stages))
-        found = program.information(program.finer(FINER).space.motion(x))
+        fine = program.finer(FINER)
+        motion = fine.space.motion(x)
+        found = program.information(motion)
         merits.append(aim.merit(found))
         goal = goal.after(found)
         information.append(goal.gathered)
         coefficients.append(program.space.coefficients(x))
-        least = min(
-            least,
-            program.finer(FINER).clearance.near(program.finer(FINER).space.motion(x)[0])[1].min(initial=NEAR),
-        )
+        least = fine.clearance.near(motion[0])[1].min(initial=least)
     progress("trajectories", 1.0)
     of_kind = FourierPaths if kind == "fourier" else SplinePaths
     controller = model.controller

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.design.planned_responses import PlannedResponses
+from flexcal.estimation.uncertainty import LOG_STD_LIMIT
 from flexcal.model import RobotModel
 from flexcal.report.figures.amplitude_spectrum import amplitude_spectrum
 from flexcal.report.figures.planned_arm import planned_arm
@@ -19,8 +20,8 @@ from flexcal.report.notation import significant, spring_label
 from flexcal.report.page import Block, Check, Fact, FigureBlock, Page, Section, Table, Verdict, tally, worst
 from flexcal.report.render import write_page
 
-UNKNOWN, LARGE = 0.255, 0.05
-"""Relative standard deviation from which a stiffness is not known to a factor of two, and from which it is known badly."""
+LARGE = 0.05
+"""Relative standard deviation from which a stiffness is known badly; from `LOG_STD_LIMIT` on it is not known at all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,20 +63,24 @@ def _verdict(study: FrequencyDesignStudy) -> Verdict:
         Fact("How well will the springs be known?", significant(100 * std, 2), "%", f"Worst is {spring}."),
         Fact("How long does it take?", f"{minutes:.0f}", "min", f"{study.results['recordings']} recordings."),
         Fact(
-            "Will all of them be known?", "Yes" if std < UNKNOWN else "No", "", tally(checks), worst(checks)
+            "Will all of them be known?",
+            "Yes" if std < LOG_STD_LIMIT else "No",
+            "",
+            tally(checks),
+            worst(checks),
         ),
     )
     sentence = (
         f"Predicted from the robot as it is known, its sensors and its friction: the stiffness of {spring} will have a standard "
         f"deviation of {significant(100 * std, 2)} %, every other a smaller one."
     )
-    headline = "Every stiffness will be known" if std < UNKNOWN else f"{spring} will not be known"
+    headline = "Every stiffness will be known" if std < LOG_STD_LIMIT else f"{spring} will not be known"
     return Verdict(worst(checks), headline, sentence, facts, (), "", checks)
 
 
 def _known(spring: str, std: float) -> Check:
     question = "Do these poses determine every stiffness?"
-    if std > UNKNOWN:
+    if std > LOG_STD_LIMIT:
         return Check(
             question,
             f"No: {spring} not even to a factor of two. Choose other poses, or hold a payload off the axis.",

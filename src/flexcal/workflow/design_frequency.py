@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.data import MultisinePlan, write_plan
+from flexcal.data import MultisinePlan, page_beside, write_plan
 from flexcal.design.amplitude import shaped
 from flexcal.design.frequency_poses import ChosenPoses, stiffness_curve
 from flexcal.design.gap_crossing import within_preload
@@ -58,7 +58,7 @@ class DesignedFrequency:
         name, largest = largest_stiffness_std(self.planned.sensitivity)
         result = {
             "plan": self.file,
-            "page": self.file.with_suffix(".html"),
+            "page": page_beside(self.file),
             "poses": len(plan.poses),
             "excited_axes": [joint + 1 for joint in plan.joints],
             "lines": len(plan.lines),
@@ -144,7 +144,7 @@ def plan_frequency_experiments(
     found = DesignedFrequency(planned, flat, out, choice, curve, places)
     write_plan(out, planned.plan)
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
-    write_frequency_page(out.with_suffix(".html"), study)
+    write_frequency_page(page_beside(out), study)
     return found
 
 

@@ -8,9 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import PosePlan, PosePool, read_pose_pool, read_working, write_plan
+from flexcal.data import PosePlan, PosePool, page_beside, write_plan
 from flexcal.design import (
-    CollisionChecker,
     CriterionName,
     MeasuringSetup,
     PoseCurve,
@@ -19,18 +18,15 @@ from flexcal.design import (
     WorkingVolume,
     choose_poses,
     fewest_poses,
-    pose_candidates,
     pose_curve,
     random_poses,
     visiting_order,
-    working_box,
-    working_points,
 )
-from flexcal.errors import InputError
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pose_design import PoseStudy, write_pose_page
 from flexcal.units import MILLIMETRE
+from flexcal.workflow.pose_choice import PoseChoice
 from flexcal.workflow.results import identifiability_block
 
 VERIFICATION = "verification"
@@ -146,31 +142,17 @@ def plan_calibration_poses(
     declared one. Raises `FlexcalError` as `design_poses`, `fewest_poses`, `read_pose_pool` and `working_volume` do.
     """
     model = RobotModel.from_yaml(robot)
-    checker = CollisionChecker(model)
-    place = working_volume(checker, working, seed)
-    choice = read_pose_pool(candidates, model) if isinstance(candidates, Path) else candidates
     rng = np.random.default_rng([seed, 2])
-    found = pose_candidates(
-        model,
-        rng=rng,
-        candidates=choice,
-        least=count,
-        setup=MeasuringSetup.declared(model, payload),
-        working=None if place is None else place.q,
-        checker=checker,
-        progress=progress,
-    )
+    choice = PoseChoice.of(model, candidates, working, payload, count, rng, seed, progress)
     if wanted is not None:
-        count = fewest_poses(found, count, wanted)
-    design = choose_poses(found, count, rng=rng, criterion=criterion, progress=progress)
-    way = visiting_order(checker, design.plan.q)
+        count = fewest_poses(choice.found, count, wanted)
+    design = choose_poses(choice.found, count, rng=rng, criterion=criterion, progress=progress)
+    way = visiting_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    pool = choice if isinstance(choice, PosePool) else None
-    result = ChosenPoses(plan, out, design, curve, way, place, pool)
-    write_plan(out, plan)
-    write_pose_page(page_beside(out), study_of(model, plan, result.document(), place))
+    result = ChosenPoses(plan, out, design, curve, way, choice.working, choice.pool)
+    write_pose_plan(out, model, plan, result.document(), choice.working)
     return result
 
 
@@ -183,55 +165,16 @@ def plan_verification_poses(
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
     result = DesignedPoses(plan, out)
-    write_plan(out, plan)
-    write_pose_page(page_beside(out), study_of(model, plan, result.document(), None))
+    write_pose_plan(out, model, plan, result.document(), None)
     return result
 
 
-def page_beside(plan: Path) -> Path:
-    """The page with pictures of a plan."""
-    return plan.with_suffix(".html")
-
-
-def study_of(
-    model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
-) -> PoseStudy:
-    """What the page shows."""
-    if working is None:
-        return PoseStudy(model, plan.q, document)
-    return PoseStudy(model, plan.q, document, working.points, working.box)
-
-
-def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> WorkingVolume | None:
-    """Where the robot will work: a box "x:X,y:Y,z:Z" (m, base frame), else a file for `read_working`, else what robot.yaml declares.
-
-    None where nothing does. Raises `FlexcalError` for a box that is none, and what the robot does not reach.
-    """
-    model, rng = checker.model, np.random.default_rng([seed, 6])
-    declared = model.config.working_volume
-    if given is None:
-        if declared is None:
-            return None
-        return working_box(checker, np.array(declared.lower), np.array(declared.upper), rng)
-    if ":" in given:
-        corners = _corners(given)
-        return working_box(checker, corners[0], corners[1], rng)
-    q, points = read_working(Path(given), model)
-    if points is not None:
-        return working_points(checker, points, rng)
-    assert q is not None
-    return WorkingVolume(q, point_kinematics(model, q, jacobians=False).position)
-
-
-def _corners(text: str) -> np.ndarray:
-    """Corners (2, 3) of "x:X,y:Y,z:Z"."""
-    try:
-        ranges = [[float(end) for end in part.split(":")] for part in text.split(",")]
-        corners = np.array(ranges).T
-        if corners.shape != (2, 3) or not np.isfinite(corners).all():
-            raise ValueError
-    except ValueError:
-        raise InputError(
-            f"--working {text} is no box; write smallest and largest x, y and z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or name a file."
-        ) from None
-    return corners
+def write_pose_plan(
+    out: Path, model: RobotModel, plan: PosePlan, document: dict[str, Any], working: WorkingVolume | None
+) -> None:
+    """Write a plan to `out`, and its page beside it."""
+    write_plan(out, plan)
+    study = PoseStudy(model, plan.q, document)
+    if working is not None:
+        study = replace(study, working=working.points, box=working.box)
+    write_pose_page(page_beside(out), study)

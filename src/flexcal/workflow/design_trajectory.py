@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import TrajectoryPlan, read_plan_of, write_plan
+from flexcal.data import TrajectoryPlan, page_beside, read_plan_of, write_plan
 from flexcal.design import TrajectoryDesign, design_trajectories, sequence
 from flexcal.design.condition import condition_number
 from flexcal.design.motion_space import Kind
@@ -81,7 +81,7 @@ class DesignedTrajectories:
     @property
     def page(self) -> Path:
         """Where the pictures are: beside the plan."""
-        return self.file.with_suffix(".html")
+        return page_beside(self.file)
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""

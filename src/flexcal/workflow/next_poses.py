@@ -9,28 +9,23 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import PosePlan, PosePool, read_pose_pool, read_poses, write_plan
+from flexcal.data import PosePlan, PosePool, read_poses
 from flexcal.design import (
-    CollisionChecker,
     CriterionName,
-    MeasuringSetup,
     NextPoses,
     WorkingVolume,
     next_poses,
-    pose_candidates,
 )
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.pose_design import write_pose_page
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.design_poses import (
     flank_block,
-    page_beside,
     pool_block,
-    study_of,
     working_block,
-    working_volume,
+    write_pose_plan,
 )
+from flexcal.workflow.pose_choice import PoseChoice
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,9 +67,9 @@ class ContinuedPoses:
 def plan_next_poses(
     robot: Path,
     out: Path,
-    measured: Sequence[Path],
     count: int,
     *,
+    measured: Sequence[Path],
     criterion: CriterionName = "c",
     candidates: int | Path = 4000,
     working: str | None = None,
@@ -89,29 +84,17 @@ def plan_next_poses(
     `plan_calibration_poses`. Raises `FlexcalError` as `next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
     """
     model = RobotModel.from_yaml(robot)
-    checker = CollisionChecker(model)
-    place = working_volume(checker, working, seed)
     known = read_poses(measured, model, require_motion=False)
-    choice = read_pose_pool(candidates, model) if isinstance(candidates, Path) else candidates
     rng = np.random.default_rng([seed, 7])
-    found = pose_candidates(
-        model,
-        rng=rng,
-        candidates=choice,
-        least=count,
-        setup=MeasuringSetup.declared(model, payload),
-        working=None if place is None else place.q,
-        checker=checker,
-        progress=progress,
-    )
-    after = next_poses(found, known, count, rng=rng, criterion=criterion)
+    choice = PoseChoice.of(model, candidates, working, payload, count, rng, seed, progress)
+    after = next_poses(choice.found, known, count, rng=rng, criterion=criterion)
     stop = after.enough(wanted)
-    pool = choice if isinstance(choice, PosePool) else None
     if stop == 0:
-        return ContinuedPoses(None, None, after, stop, wanted, place, pool)
+        return ContinuedPoses(None, None, after, stop, wanted, choice.working, choice.pool)
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
-    result = ContinuedPoses(plan, out, replace(after, design=design), stop, wanted, place, pool)
-    write_plan(out, plan)
-    write_pose_page(page_beside(out), study_of(model, plan, result.document(), place))
+    result = ContinuedPoses(
+        plan, out, replace(after, design=design), stop, wanted, choice.working, choice.pool
+    )
+    write_pose_plan(out, model, plan, result.document(), choice.working)
     return result

@@ -1,0 +1,98 @@
+"""What poses are chosen from: candidates that can be measured, and where the robot will work."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data import PosePool, read_pose_pool, read_working
+from flexcal.design import (
+    CollisionChecker,
+    MeasuringSetup,
+    PoseCandidates,
+    WorkingVolume,
+    pose_candidates,
+    working_box,
+    working_points,
+)
+from flexcal.errors import InputError
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class PoseChoice:
+    """The candidates `found`, the given `pool` that they come from, if any, and where the robot will work (None: anywhere)."""
+
+    checker: CollisionChecker
+    found: PoseCandidates
+    pool: PosePool | None
+    working: WorkingVolume | None
+
+    @classmethod
+    def of(
+        cls,
+        model: RobotModel,
+        candidates: int | Path,
+        working: str | None,
+        payload: float | None,
+        least: int,
+        rng: np.random.Generator,
+        seed: int,
+        progress: Progress,
+    ) -> PoseChoice:
+        """So many random `candidates`, or those of a file, at least `least`; `working` as in `working_volume`, `payload` in kg.
+
+        Raises `FlexcalError` as `pose_candidates`, `read_pose_pool` and `working_volume` do.
+        """
+        checker = CollisionChecker(model)
+        place = working_volume(checker, working, seed)
+        given = read_pose_pool(candidates, model) if isinstance(candidates, Path) else candidates
+        found = pose_candidates(
+            model,
+            rng=rng,
+            candidates=given,
+            least=least,
+            setup=MeasuringSetup.declared(model, payload),
+            working=None if place is None else place.q,
+            checker=checker,
+            progress=progress,
+        )
+        return cls(checker, found, given if isinstance(given, PosePool) else None, place)
+
+
+def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> WorkingVolume | None:
+    """Where the robot will work: a box "x:X,y:Y,z:Z" (m, base frame), else a file for `read_working`, else what robot.yaml declares.
+
+    None where nothing does. Raises `FlexcalError` for a box that is none, and what the robot does not reach.
+    """
+    model, rng = checker.model, np.random.default_rng([seed, 6])
+    declared = model.config.working_volume
+    if given is None:
+        if declared is None:
+            return None
+        return working_box(checker, np.array(declared.lower), np.array(declared.upper), rng)
+    if ":" in given:
+        corners = _corners(given)
+        return working_box(checker, corners[0], corners[1], rng)
+    q, points = read_working(Path(given), model)
+    if points is not None:
+        return working_points(checker, points, rng)
+    assert q is not None
+    return WorkingVolume(q, point_kinematics(model, q, jacobians=False).position)
+
+
+def _corners(text: str) -> np.ndarray:
+    """Corners (2, 3) of "x:X,y:Y,z:Z"."""
+    try:
+        ranges = [[float(end) for end in part.split(":")] for part in text.split(",")]
+        corners = np.array(ranges).T
+        if corners.shape != (2, 3) or not np.isfinite(corners).all():
+            raise ValueError
+    except ValueError:
+        raise InputError(
+            f"--working {text} is no box; write smallest and largest x, y and z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or name a file."
+        ) from None
+    return corners
