@@ -8,7 +8,8 @@ import pytest
 from scipy.linalg import eigh
 
 from flexcal.errors import FlexcalError
-from flexcal.export.mjcf import carried_inertias, mjcf_spec, write_mjcf
+from flexcal.export import write_mjcf
+from flexcal.export.mjcf import carried_inertias, mjcf_spec
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.units import DEGREE
 

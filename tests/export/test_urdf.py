@@ -34,8 +34,10 @@ def test_the_loss_is_said_in_millimetres(tx90l: RobotModel, tmp_path: Path) -> N
     loose = tx90l.with_values({"joint_2.backlash": 1e-4})
     export = write_urdf(loose, tmp_path / "calibrated.urdf")
     assert export.lost == ("elastic deflection", "backlash")
-    assert 0.5e-3 < export.mean_loss < export.max_loss < 10e-3
-    assert "cannot carry elastic deflection, backlash" in str(export)
+    whole, alone = export.loss.error, [term.error for term in export.loss.terms]
+    assert whole is not None and 0.5e-3 < whole.mean < whole.p95 < whole.max < 10e-3
+    assert alone[0] is not None and alone[1] is not None and alone[1].max < 0.1 * alone[0].max < 0.1 * 10e-3
+    assert "cannot carry elastic deflection (alone" in str(export) and "in 95 % of poses" in str(export)
 
 
 def test_a_point_named_like_a_link_is_refused(tx90l: RobotModel, tmp_path: Path) -> None:

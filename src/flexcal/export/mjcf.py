@@ -11,12 +11,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Collection
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.atomic import write_text
 from flexcal.errors import FlexcalError
 from flexcal.model import Inertia, RobotModel
 from flexcal.model.inertia import parallel_axis
@@ -75,17 +73,6 @@ def mjcf_spec(
         joint, position, rotation = point_placement(model, name)
         bodies[joint].add_site(name=name, pos=position, quat=rotation_wxyz(rotation))
     return spec
-
-
-def write_mjcf(model: RobotModel, path: str | Path) -> None:
-    """Write the robot as an MJCF file with elastic joints; see `mjcf_spec` for its joints and for what it cannot hold."""
-    import mujoco
-
-    spec = mjcf_spec(model)
-    spec.option.timestep = 0.25e-3
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
-    spec.compile()
-    write_text(path, spec.to_xml())
 
 
 def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:

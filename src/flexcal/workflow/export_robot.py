@@ -2,49 +2,122 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from flexcal.errors import InputError
-from flexcal.export.urdf import UrdfExport, write_urdf
+from flexcal.export.dh import Convention, render_dh
+from flexcal.export.exported import Exported, Rendered, write_rendered
+from flexcal.export.json_document import render_json
+from flexcal.export.kinematics import render_kinematics
+from flexcal.export.mjcf_file import render_mjcf
+from flexcal.export.offsets import render_offsets
+from flexcal.export.sdf import render_sdf
+from flexcal.export.urdf import render_urdf
 from flexcal.model import RobotModel
 from flexcal.model.stored import apply_estimates
-from flexcal.units import MILLIMETRE
+
+Render = Callable[[RobotModel, RobotModel], Rendered]
+"""The calibrated and the nominal robot to the text of a file."""
 
 
 @dataclass(frozen=True)
 class ExportedRobot:
     """What was written; `calibrated` is False where there were no estimates and the nominal robot was exported."""
 
-    export: UrdfExport
+    export: Exported
     calibrated: bool
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
+        loss = self.export.loss
         return {
             "file": self.export.path,
             "calibrated": self.calibrated,
-            "lost": list(self.export.lost),
-            "mean_loss_mm": self.export.mean_loss / MILLIMETRE,
-            "max_loss_mm": self.export.max_loss / MILLIMETRE,
+            "lost": [
+                {"term": term.name} | (term.error.in_millimetres() if term.error else {})
+                for term in loss.terms
+            ],
+            "tool_error": loss.error.in_millimetres() | {"poses": loss.poses, "within": loss.within}
+            if loss.error
+            else None,
             "remarks": list(self.export.remarks),
+            **self.export.table,
         }
 
 
 def export_urdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
     """Write the robot with its estimates as URDF; `estimates` is a file or folder in place of that beside robot.yaml.
 
-    Raises `FlexcalError` as reading and `write_urdf` do, and where `out` is the robot's own URDF.
+    Raises `FlexcalError`, as every export here, as reading and the format's rendering do, and where `out` is one of the robot's own files.
     """
-    model = RobotModel.from_yaml(robot, estimates=False)
-    if out.exists() and model.urdf.exists() and out.samefile(model.urdf):
-        raise InputError(f"{out} is the nominal URDF of {robot}, which is never changed; give another --out.")
-    path = model.path.parent / model.config.estimates if estimates is None else estimates
+    return _export(robot, out, estimates, lambda model, _: render_urdf(model))
+
+
+def export_mjcf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the robot as MJCF with elastic joints."""
+    return _export(robot, out, estimates, lambda model, _: render_mjcf(model))
+
+
+def export_sdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the robot as SDFormat."""
+    return _export(robot, out, estimates, lambda model, _: render_sdf(model))
+
+
+def export_json(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write everything of the robot as one JSON document."""
+    return _export(robot, out, estimates, render_json)
+
+
+def export_kinematics(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the placements of six joints as the `kinematics` YAML of Universal Robots' ROS description."""
+    return _export(robot, out, estimates, render_kinematics)
+
+
+def export_dh(
+    robot: Path,
+    out: Path,
+    convention: Convention,
+    *,
+    point: str | None = None,
+    four_parameters: bool = False,
+    estimates: Path | None = None,
+) -> ExportedRobot:
+    """Write the Denavit-Hartenberg table of the chain to a point; see `render_dh`."""
+
+    def render(model: RobotModel, nominal: RobotModel) -> Rendered:
+        return render_dh(model, nominal, convention, point=point, four_parameters=four_parameters)
+
+    return _export(robot, out, estimates, render)
+
+
+def export_offsets(
+    robot: Path,
+    out: Path,
+    *,
+    point: str | None = None,
+    keep_frames: bool = False,
+    estimates: Path | None = None,
+) -> ExportedRobot:
+    """Write the best joint offsets of the chain to a point; see `render_offsets`."""
+
+    def render(model: RobotModel, nominal: RobotModel) -> Rendered:
+        return render_offsets(model, nominal, point=point, keep_frames=keep_frames)
+
+    return _export(robot, out, estimates, render)
+
+
+def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> ExportedRobot:
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    path = nominal.path.parent / nominal.config.estimates if estimates is None else estimates
     path = path / "estimates.yaml" if path.is_dir() else path
+    for own, what in ((nominal.urdf, "nominal URDF"), (robot, "robot.yaml"), (path, "estimates file")):
+        if out.exists() and own.exists() and out.samefile(own):
+            raise InputError(f"{out} is the {what} of {robot}, which is never changed; give another --out.")
     if estimates is not None and not path.exists():
         raise InputError(f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out.")
     calibrated = path.exists()
-    if calibrated:
-        model = apply_estimates(model, path)
-    return ExportedRobot(write_urdf(model, out), calibrated)
+    model = apply_estimates(nominal, path) if calibrated else nominal
+    return ExportedRobot(write_rendered(model, out, render(model, nominal)), calibrated)

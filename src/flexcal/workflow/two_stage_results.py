@@ -10,13 +10,13 @@ import numpy as np
 from flexcal.atomic import write_text
 from flexcal.calibration import ErrorStatistics
 from flexcal.estimation import Estimate
-from flexcal.export.urdf import UrdfExport
+from flexcal.export import Exported
 from flexcal.model.names import SPRINGS
 from flexcal.report.study import CadAlone, TwoStageStudy
 from flexcal.workflow.results import identifiability_block, quantities
 
 
-def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, Any]:
+def two_stage_document(study: TwoStageStudy, exported: Exported) -> dict[str, Any]:
     """The content of results.json."""
     truth = study.truth or {}
     estimate = study.stiffness.estimate
@@ -48,9 +48,8 @@ def two_stage_document(study: TwoStageStudy, exported: UrdfExport) -> dict[str, 
         "export": {
             "urdf": exported.path.name,
             "lost": list(exported.lost),
-            "mean_mm": exported.mean_loss * 1e3,
-            "max_mm": exported.max_loss * 1e3,
-        },
+        }
+        | (exported.loss.error.in_millimetres() if exported.loss.error else {}),
         "seconds": dict(study.seconds) | {"total": sum(study.seconds.values())},
         "seed": study.seed,
         "plan": study.plan.name,

@@ -1,0 +1,224 @@
+"""`flexcal export …`: a verb a format."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, MaybePath, MaybeText, Robot, require_robot
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from flexcal.workflow.export_robot import ExportedRobot
+
+Point = Annotated[
+    MaybeText,
+    arg(metavar="NAME", help="the point at the end of the chain", help_behavior_hint="(default: the first)"),
+]
+
+
+@dataclass(frozen=True)
+class Export(ABC):
+    """What the verbs have in common: a robot with its estimates to a file, and what the file cannot carry."""
+
+    robot: Robot
+    out: Annotated[Path, arg(metavar="FILE", help="the file to write")]
+    estimates: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+    ] = None
+    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    json: Json = False
+
+    @abstractmethod
+    def write(self) -> ExportedRobot:
+        """Write the file."""
+
+    @abstractmethod
+    def following(self) -> str:
+        """What to do with it."""
+
+    def tables(self, document: dict[str, Any]) -> list[Table]:
+        """What to show of the file's content; `document` as with --json."""
+        return []
+
+    def run(self) -> None:
+        """Export, and say what is lost."""
+        require_robot(self.robot)
+        console = Console(self.json)
+        found = self.write()
+        document = found.document()
+        for table in self.tables(document):
+            console.show(table)
+        console.say(f"wrote {found.export.path}")
+        for sentence in (*found.export.loss.sentences, *found.export.remarks):
+            console.say(sentence)
+        following = self.following()
+        if not found.calibrated:
+            console.say("there are no estimates: this is the nominal robot")
+            following = f"flexcal calibrate {self.robot} POSES…, and export again"
+        console.finish(document, following)
+
+
+@dataclass(frozen=True)
+class ExportUrdf(Export):
+    """Write the calibrated robot as URDF: joint origins and tool moved to where they were found to be, links with identified inertials.
+
+    A URDF cannot hold deflection, backlash and transmission error; what leaving them out costs is said in millimetres. Rotor inertia
+    and friction stay in estimates.yaml.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_urdf
+
+        return export_urdf(self.robot, self.out, estimates=self.estimates)
+
+    def following(self) -> str:
+        return f"load {self.out} wherever the nominal URDF was loaded"
+
+
+@dataclass(frozen=True)
+class ExportMjcf(Export):
+    """Write the calibrated robot as MJCF for MuJoCo, with its springs, dampers and rotors as joints and its payload in the last link.
+
+    It deflects under gravity as the calibrated robot does. Backlash, gravity compliance and transmission error have no form in MJCF;
+    what leaving them out costs is said in millimetres.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_mjcf
+
+        return export_mjcf(self.robot, self.out, estimates=self.estimates)
+
+    def following(self) -> str:
+        return f"load {self.out} in MuJoCo, or look at it with 'python -m mujoco.viewer --mjcf={self.out}'"
+
+
+@dataclass(frozen=True)
+class ExportSdf(Export):
+    """Write the calibrated robot as SDFormat 1.7 for Gazebo: geometry, inertials and friction, without looks and collision bodies.
+
+    What SDFormat cannot hold (deflection, backlash and transmission error) is said in millimetres.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_sdf
+
+        return export_sdf(self.robot, self.out, estimates=self.estimates)
+
+    def following(self) -> str:
+        return f"include {self.out} in a Gazebo world"
+
+
+@dataclass(frozen=True)
+class ExportKinematics(Export):
+    """Write the placements of the six joints as the `kinematics` YAML of Universal Robots' ROS description.
+
+    Its frames are those of that description whatever the URDF's are, for robots of that maker. The tool has no place in it and is said.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_kinematics
+
+        return export_kinematics(self.robot, self.out, estimates=self.estimates)
+
+    def following(self) -> str:
+        return f"give {self.out} to the description or driver as kinematics_params_file"
+
+
+@dataclass(frozen=True)
+class ExportJson(Export):
+    """Write everything of the calibrated robot as one JSON document, for programs of your own. Nothing is left out.
+
+    Joints with placements, springs, backlash and drives, points, payload, stations, and every parameter with its standard deviation.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_json
+
+        return export_json(self.robot, self.out, estimates=self.estimates)
+
+    def following(self) -> str:
+        return f"read {self.out} in your own program; docs/file-formats.md says what stands in it"
+
+
+@dataclass(frozen=True)
+class ExportDh(Export):
+    """Write the standard Denavit-Hartenberg table of the chain to a point as CSV, nominal beside calibrated.
+
+    A row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) Ry(beta). beta (Hayati) stands for d between axes that are nominally parallel, whose
+    common normal would lie anywhere.
+    """
+
+    convention: ClassVar[Literal["standard", "modified"]] = "standard"
+    point: Point = None
+    four_parameters: bool = False
+    """Never use beta: for controllers that take four parameters a joint; d may become very large."""
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_dh
+
+        return export_dh(
+            self.robot,
+            self.out,
+            self.convention,
+            point=self.point,
+            four_parameters=self.four_parameters,
+            estimates=self.estimates,
+        )
+
+    def following(self) -> str:
+        return f"enter the calibrated values of {self.out} in the controller, base and tool too"
+
+    def tables(self, document: dict[str, Any]) -> list[Table]:
+        from flexcal.cli.export_tables import dh_table, frame_table
+
+        frames = {name: document[name]["calibrated"] for name in ("base", "tool")}
+        return [dh_table(document), frame_table(frames)]
+
+
+@dataclass(frozen=True)
+class ExportMdh(ExportDh):
+    """Write the modified Denavit-Hartenberg table (Craig; Khalil, Kleinfinger) of the chain to a point as CSV, nominal beside calibrated.
+
+    A row is Rx(alpha) Tx(a) Ry(beta) Rz(theta + q) Tz(d). beta (Hayati) stands for d between axes that are nominally parallel, whose
+    common normal would lie anywhere.
+    """
+
+    convention: ClassVar[Literal["standard", "modified"]] = "modified"
+
+
+@dataclass(frozen=True)
+class ExportOffsets(Export):
+    """Write the joint offsets that bring the nominal robot nearest to the real one, for controllers that correct nothing else, as CSV.
+
+    They are fitted to the calibrated robot at rest over random poses, of the working volume where robot.yaml declares one: what they
+    cannot correct they balance. Base and tool are placed with them.
+    """
+
+    point: Point = None
+    keep_frames: bool = False
+    """Leave base and tool as they are nominally, and fit the offsets alone."""
+
+    def write(self) -> ExportedRobot:
+        from flexcal.workflow.export_robot import export_offsets
+
+        return export_offsets(
+            self.robot, self.out, point=self.point, keep_frames=self.keep_frames, estimates=self.estimates
+        )
+
+    def following(self) -> str:
+        frames = "" if self.keep_frames else ", and set base and tool as it says"
+        return f"add the offsets of {self.out} to the joint zeros of the controller{frames}"
+
+    def tables(self, document: dict[str, Any]) -> list[Table]:
+        from flexcal.cli.export_tables import frame_table, offset_table
+
+        if self.keep_frames:
+            return [offset_table(document)]
+        return [offset_table(document), frame_table({name: document[name] for name in ("base", "tool")})]

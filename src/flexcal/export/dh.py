@@ -1,0 +1,168 @@
+"""Denavit-Hartenberg tables, standard and modified, nominal beside calibrated, and their reader."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Callable
+from io import StringIO
+from typing import Literal
+
+import numpy as np
+
+from flexcal.export.denavit_hartenberg import (
+    NEARLY_PARALLEL,
+    DhChain,
+    chain_axes,
+    dh_chain,
+    nominal_angle,
+    require_points,
+)
+from flexcal.export.exported import Rendered
+from flexcal.export.frames import X, Y, Z, from_six, shifted, six_numbers, turned
+from flexcal.export.loss import AT_REST, ToolMap
+from flexcal.model import RobotModel
+
+Convention = Literal["standard", "modified"]
+Row = tuple[str, str, dict[str, float]]
+"""Joint (or base, tool), type, and its parameters by name."""
+
+UNITS = {
+    "theta": "rad", "d": "m", "a": "m", "alpha": "rad", "beta": "rad",
+    "x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad",
+}  # fmt: skip
+COLUMNS = ("joint", "type", "parameter", "unit", "nominal", "calibrated", "difference")
+_ORDER = {
+    "standard": ("theta", "d", "a", "alpha", "beta"),
+    "modified": ("alpha", "a", "beta", "theta", "d"),
+}
+_SAYS = {
+    "standard": (
+        "Standard Denavit-Hartenberg (Denavit and Hartenberg 1955; Spong): a row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) Ry(beta).",
+        "Frame k lies on the axis of joint k + 1.",
+    ),
+    "modified": (
+        "Modified Denavit-Hartenberg (Craig; Khalil and Kleinfinger): a row is Rx(alpha) Tx(a) Ry(beta) Rz(theta + q) Tz(d).",
+        "Frame k lies on the axis of joint k; alpha, a and beta of a row lead to it from the axis before.",
+    ),
+}
+
+
+def render_dh(
+    model: RobotModel,
+    nominal: RobotModel,
+    convention: Convention,
+    *,
+    point: str | None = None,
+    four_parameters: bool = False,
+) -> Rendered:
+    """The chain that moves a target as a CSV table in a convention: joint, parameter, nominal, calibrated, difference; base and tool too.
+
+    beta stands for d between axes that are nominally within 1° of parallel (Hayati, Mirmirani 1985); with `four_parameters` it is never
+    used. Raises `FlexcalError` for a robot without points, or an unknown point.
+    """
+    require_points(model, "Denavit-Hartenberg parameters")
+    target = model.point(point).name
+    axes = chain_axes(model, target)
+    before = dh_chain(chain_axes(nominal, target), hayati=not four_parameters)
+    after = dh_chain(axes, hayati=not four_parameters, like=before)
+    names = [(model.joints[i].name, model.joints[i].kind) for i in axes.joints]
+    rows = [_rows(chain, names, convention) for chain in (before, after)]
+    text = _csv(*rows)
+    left = [name for i, name in enumerate(model.joint_names) if i not in axes.joints]
+    remarks = _remarks(before, after, [name for name, _ in names], four_parameters)
+    if left:
+        remarks += (f"{', '.join(left)} does not move the point '{target}' and is not in the table.",)
+    documents = {
+        name: {"type": kind, "nominal": old, "calibrated": new}
+        for (name, kind, old), (_, _, new) in zip(*rows, strict=True)
+    }
+    base, tool = documents.pop("base"), documents.pop("tool")
+    return Rendered(
+        text,
+        _tool_map(text, convention, list(axes.joints)),
+        AT_REST,
+        "#",
+        about=(
+            *_SAYS[convention],
+            "q adds to theta, or to d of a prismatic joint. The rows base and tool are Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll): "
+            f"from the robot's base to the first frame, and from the last frame to the point '{target}'.",
+        ),
+        remarks=remarks,
+        table={"convention": convention, "joints": documents, "base": base, "tool": tool},
+        point=target,
+    )
+
+
+def dh_transforms(
+    text: str, convention: Convention, column: str = "calibrated"
+) -> Callable[[np.ndarray], np.ndarray]:
+    """Forward kinematics that a table's `text` says by itself: positions (N, m) of its joints, rad or m, to frames (N, 4, 4)."""
+    rows: dict[str, dict[str, float]] = {}
+    types: dict[str, str] = {}
+    lines = (line for line in text.splitlines() if not line.startswith("#"))
+    for row in csv.DictReader(lines):
+        rows.setdefault(row["joint"], {})[row["parameter"]] = float(row[column])
+        types[row["joint"]] = row["type"]
+    joints = [name for name in rows if types[name] != "fixed"]
+    base, tool = (from_six(rows[name]) for name in rows if types[name] == "fixed")
+
+    def frames(q: np.ndarray) -> np.ndarray:
+        at = np.broadcast_to(base, (len(q), 4, 4))
+        for k, name in enumerate(joints):
+            row, moved = rows[name], q[:, k]
+            turn = row["theta"] + (moved if types[name] == "revolute" else 0.0 * moved)
+            shift = row["d"] + (moved if types[name] == "prismatic" else 0.0 * moved)
+            joint = turned(Z, turn) @ shifted(Z, shift)
+            link = shifted(X, row["a"]) @ turned(X, row["alpha"]) @ turned(Y, row["beta"])
+            at = at @ (joint @ link if convention == "standard" else link @ joint)
+        return at @ tool
+
+    return frames
+
+
+def _tool_map(text: str, convention: Convention, chain: list[int]) -> ToolMap:
+    frames = dh_transforms(text, convention)
+    return lambda q: frames(q[:, chain])[:, :3, 3]
+
+
+def _rows(chain: DhChain, names: list[tuple[str, str]], convention: Convention) -> list[Row]:
+    own = {key: getattr(chain, key) for key in _ORDER[convention]}
+    if convention == "modified":
+        own |= {key: np.concatenate([[0.0], own[key][:-1]]) for key in ("a", "alpha", "beta")}
+    rows: list[Row] = [("base", "fixed", six_numbers(chain.base))]
+    rows += [
+        (name, kind, {key: float(values[k]) + 0.0 for key, values in own.items()})
+        for k, (name, kind) in enumerate(names)
+    ]
+    return [*rows, ("tool", "fixed", six_numbers(chain.tool))]
+
+
+def _csv(nominal: list[Row], calibrated: list[Row]) -> str:
+    stream = StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for (name, kind, old), (_, _, new) in zip(nominal, calibrated, strict=True):
+        for key in new:
+            change = new[key] - old[key]
+            if UNITS[key] == "rad":
+                change = math.remainder(change, 2 * math.pi)
+            writer.writerow([name, kind, key, UNITS[key], repr(old[key]), repr(new[key]), repr(change)])
+    return stream.getvalue()
+
+
+def _remarks(before: DhChain, after: DhChain, names: list[str], four: bool) -> tuple[str, ...]:
+    found = []
+    for k in range(len(names) - 1):
+        if nominal_angle(before, k) >= NEARLY_PARALLEL:
+            continue
+        pair = f"The axes of {names[k]} and {names[k + 1]} are nearly parallel"
+        if not four:
+            found.append(
+                f"{pair}: their row has beta, and d stays nominal; take --four-parameters where beta cannot be entered."
+            )
+        elif abs(after.d[k] - before.d[k]) > 0.01:
+            found.append(
+                f"{pair}: with four parameters d moves by {abs(after.d[k] - before.d[k]):.3g} m, to their common normal."
+            )
+    return tuple(found)

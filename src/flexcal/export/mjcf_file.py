@@ -1,0 +1,148 @@
+"""The MJCF file of a calibrated robot, and where MuJoCo puts its tool at rest."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.export.exported import Exported, Rendered, write_rendered
+from flexcal.export.loss import BACKLASH, GRAVITY_COMPLIANCE, TRANSMISSION, ToolMap
+from flexcal.export.mjcf import mjcf_spec
+from flexcal.model import RobotModel
+
+if TYPE_CHECKING:
+    import mujoco
+
+_TIME_STEP = 0.25e-3
+_PASSES = 30
+_AT_REST = 1e-12
+"""rad: a correction of the springs after which the arm counts as at rest."""
+
+
+def write_mjcf(model: RobotModel, path: str | Path) -> Exported:
+    """Write the robot as MJCF with elastic joints and measure what it lost; see `render_mjcf`."""
+    return write_rendered(model, path, render_mjcf(model))
+
+
+def render_mjcf(model: RobotModel) -> Rendered:
+    """The robot as MJCF: the joints of `mjcf_spec`, all free, with the declared payload; numbers to their last digit.
+
+    Raises `FlexcalError` where MuJoCo cannot build the robot, as with links that have no mass.
+    """
+    import mujoco
+
+    spec = mjcf_spec(model)
+    spec.option.timestep = _TIME_STEP
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICIT
+    try:
+        compiled = spec.compile()
+    except ValueError as problem:
+        raise FlexcalError(
+            f"MuJoCo cannot build {model.name}: {problem}; every moving link needs a mass and an inertia in {model.urdf.name}."
+        ) from problem
+    text = _with_all_digits(spec.to_xml(), compiled)
+    remarks = ["Looks and collision bodies stay in the URDF."]
+    if model.coulomb[np.isfinite(model.coulomb)].any():
+        remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
+    springs = [
+        f"{joint.name}.{key}"
+        for joint in model.elastic
+        for key in ("drive", "bearing_y", "bearing_x")[: len(joint.components)]
+    ]
+    about = (
+        "Joints: NAME is the motor's, referred to the joint; the actuator of that name is its torque, N m.",
+    )
+    if springs:
+        about += (
+            f"Springs: {', '.join(springs)}; q of a drive spring is what the arm turns beyond its motor.",
+        )
+    return Rendered(
+        text,
+        mjcf_tool(model, text),
+        (BACKLASH, GRAVITY_COMPLIANCE, TRANSMISSION),
+        "<!--",
+        about=about,
+        remarks=tuple(remarks),
+    )
+
+
+def mjcf_tool(model: RobotModel, text: str) -> ToolMap:
+    """Where MuJoCo, reading the MJCF `text`, puts the first point of `model` at rest with the motors held: Newton on the springs."""
+
+    def positions(q: np.ndarray) -> np.ndarray:
+        import mujoco
+
+        read = mujoco.MjModel.from_xml_string(text)
+        data = mujoco.MjData(read)
+        motors = [read.joint(name).qposadr[0] for name in model.joint_names]
+        springs = [
+            read.jnt_dofadr[i] for i in range(read.njnt) if read.joint(i).name not in model.joint_names
+        ]
+        stiffness = np.array([_linear(read.jnt_stiffness[read.dof_jntid[i]]) for i in springs])
+        result = np.zeros((len(q), 3))
+        for k, held in enumerate(q):
+            data.qpos[:] = 0.0
+            data.qpos[motors] = held
+            for _ in range(_PASSES):
+                mujoco.mj_forward(read, data)
+                if not springs:
+                    break
+                step = (data.qfrc_passive - data.qfrc_bias)[springs] / stiffness
+                data.qpos[springs] += step
+                if np.abs(step).max() < _AT_REST:
+                    break
+            mujoco.mj_kinematics(read, data)
+            result[k] = data.site(model.point().name).xpos
+        return result
+
+    return positions
+
+
+def _with_all_digits(xml: str, compiled: mujoco.MjModel) -> str:
+    """MuJoCo's XML, which it rounds to six digits, with the numbers of the compiled robot."""
+    root = ET.fromstring(xml)
+    option = root.find("option")
+    assert option is not None
+    option.set("gravity", _digits(compiled.opt.gravity))
+    for element in root.iter("body"):
+        body = compiled.body(element.get("name"))
+        element.set("pos", _digits(body.pos))
+        element.set("quat", _digits(body.quat))
+        inertial = element.find("inertial")
+        if inertial is not None:
+            inertial.set("pos", _digits(body.ipos))
+            inertial.set("quat", _digits(body.iquat))
+            inertial.set("mass", _digits(body.mass))
+            inertial.set("diaginertia", _digits(body.inertia))
+        for own in element.findall("joint"):
+            joint = compiled.joint(own.get("name"))
+            dof = joint.dofadr[0]
+            own.set("axis", _digits(joint.axis))
+            exact = {
+                "range": joint.range,
+                "stiffness": _linear(joint.stiffness),
+                "damping": _linear(compiled.dof_damping[dof]),
+                "armature": compiled.dof_armature[dof],
+                "frictionloss": compiled.dof_frictionloss[dof],
+            }
+            for key in exact.keys() & own.keys():
+                own.set(key, _digits(exact[key]))
+        for own in element.findall("site"):
+            site = compiled.site(own.get("name"))
+            own.set("pos", _digits(site.pos))
+            own.set("quat", _digits(site.quat))
+    ET.indent(root)
+    return ET.tostring(root, encoding="unicode") + "\n"
+
+
+def _linear(coefficient: np.ndarray | float) -> float:
+    """The linear coefficient of a spring or damper: a number up to MuJoCo 3, the first of a polynomial from 4 on."""
+    return float(np.ravel(coefficient)[0])
+
+
+def _digits(values: np.ndarray | float) -> str:
+    return " ".join(repr(float(value)) for value in np.ravel(values))

@@ -1,0 +1,171 @@
+"""The joint offsets that bring the nominal robot nearest to the real one, for controllers that take nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.export.loss import Distances, random_poses, tool_positions
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.rotations import rotation_vector, vector_rotation
+
+_STEPS = 8
+_SMALL = 1e-8
+"""m and rad: a step after which there is no other."""
+_REST = 1e-4
+"""Weight, relative to a tool error, of moving base and tool by as much: what offsets can do as well, offsets do."""
+
+
+@dataclass(frozen=True, eq=False)
+class OffsetFit:
+    """`offsets` (n,), rad or m, that are added to q of the nominal robot, and their standard deviations `std` (n,), zero where unknown.
+
+    `base` (6,): position, m, and rotation vector, rad, of the nominal robot's base in that of the real one; `tool` (3,) m is added to the
+    target in its frame. `before` is the tool error of the nominal robot with the same freedom of base and tool and no offsets.
+    """
+
+    offsets: np.ndarray
+    std: np.ndarray
+    base: np.ndarray
+    tool: np.ndarray
+    before: Distances
+
+
+def fit_offsets(model: RobotModel, nominal: RobotModel, point: str, *, keep_frames: bool) -> OffsetFit:
+    """Least squares of the tool error between `model` at rest and `nominal` with offsets, base and tool, over random poses.
+
+    The poses are those of the working volume where one is declared. With `keep_frames` base and tool stay. The standard deviations are
+    those that the covariance of the model's parameters gives, to first order.
+    """
+    q, _ = random_poses(model, point, np.random.default_rng(1))
+    wanted, flank = tool_positions(model, q, point=point)
+    moving = np.isin(np.arange(model.n), chain_of(model, point))
+    fitted = _solve(nominal, q, wanted, point, moving, keep_frames=keep_frames)
+    still = _solve(nominal, q, wanted, point, np.zeros(model.n, dtype=bool), keep_frames=keep_frames)
+    n = model.n
+    columns = _columns(nominal, q, fitted, point, moving, keep_frames=keep_frames)
+    spread = _position_spread(model, q, flank, point)
+    std = np.zeros(n + 9)
+    if spread.shape[1]:
+        response = _least_squares(
+            np.vstack([columns, _rest_rows(n, len(q))]),
+            np.vstack([spread, np.zeros((9, spread.shape[1]))]),
+        )
+        std = np.linalg.norm(response, axis=1)
+    before = Distances.of(wanted - offset_tool(nominal, q, still, point))
+    return OffsetFit(fitted[:n], std[:n], fitted[n : n + 6], fitted[n + 6 :], before)
+
+
+def offset_tool(nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, point: str) -> np.ndarray:
+    """Target (N, 3), m, of the nominal robot with `parameters` (n + 9,): offsets, base, tool as in `OffsetFit`."""
+    n = nominal.n
+    moved = parameters[n : n + 6]
+    at = point_kinematics(nominal, q + parameters[:n], point=point, jacobians=False)
+    position = at.position + at.orientation @ parameters[n + 6 :]
+    return position @ vector_rotation(moved[3:]).T + moved[:3]
+
+
+def what_offsets_leave(
+    nominal: RobotModel, q: np.ndarray, moved: np.ndarray, point: str, *, keep_frames: bool
+) -> np.ndarray:
+    """What the best offsets, to first order, leave of tool displacements `moved` (N, 3) at `q` (N, n)."""
+    moving = np.isin(np.arange(nominal.n), chain_of(nominal, point))
+    columns = _columns(nominal, q, np.zeros(nominal.n + 9), point, moving, keep_frames=keep_frames)
+    absorbed = columns @ _least_squares(columns, moved.ravel())
+    return moved - absorbed.reshape(moved.shape)
+
+
+def chain_of(model: RobotModel, point: str) -> list[int]:
+    """Indices of the joints that move a target."""
+    at, chain = model.point(point).joint, []
+    while at >= 0:
+        chain.insert(0, at)
+        at = model.joints[at].parent
+    return chain
+
+
+def _solve(
+    nominal: RobotModel,
+    q: np.ndarray,
+    wanted: np.ndarray,
+    point: str,
+    moving: np.ndarray,
+    *,
+    keep_frames: bool,
+) -> np.ndarray:
+    """Gauss-Newton from zero, (n + 9,)."""
+    found = np.zeros(nominal.n + 9)
+    rest = _rest_rows(nominal.n, len(q))
+    for _ in range(_STEPS):
+        columns = _columns(nominal, q, found, point, moving, keep_frames=keep_frames)
+        missing = (wanted - offset_tool(nominal, q, found, point)).ravel()
+        rows, right = np.vstack([columns, rest]), np.concatenate([missing, -rest @ found])
+        step = _least_squares(rows, right)
+        turned = vector_rotation(step[nominal.n + 3 : nominal.n + 6]) @ vector_rotation(
+            found[nominal.n + 3 : nominal.n + 6]
+        )
+        found = found + step
+        found[nominal.n + 3 : nominal.n + 6] = rotation_vector(turned)
+        if np.abs(step).max() < _SMALL:
+            break
+    return found
+
+
+def _columns(
+    nominal: RobotModel,
+    q: np.ndarray,
+    parameters: np.ndarray,
+    point: str,
+    moving: np.ndarray,
+    *,
+    keep_frames: bool,
+) -> np.ndarray:
+    """Derivative (3 N, n + 9) of `offset_tool` by its parameters; those that stay have none."""
+    n = nominal.n
+    at = point_kinematics(nominal, q + parameters[:n], point=point)
+    turn = vector_rotation(parameters[n + 3 : n + 6])
+    columns = np.zeros((len(q), 3, n + 9))
+    by_offset = at.geometry_jacobian[:, :, : 6 * n : 6]
+    lever = (at.orientation @ parameters[n + 6 :])[:, :, None]
+    columns[:, :, :n] = turn @ (by_offset[:, :3] + np.cross(by_offset[:, 3:], lever, axis=1)) * moving
+    if not keep_frames:
+        where = offset_tool(nominal, q, parameters, point) - parameters[n : n + 3]
+        columns[:, :, n : n + 3] = np.eye(3)
+        columns[:, :, n + 3 : n + 6] = -np.cross(where[:, :, None], np.eye(3)[None], axis=1)
+        columns[:, :, n + 6 :] = turn @ at.orientation
+    return columns.reshape(-1, n + 9)
+
+
+def _least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
+    """The shortest solution, by way of the triangle that QR leaves of tall rows."""
+    orthogonal, triangle = np.linalg.qr(rows)
+    return np.linalg.lstsq(triangle, orthogonal.T @ right, rcond=None)[0]
+
+
+def _rest_rows(n: int, poses: int) -> np.ndarray:
+    return _REST * np.sqrt(3 * poses) * np.eye(n + 9)[n:]
+
+
+def _position_spread(model: RobotModel, q: np.ndarray, flank: np.ndarray, point: str) -> np.ndarray:
+    """What one standard deviation in each independent direction of the posterior moves the target by, (3 N, directions), m."""
+    posterior = model.posterior
+    known = [name for name in posterior.parameters.names if posterior.determines(name)]
+    parameters = posterior.parameters.subset(known)
+    covariance = posterior.marginal(known)
+    std = np.sqrt(np.diag(covariance))
+    centre = parameters.coordinates()
+    slopes = []
+    for k in range(len(known)):
+        sides = []
+        for sign in (1, -1):
+            moved = centre.copy()
+            moved[k] += sign * std[k]
+            values = dict(zip(known, parameters.natural(moved).tolist(), strict=True))
+            sides.append(tool_positions(model.with_values(values), q, point=point, flank=flank)[0])
+        slopes.append((sides[0] - sides[1]).ravel() / 2)
+    if not slopes:
+        return np.zeros((q.size // model.n * 3, 0))
+    correlation = covariance / np.outer(std, std)
+    values, vectors = np.linalg.eigh(correlation)
+    return np.column_stack(slopes) @ (vectors * np.sqrt(np.clip(values, 0, None)))
