@@ -1,0 +1,49 @@
+"""Robots with known errors to export."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+from flexcal.export import write_urdf
+from flexcal.model import RobotModel
+from flexcal.model.names import GEOMETRY
+
+Kinematics = Callable[[np.ndarray], np.ndarray]
+
+
+@pytest.fixture
+def erroneous() -> Callable[[RobotModel, float], RobotModel]:
+    """A robot with a random error of every geometric parameter, rad and m."""
+
+    def make(model: RobotModel, size: float = 1e-3) -> RobotModel:
+        rng = np.random.default_rng(7)
+        owners = [*model.joint_names, "tool"]
+        return model.with_values({f"{o}.{key}": size * rng.normal() for o in owners for key in GEOMETRY})
+
+    return make
+
+
+@pytest.fixture
+def pinocchio_of(tmp_path: Path) -> Callable[[RobotModel], Kinematics]:
+    """Frames (N, 4, 4) of the first point of a robot, by Pinocchio from its exported URDF."""
+
+    def make(model: RobotModel) -> Kinematics:
+        export = write_urdf(model, tmp_path / "for_pinocchio.urdf")
+        read = pin.buildModelFromUrdf(str(export.path))
+        data, frame = read.createData(), read.getFrameId(model.point().name)
+
+        def frames(q: np.ndarray) -> np.ndarray:
+            result = []
+            for own in q:
+                pin.framesForwardKinematics(read, data, own)
+                result.append(data.oMf[frame].homogeneous.copy())
+            return np.array(result)
+
+        return frames
+
+    return make

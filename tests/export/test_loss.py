@@ -1,0 +1,47 @@
+"""What a format loses is what the tool is off by, over the poses where the robot works."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.export.loss import AT_REST, measure_loss, random_poses
+from flexcal.export.urdf import write_urdf
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.config import BoxConfig
+
+
+def test_backlash_of_one_joint_is_its_lever_times_the_gap(tx90l: RobotModel) -> None:
+    """Half the gap of the first joint, which gravity does not load but where its bearings tilt, at the tool's distance from its axis."""
+    gap = 1e-4
+    rigid = replace(tx90l, bearing_frames={})
+    model = rigid.with_values({"joint_2.backlash": gap})
+    loss = measure_loss(model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST)
+    q, within = random_poses(model, None, np.random.default_rng(0))
+    tool = point_kinematics(model, q)
+    lever = np.linalg.norm(tool.geometry_jacobian[:, :3, 6], axis=1)
+    assert loss.error is not None and within == "joint range" and len(loss.terms) == 1
+    assert loss.error.mean == pytest.approx(gap * lever.mean(), rel=1e-3)
+    assert loss.error.p95 == pytest.approx(gap * np.percentile(lever, 95), rel=1e-3)
+    assert loss.error.max == pytest.approx(gap * lever.max(), rel=1e-3)
+    assert loss.terms[0].name == "backlash" and loss.terms[0].error == pytest.approx(loss.error)
+
+
+def test_the_declared_working_volume_is_where_it_is_measured(tx90l: RobotModel) -> None:
+    box = BoxConfig((0.4, -0.3, 0.3), (0.8, 0.3, 0.8))
+    model = replace(tx90l, config=replace(tx90l.config, working_volume=box))
+    q, within = random_poses(model, None, np.random.default_rng(0))
+    reached = point_kinematics(model, q, jacobians=False).position
+    assert within == "working volume" and len(q) > 500
+    assert (reached > np.array(box.lower) - 2e-4).all() and (reached < np.array(box.upper) + 2e-4).all()
+
+
+def test_a_robot_without_points_names_what_is_lost_without_millimetres(
+    tx90l: RobotModel, tmp_path: Path
+) -> None:
+    export = write_urdf(replace(tx90l, points={}), tmp_path / "robot.urdf")
+    assert export.loss.error is None and export.lost == ("elastic deflection",)
+    assert "declares no point" in str(export)

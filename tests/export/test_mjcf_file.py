@@ -1,0 +1,51 @@
+"""The MJCF file, loaded and let come to rest by MuJoCo, against the static equilibrium of the model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.export import write_mjcf
+from flexcal.export.loss import random_poses, tool_positions
+from flexcal.model import RobotModel, static_equilibrium
+
+mujoco = pytest.importorskip("mujoco")
+
+
+def test_the_arm_comes_to_rest_where_the_model_rests(
+    tx90l: RobotModel, erroneous, rng: np.random.Generator, tmp_path: Path
+) -> None:
+    """Under gravity and 6 kg of payload, the motors held by rotors too heavy to move, ringing down in two seconds with more damping."""
+    model = erroneous(tx90l)
+    write_mjcf(model, tmp_path / "robot.xml")
+    loaded = mujoco.MjModel.from_xml_path(str(tmp_path / "robot.xml"))
+    motors = [loaded.joint(name).qposadr[0] for name in model.joint_names]
+    loaded.dof_armature[[loaded.joint(name).dofadr[0] for name in model.joint_names]] = 1e12
+    loaded.dof_damping *= 20
+    for q in rng.uniform(-1, 1, (2, 6)):
+        data = mujoco.MjData(loaded)
+        data.qpos[motors] = q
+        for _ in range(8000):
+            mujoco.mj_step(loaded, data)
+        np.testing.assert_allclose(data.qpos[motors], q, atol=1e-8)
+        expected = tool_positions(model, q[None])[0][0]
+        np.testing.assert_allclose(data.site("smr").xpos, expected, atol=1e-6)
+        twist = static_equilibrium(model, q[None]).deflection[0, 1, 2]
+        assert data.joint("joint_2.drive").qpos[0] == pytest.approx(twist, abs=1e-7)
+        assert abs(twist) > 1e-5
+
+
+def test_only_what_mjcf_has_no_place_for_is_lost(tx90l: RobotModel, tmp_path: Path) -> None:
+    loose = tx90l.with_values({"joint_2.backlash": 1e-4, "joint_5.gravity_compliance": 1e-5})
+    export = write_mjcf(loose, tmp_path / "robot.xml")
+    assert export.lost == ("backlash", "gravity compliance")
+    q, _ = random_poses(loose, None, np.random.default_rng(0))
+    tight = tx90l.with_values({"joint_2.backlash": 0.0})
+    missed = np.linalg.norm(tool_positions(loose, q)[0] - tool_positions(tight, q)[0], axis=1)
+    error = export.loss.error
+    assert error is not None
+    np.testing.assert_allclose([error.mean, error.max], [missed.mean(), missed.max()], rtol=1e-6)
+    assert "cannot carry backlash (alone" in (tmp_path / "robot.xml").read_text()
+    assert write_mjcf(tx90l, tmp_path / "robot.xml").lost == ()
