@@ -1,0 +1,108 @@
+"""`export …`: every format from the command line, what it says is lost, and what it refuses."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+
+import pytest
+from test_bad_input import refused
+
+from flexcal.model import RobotModel
+
+FORMATS = {
+    "urdf": "calibrated.urdf",
+    "mjcf": "calibrated.xml",
+    "sdf": "calibrated.sdf",
+    "dh": "dh.csv",
+    "mdh": "mdh.csv",
+    "offsets": "offsets.csv",
+    "kinematics": "kinematics.yaml",
+    "json": "calibrated.json",
+}
+RIGID = {"urdf", "sdf", "dh", "mdh", "kinematics"}
+
+
+def test_every_format_of_a_calibrated_robot(run, ur5_folder: Path) -> None:
+    """A calibration with nothing but geometry: all but the offsets carry it, and the offsets say what they leave."""
+    robot = ur5_folder / "robot.yaml"
+    run("calibrate", robot, ur5_folder / "grid.csv", "--terms", "kinematic")
+    for name, file in FORMATS.items():
+        out = ur5_folder / "exported" / file
+        outcome = run("export", name, robot, "--out", out, "--json")
+        assert outcome.status == 0, outcome.err
+        document = outcome.document
+        assert document["calibrated"] and document["file"] == str(out) and out.is_file()
+        lost = [term["term"] for term in document["lost"]]
+        if name == "offsets":
+            assert lost == ["axis misalignments and lengths"]
+            assert 0.05 < document["tool_error"]["mean_mm"] < document["tool_error"]["p95_mm"] < 2.0
+            joints = document["joints"]
+            assert list(joints) == list(RobotModel.from_yaml(robot).joint_names)
+            assert all(0 < joint["std"] < 1e-3 for joint in list(joints.values())[:5])
+        else:
+            assert lost == [] and document["tool_error"]["max_mm"] < 1e-6
+        again = run("export", name, robot, "--out", out)
+        assert again.status == 0 and again.out.splitlines()[-1].startswith("next: ")
+        assert f"wrote {out}" in again.out
+
+
+@pytest.mark.parametrize("name", sorted(RIGID | {"offsets"}))
+def test_what_is_lost_stands_in_the_file_and_on_the_page(run, tx90l_folder: Path, name: str) -> None:
+    out = tx90l_folder / FORMATS[name]
+    page = run("export", name, tx90l_folder / "robot.yaml", "--out", out)
+    said = [line for line in page.out.splitlines() if line.startswith(("This format", "The tool is off"))]
+    assert len(said) == 2 and "elastic deflection (alone" in said[0] and " mm in 95 % of poses" in said[1]
+    text = out.read_text()
+    assert all(sentence in text for sentence in said)
+    assert "nominal robot" in page.out and page.out.splitlines()[-1].startswith("next: flexcal calibrate")
+
+
+def test_tables_are_tables(run, tx90l_folder: Path) -> None:
+    robot = tx90l_folder / "robot.yaml"
+    run("export", "mdh", robot, "--out", tx90l_folder / "mdh.csv")
+    lines = [line for line in (tx90l_folder / "mdh.csv").read_text().splitlines() if not line.startswith("#")]
+    rows = list(csv.DictReader(lines))
+    assert len(rows) == 6 * 5 + 2 * 6 and {row["unit"] for row in rows} == {"rad", "m"}
+    for row in rows:
+        assert float(row["calibrated"]) - float(row["nominal"]) == pytest.approx(float(row["difference"]))
+    page = run("export", "offsets", robot, "--out", tx90l_folder / "offsets.csv", "--keep-frames")
+    assert "with these frames" not in page.out and "base" not in (tx90l_folder / "offsets.csv").read_text()
+
+
+@pytest.mark.parametrize("name", FORMATS)
+@pytest.mark.parametrize("own", ["robot.yaml", "tx90l.urdf", "frequency_poses.csv"])
+def test_a_robots_own_file_is_no_place_for_an_export(run, tx90l_folder: Path, name: str, own: str) -> None:
+    arguments = ("export", name, tx90l_folder / "robot.yaml", "--out", tx90l_folder / own)
+    assert "never changed" in refused(run, tx90l_folder, *arguments)
+
+
+def test_what_flexcal_wrote_is_protected_while_it_is_the_robot(run, tx90l_folder: Path) -> None:
+    run("export", "urdf", tx90l_folder / "robot.yaml", "--out", tx90l_folder / "new.urdf")
+    robot = tx90l_folder / "new.yaml"
+    robot.write_text(
+        (tx90l_folder / "robot.yaml").read_text().replace("tx90l.urdf", "new.urdf").replace("smr:", "seen:")
+    )
+    sentence = refused(run, tx90l_folder, "export", "urdf", robot, "--out", tx90l_folder / "new.urdf")
+    assert "is the nominal URDF" in sentence
+
+
+@pytest.mark.parametrize("name", ["dh", "mdh", "offsets", "kinematics"])
+def test_a_chain_needs_a_point(run, tx90l_folder: Path, name: str) -> None:
+    robot = tx90l_folder / "robot.yaml"
+    lines = robot.read_text().splitlines(keepends=True)
+    robot.write_text("".join(line for line in lines if not line.startswith(("points:", "  smr:"))))
+    sentence = refused(run, tx90l_folder, "export", name, robot, "--out", tx90l_folder / "new")
+    assert "declares none; add one under `points:`" in sentence
+
+
+def test_other_input_that_cannot_be_used(run, tx90l_folder: Path, examples: Path) -> None:
+    robot, out = tx90l_folder / "robot.yaml", tx90l_folder / "new"
+    sentence = refused(run, tx90l_folder, "export", "dh", robot, "--point", "tool", "--out", out)
+    assert "no point 'tool'" in sentence and "smr" in sentence
+    missing = refused(run, tx90l_folder, "export", "mjcf", robot, "--estimates", "nowhere", "--out", out)
+    assert "nowhere does not exist" in missing
+    massless = refused(run, tx90l_folder, "export", "mjcf", examples / "tx40" / "robot.yaml", "--out", out)
+    assert "MuJoCo cannot build" in massless and "tx40.urdf" in massless
+    assert "is a folder" in refused(run, tx90l_folder, "export", "sdf", robot, "--out", tx90l_folder)
+    assert "no 'export step'" in refused(run, tx90l_folder, "export", "step", robot, "--out", out)
