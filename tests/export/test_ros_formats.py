@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -24,6 +25,11 @@ UR5 = {
     "wrist_3": (0, 0.0823, 0, -np.pi / 2, 0, 0),
 }
 """default_kinematics.yaml of the UR5 (wrist_3 there in the other angles of the same rotation: π/2, π, π)."""
+
+
+FIXED = """<joint name="{0}-{1}" type="fixed"><parent link="{0}"/><child link="{1}"/><origin xyz="0 0 0" rpy="{2}"/></joint>"""
+REVOLUTE = """<joint name="{1}_joint" type="revolute"><parent link="{0}"/><child link="{1}"/><origin xyz="{2}" rpy="{3}"/>
+  <axis xyz="0 0 1"/><limit lower="-6.28" upper="6.28" effort="1" velocity="1"/></joint>"""
 
 
 def placed(six: list[float]) -> np.ndarray:
@@ -63,8 +69,9 @@ def read_sdf(text: str, point: str, q: dict[str, float]) -> np.ndarray:
 def test_sdf_stands_where_pinocchio_does(
     name: str, request: pytest.FixtureRequest, erroneous, pinocchio_of, rng: np.random.Generator
 ) -> None:
-    model = erroneous(request.getfixturevalue(name))
-    text = render_sdf(model).text
+    nominal: RobotModel = request.getfixturevalue(name)
+    model = erroneous(nominal)
+    text = render_sdf(model, nominal).text
     q = rng.uniform(-2, 2, (20, 6))
     ours = np.array([read_sdf(text, "smr", dict(zip(model.joint_names, own, strict=True))) for own in q])
     np.testing.assert_allclose(ours, pinocchio_of(model)(q), atol=1e-12)
@@ -78,6 +85,27 @@ def test_the_nominal_ur5_has_the_makers_numbers(ur5: RobotModel) -> None:
         ours = placed([read[link][key] for key in ("x", "y", "z", "roll", "pitch", "yaw")])
         np.testing.assert_allclose(ours, placed(list(expected)), atol=1e-9)
     assert read["hash"].startswith("flexcal_")
+
+
+def test_the_makers_own_description_keeps_its_frames(tmp_path: Path) -> None:
+    """A URDF as the description makes it, all joints about z and half a turn at the base, gives back the numbers it was made of."""
+    chain = ["base_link_inertia", *LINKS]
+    parts = [f'<link name="{name}"/>' for name in ("base_link", *chain, "tool0")]
+    parts.append(FIXED.format("base_link", "base_link_inertia", f"0 0 {np.pi}"))
+    parts.append(FIXED.format("wrist_3", "tool0", "0 0 0"))
+    parts += [
+        REVOLUTE.format(parent, link, *(" ".join(map(str, part)) for part in (UR5[link][:3], UR5[link][3:])))
+        for parent, link in zip(chain, LINKS, strict=False)
+    ]
+    (tmp_path / "ur.urdf").write_text(f'<robot name="ur">{"".join(parts)}</robot>')
+    (tmp_path / "robot.yaml").write_text(
+        "robot: ur.urdf\npoints:\n  smr: {frame: tool0, xyz: [0.01, 0, 0.05]}\n"
+    )
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml")
+    read = yaml.safe_load(render_kinematics(model, model).text)["kinematics"]
+    for link in LINKS:
+        ours = placed([read[link][key] for key in ("x", "y", "z", "roll", "pitch", "yaw")])
+        np.testing.assert_allclose(ours, placed(list(UR5[link])), atol=1e-12)
 
 
 def test_calibrated_kinematics_stand_where_pinocchio_does(
@@ -101,7 +129,7 @@ def test_calibrated_kinematics_stand_where_pinocchio_does(
     np.testing.assert_allclose(np.array(ours), pinocchio_of(model)(q), atol=1e-12)
 
 
-def test_seven_axes_have_no_kinematics_file(tmp_path) -> None:
+def test_seven_axes_have_no_kinematics_file(tmp_path: Path) -> None:
     model = panda(tmp_path)
     with pytest.raises(FlexcalError, match="six revolute joints"):
         render_kinematics(model, model)
@@ -111,4 +139,4 @@ def test_names_stand_for_one_thing_in_sdf(tx90l: RobotModel) -> None:
     from dataclasses import replace
 
     with pytest.raises(FlexcalError, match="'link_3' stands for two things"):
-        render_sdf(replace(tx90l, points={"link_3": replace(tx90l.point(), name="link_3")}))
+        render_sdf(replace(tx90l, points={"link_3": replace(tx90l.point(), name="link_3")}), tx90l)

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, MaybeText, Robot, require_robot
+from flexcal.cli.options import Estimates, Json, MaybeText, Robot, require_robot
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -29,10 +29,7 @@ class Export(ABC):
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE", help="the file to write")]
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     json: Json = False
 
     @abstractmethod

@@ -14,7 +14,7 @@ _LENGTHS = ("a", "d", "x", "y", "z")
 
 
 def dh_table(document: Mapping[str, Any]) -> Table:
-    """One row a joint: its calibrated parameters and the change of each from nominal."""
+    """One row a joint: its calibrated parameters, each with its change from nominal below."""
     table = Table(
         title=f"{document['convention']} Denavit-Hartenberg, calibrated (change)", title_justify="left"
     )
@@ -25,7 +25,7 @@ def dh_table(document: Mapping[str, Any]) -> Table:
     for name, row in document["joints"].items():
         new, old = row["calibrated"], row["nominal"]
         table.add_row(
-            name, *(f"{_shown(key, new[key])} ({_change(key, new[key] - old[key])})" for key in keys)
+            name, *(f"{_shown(key, new[key])}\n({_change(key, new[key] - old[key])})" for key in keys)
         )
     return table
 

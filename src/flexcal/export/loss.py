@@ -8,6 +8,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, point_kinematics, reach_points, static_equilibrium
 from flexcal.model.joint_space import joint_limits
 from flexcal.units import MILLIMETRE
@@ -25,6 +26,8 @@ _TRIES = 4
 _LEAST_REACHED = 50
 _STROKE = 1.0
 """m either way, of a prismatic joint without limits."""
+_TURNS = 4 * np.pi
+"""rad: a revolute joint with a longer range counts as one without limits."""
 
 ToolMap = Callable[[np.ndarray], np.ndarray]
 """Joint positions (N, n), rad or m, to positions (N, 3), m."""
@@ -65,13 +68,14 @@ class LostTerm:
 class Loss:
     """What is lost: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
 
-    `error` is None for a robot without points, which has no tool to be off.
+    `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg.
     """
 
     terms: tuple[LostTerm, ...]
     error: Distances | None
     poses: int
     within: str
+    payload: float
 
     @property
     def sentences(self) -> tuple[str, ...]:
@@ -89,10 +93,11 @@ class Loss:
                 f"This format cannot carry {named}. What that costs is not known: robot.yaml declares no point.",
             )
         off = self.error.in_millimetres()
+        carrying = f", carrying {self.payload:.3g} kg" if self.payload > 0 else ""
         return (
             f"This format cannot carry {named}.",
             f"The tool is off by {off['mean_mm']:.3f} mm on average, {off['p95_mm']:.3f} mm in 95 % of poses and "
-            f"{off['max_mm']:.3f} mm at most, over {self.poses} random poses of the {self.within}.",
+            f"{off['max_mm']:.3f} mm at most, over {self.poses} random poses of the {self.within}{carrying}.",
         )
 
 
@@ -110,15 +115,16 @@ def measure_loss(
     what the file's own freedom leaves of it; by default all of it.
     """
     present = [term for term in terms if _leave_out(model, term) is not model]
+    payload = float(model.payload_mass[0])
     if not model.points:
-        return Loss(tuple(LostTerm(term, None) for term in present), None, 0, "joint range")
+        return Loss(tuple(LostTerm(term, None) for term in present), None, 0, "joint range", payload)
     q, within = random_poses(model, point, np.random.default_rng(0))
     full, flank = tool_positions(model, q, point=point)
     lost = []
     for term in present:
         moved = full - tool_positions(_leave_out(model, term), q, point=point, flank=flank)[0]
         lost.append(LostTerm(term, Distances.of(moved if absorb is None else absorb(q, moved))))
-    return Loss(tuple(lost), Distances.of(full - tool(q)), len(q), within)
+    return Loss(tuple(lost), Distances.of(full - tool(q)), len(q), within, payload)
 
 
 def tool_positions(
@@ -130,11 +136,21 @@ def tool_positions(
 
 
 def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator) -> tuple[np.ndarray, str]:
-    """Random joint positions (N, n) that put the target into the declared working volume, or all over the joint range without one."""
+    """Random joint positions (N, n) that put the target into the declared working volume, or all over the joint range without one.
+
+    The second value says which. Where fewer than 50 of the tries reach the volume, it is the joint range, too. Raises `FlexcalError` for
+    limits that cross.
+    """
     lower, upper = joint_limits(model)
-    stroke = np.array([_STROKE if joint.kind == "prismatic" else np.pi for joint in model.joints])
-    free = ~np.isfinite(upper - lower)
-    lower, upper = np.where(free, -stroke, lower), np.where(free, stroke, upper)
+    for joint in model.joints:
+        if joint.lower > joint.upper:
+            raise FlexcalError(
+                f"the limits of {joint.name} in {model.urdf.name} cross ({joint.lower:g} to {joint.upper:g}); correct the URDF."
+            )
+    slides = np.array([joint.kind == "prismatic" for joint in model.joints])
+    free = ~(upper - lower <= np.where(slides, np.finfo(float).max, _TURNS))
+    reach = np.where(slides, _STROKE, np.pi)
+    lower, upper = np.where(free, -reach, lower), np.where(free, reach, upper)
     box = model.config.working_volume
     if box is not None:
         wanted = rng.uniform(box.lower, box.upper, (SAMPLES // _TRIES, 3))

@@ -71,6 +71,7 @@ def render_offsets(
         remarks=tuple(remarks),
         table={
             "joints": document,
+            "without_offsets": fit.before.in_millimetres(),
             "base": None if keep_frames else _base_numbers(fit.base),
             "tool": None if keep_frames else dict(zip("xyz", fit.tool.tolist(), strict=True)),
         },

@@ -10,7 +10,8 @@ from flexcal.errors import FlexcalError
 from flexcal.export.exported import Rendered
 from flexcal.export.frames import SIX, from_six, shifted, six_numbers, transform, turned
 from flexcal.export.loss import AT_REST, ToolMap
-from flexcal.model import RobotModel
+from flexcal.export.urdf_inertials import bodiless_links, bodiless_remark
+from flexcal.model import Inertia, RobotModel
 from flexcal.model.joint import Joint
 from flexcal.model.placement import link_placement, point_placement
 
@@ -19,7 +20,7 @@ BASE = "base"
 _MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
-def render_sdf(model: RobotModel) -> Rendered:
+def render_sdf(model: RobotModel, nominal: RobotModel) -> Rendered:
     """The robot as SDFormat 1.7: geometry, inertials, viscous and Coulomb friction, a frame per point, the base fixed to the world.
 
     Raises `FlexcalError` where a link or point has the name of another, or of the base.
@@ -30,6 +31,7 @@ def render_sdf(model: RobotModel) -> Rendered:
         raise FlexcalError(
             f"the name '{twice[0]}' stands for two things in the SDF; rename the point or link."
         )
+    bodiless = bodiless_links(model, nominal.inertias)
     root = ET.Element("sdf", version=VERSION)
     body = ET.SubElement(root, "model", name=model.name)
     ET.SubElement(body, "link", name=BASE)
@@ -38,7 +40,9 @@ def render_sdf(model: RobotModel) -> Rendered:
     ET.SubElement(fixed, "child").text = BASE
     for i, joint in enumerate(model.joints):
         parent = BASE if joint.parent < 0 else model.joints[joint.parent].link
-        _add_link(body, model, i, parent)
+        _add_link(
+            body, model, i, parent, nominal.inertias[i] if joint.link in bodiless else model.inertias[i]
+        )
         _add_joint(body, model, i, parent)
     for name in model.points:
         carrier, position, rotation = point_placement(model, name)
@@ -54,6 +58,7 @@ def render_sdf(model: RobotModel) -> Rendered:
         remarks=(
             "Fixed and locked links are merged into those that carry them, rotors and payload are left out.",
             "Looks and collision bodies stay in the URDF.",
+            *bodiless_remark(bodiless),
         ),
     )
 
@@ -85,8 +90,8 @@ def sdf_tool(model: RobotModel, text: str) -> ToolMap:
     return positions
 
 
-def _add_link(body: ET.Element, model: RobotModel, i: int, parent: str) -> None:
-    joint, inertia = model.joints[i], model.inertias[i]
+def _add_link(body: ET.Element, model: RobotModel, i: int, parent: str, inertia: Inertia) -> None:
+    joint = model.joints[i]
     link = ET.SubElement(body, "link", name=joint.link)
     ET.SubElement(link, "pose", relative_to=parent).text = _pose(*link_placement(model, i))
     inertial = ET.SubElement(link, "inertial")

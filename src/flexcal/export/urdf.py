@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.export.exported import Exported, Rendered, write_rendered
 from flexcal.export.loss import AT_REST, ToolMap
-from flexcal.export.urdf_inertials import write_inertials
+from flexcal.export.urdf_inertials import bodiless_remark, write_inertials
 from flexcal.model import RobotModel
 from flexcal.model.placement import link_placement, point_placement
 from flexcal.model.rotations import rotation_rpy, rpy_rotation
@@ -68,12 +68,7 @@ def urdf_tool(model: RobotModel, text: str) -> ToolMap:
 
 def _remarks(model: RobotModel, bodiless: tuple[str, ...]) -> tuple[str, ...]:
     """One sentence for each thing of the dynamics that the file lacks."""
-    found = []
-    if bodiless:
-        found.append(
-            f"No body can have the inertials identified for {', '.join(bodiless)}, which stay nominal; identify dynamics "
-            "with --estimator sdp."
-        )
+    found = [*bodiless_remark(bodiless)]
     if any(f"{name}.rotor_inertia" in model.posterior.parameters for name in model.joint_names):
         found.append(
             "Rotor inertia, friction and torque offset of the drives stay in estimates.yaml: torques need them besides."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
-from collections.abc import Container, Iterator
+from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
@@ -19,20 +19,35 @@ def write_inertials(model: RobotModel, root: ET.Element) -> tuple[str, ...]:
 
     Only what differs from the URDF is touched. What hangs on a link by fixed or locked joints is part of it: its own inertials go.
     """
-    left: list[str] = []
     nominal = read_urdf(model.urdf, model.config.locked).inertias
+    left = bodiless_links(model, nominal)
     for joint, ours, theirs in zip(model.joints, model.inertias, nominal, strict=True):
-        if _same(ours, theirs):
-            continue
-        if not is_body(model.values, joint.link):
-            left.append(joint.link)
+        if _same(ours, theirs) or joint.link in left:
             continue
         carrier, *others = _rigid_body(root, joint.link, model.config.locked)
         for link in (carrier, *others):
             for inertial in link.findall("inertial"):
                 link.remove(inertial)
         _add_inertial(carrier, ours)
-    return tuple(left)
+    return left
+
+
+def bodiless_links(model: RobotModel, nominal: Sequence[Inertia]) -> tuple[str, ...]:
+    """Links that were identified with inertials which no body has, beside their `nominal` ones."""
+    return tuple(
+        joint.link
+        for joint, ours, theirs in zip(model.joints, model.inertias, nominal, strict=True)
+        if not _same(ours, theirs) and not is_body(model.values, joint.link)
+    )
+
+
+def bodiless_remark(links: tuple[str, ...]) -> tuple[str, ...]:
+    """One sentence on links whose identified inertials are not written, if there are any."""
+    if not links:
+        return ()
+    return (
+        f"No body can have the inertials identified for {', '.join(links)}, which stay nominal; identify dynamics with --estimator sdp.",
+    )
 
 
 def _same(one: Inertia, other: Inertia) -> bool:

@@ -63,7 +63,7 @@ def export_mjcf(robot: Path, out: Path, *, estimates: Path | None = None) -> Exp
 
 def export_sdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
     """Write the robot as SDFormat."""
-    return _export(robot, out, estimates, lambda model, _: render_sdf(model))
+    return _export(robot, out, estimates, render_sdf)
 
 
 def export_json(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
