@@ -123,7 +123,7 @@ def test_slides_and_branches(tree: RobotModel, erroneous, rng: np.random.Generat
     nominal = RobotModel.from_yaml(robot)
     wrong = erroneous(nominal)
     found = render_dh(wrong, nominal, "modified")
-    assert any("to_right, to_finger does not move the point 'held'" in remark for remark in found.remarks)
+    assert any("do not move the point 'held': to_right, to_finger" in remark for remark in found.remarks)
     rows, q = table_of(found.text), rng.uniform(-1, 1, (20, 6))
     expected = point_kinematics(wrong, q, jacobians=False)
     for k, own in enumerate(q):

@@ -138,5 +138,5 @@ def test_seven_axes_have_no_kinematics_file(tmp_path: Path) -> None:
 def test_names_stand_for_one_thing_in_sdf(tx90l: RobotModel) -> None:
     from dataclasses import replace
 
-    with pytest.raises(FlexcalError, match="'link_3' stands for two things"):
+    with pytest.raises(FlexcalError, match="'link_3' would stand for two things"):
         render_sdf(replace(tx90l, points={"link_3": replace(tx90l.point(), name="link_3")}), tx90l)

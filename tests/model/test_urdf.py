@@ -106,6 +106,12 @@ def test_what_only_the_parser_sees_is_said_in_its_words(tmp_path: Path) -> None:
     assert "\n" not in str(caught.value)
 
 
+def test_a_joint_and_a_link_of_one_name(tmp_path: Path) -> None:
+    (tmp_path / "arm.urdf").write_text(ARM.replace('name="shoulder"', 'name="base"'))
+    with pytest.raises(InputError, match=r"arm\.urdf: a joint and a link have one name .*base.* rename one"):
+        read_urdf(tmp_path / "arm.urdf", {})
+
+
 @pytest.mark.parametrize("text", ["<robot name='x'/>", "<sdf/>", "<robot name='x'><link name='a'/></robot>"])
 def test_files_that_are_no_robot(tmp_path: Path, text: str) -> None:
     (tmp_path / "arm.urdf").write_text(text)

@@ -72,12 +72,11 @@ def render_dh(
     left = [name for i, name in enumerate(model.joint_names) if i not in axes.joints]
     remarks = _remarks(before, after, [name for name, _ in names], four_parameters)
     if left:
-        remarks += (f"{', '.join(left)} does not move the point '{target}' and is not in the table.",)
-    documents = {
-        name: {"type": kind, "nominal": old, "calibrated": new}
+        remarks += (f"Not in the table, for they do not move the point '{target}': {', '.join(left)}.",)
+    base, *joints, tool = (
+        (name, {"type": kind, "nominal": old, "calibrated": new})
         for (name, kind, old), (_, _, new) in zip(*rows, strict=True)
-    }
-    base, tool = documents.pop("base"), documents.pop("tool")
+    )
     return Rendered(
         text,
         _tool_map(text, convention, list(axes.joints)),
@@ -89,7 +88,7 @@ def render_dh(
             f"from the robot's base to the first frame, and from the last frame to the point '{target}'.",
         ),
         remarks=remarks,
-        table={"convention": convention, "joints": documents, "base": base, "tool": tool},
+        table={"convention": convention, "joints": dict(joints), "base": base[1], "tool": tool[1]},
         point=target,
     )
 
@@ -98,21 +97,17 @@ def dh_transforms(
     text: str, convention: Convention, column: str = "calibrated"
 ) -> Callable[[np.ndarray], np.ndarray]:
     """Forward kinematics that a table's `text` says by itself: positions (N, m) of its joints, rad or m, to frames (N, 4, 4)."""
-    rows: dict[str, dict[str, float]] = {}
-    types: dict[str, str] = {}
-    lines = (line for line in text.splitlines() if not line.startswith("#"))
-    for row in csv.DictReader(lines):
-        rows.setdefault(row["joint"], {})[row["parameter"]] = float(row[column])
-        types[row["joint"]] = row["type"]
-    joints = [name for name in rows if types[name] != "fixed"]
-    base, tool = (from_six(rows[name]) for name in rows if types[name] == "fixed")
+    rows: dict[tuple[str, str], dict[str, float]] = {}
+    for row in csv.DictReader(line for line in text.splitlines() if not line.startswith("#")):
+        rows.setdefault((row["joint"], row["type"]), {})[row["parameter"]] = float(row[column])
+    base, tool = (from_six(rows[name, "fixed"]) for name in ("base", "tool"))
+    joints = [(kind, row) for (_, kind), row in rows.items() if kind != "fixed"]
 
     def frames(q: np.ndarray) -> np.ndarray:
         at = np.broadcast_to(base, (len(q), 4, 4))
-        for k, name in enumerate(joints):
-            row, moved = rows[name], q[:, k]
-            turn = row["theta"] + (moved if types[name] == "revolute" else 0.0 * moved)
-            shift = row["d"] + (moved if types[name] == "prismatic" else 0.0 * moved)
+        for (kind, row), moved in zip(joints, q.T, strict=True):
+            turn = row["theta"] + moved * (kind == "revolute")
+            shift = row["d"] + moved * (kind == "prismatic")
             joint = turned(Z, turn) @ shifted(Z, shift)
             link = shifted(X, row["a"]) @ turned(X, row["alpha"]) @ turned(Y, row["beta"])
             at = at @ (joint @ link if convention == "standard" else link @ joint)

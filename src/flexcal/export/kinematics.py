@@ -33,6 +33,8 @@ from flexcal.model.urdf_xml import read_elements
 LINKS = ("shoulder", "upper_arm", "forearm", "wrist_1", "wrist_2", "wrist_3")
 _TURNED_BASE = "base_link_inertia"
 _FLANGE = "tool0"
+_ALPHA = np.pi / 2 * np.array([1, 0, 0, 1, -1, 0])
+_ALIKE = np.deg2rad(1.0)
 
 
 def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
@@ -59,6 +61,7 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
     for k in range(1, 6):
         link = link_transform(after.a[k - 1], after.alpha[k - 1], after.beta[k - 1])
         placements.append(link @ joint_transform(after.theta[k], after.d[k] - (back if k == 5 else 0.0)))
+    alike = np.abs(before.alpha - _ALPHA).max() < _ALIKE
     text = _yaml(placements)
     tool = joint_transform(0.0, back) @ after.tool
     xyz, vector = tool[:3, 3], rotation_vector(tool[:3, :3])
@@ -74,6 +77,13 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
             f"The point '{point}' has no place in this file; in the frame of wrist_3 it is at x, y, z = {_told(xyz)} m, turned by the "
             f"rotation vector {_told(vector)} rad: enter it as the tool.",
             "The hash is flexcal's own: a driver that compares it with the controller's calibration will say that they differ.",
+            *(
+                ()
+                if alike
+                else (
+                    f"The axes of {model.name} do not lie as those of Universal Robots' arms: the file has only their form.",
+                )
+            ),
         ),
         table={"tool": {"xyz": xyz.tolist(), "rotation_vector": vector.tolist()}},
     )

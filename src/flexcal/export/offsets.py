@@ -39,7 +39,9 @@ def render_offsets(
     ]
     left = [name for i, name in enumerate(model.joint_names) if i not in chain]
     if left:
-        remarks.append(f"{', '.join(left)} does not move the point '{target}' and has no offset here.")
+        remarks.append(
+            f"Without an offset here, for they do not move the point '{target}': {', '.join(left)}."
+        )
     frames = (
         ()
         if keep_frames

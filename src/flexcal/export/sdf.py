@@ -17,25 +17,27 @@ from flexcal.model.placement import link_placement, point_placement
 
 VERSION = "1.7"
 BASE = "base"
+_FIXED = "world_to_base"
 _MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
 def render_sdf(model: RobotModel, nominal: RobotModel) -> Rendered:
     """The robot as SDFormat 1.7: geometry, inertials, viscous and Coulomb friction, a frame per point, the base fixed to the world.
 
-    Raises `FlexcalError` where a link or point has the name of another, or of the base.
+    Raises `FlexcalError` where two links, joints or points have one name, or one has that of the base or the world.
     """
-    names = [BASE, *(joint.link for joint in model.joints), *model.points]
+    moving = [name for joint in model.joints for name in (joint.link, joint.name)]
+    names = ["world", BASE, _FIXED, *moving, *model.points]
     twice = [name for name in names if names.count(name) > 1]
     if twice:
         raise FlexcalError(
-            f"the name '{twice[0]}' stands for two things in the SDF; rename the point or link."
+            f"the name '{twice[0]}' would stand for two things in the SDF; rename the point, link or joint."
         )
     bodiless = bodiless_links(model, nominal.inertias)
     root = ET.Element("sdf", version=VERSION)
     body = ET.SubElement(root, "model", name=model.name)
     ET.SubElement(body, "link", name=BASE)
-    fixed = ET.SubElement(body, "joint", name="world_to_base", type="fixed")
+    fixed = ET.SubElement(body, "joint", name=_FIXED, type="fixed")
     ET.SubElement(fixed, "parent").text = "world"
     ET.SubElement(fixed, "child").text = BASE
     for i, joint in enumerate(model.joints):

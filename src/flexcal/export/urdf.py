@@ -51,7 +51,7 @@ def urdf_tool(model: RobotModel, text: str) -> ToolMap:
     def positions(q: np.ndarray) -> np.ndarray:
         read = pin.buildModelFromXML(text)
         read = pin.buildReducedModel(read, *locked_joints(read, model.config.locked))
-        data, frame = read.createData(), read.getFrameId(model.point().name)
+        data, frame = read.createData(), read.getFrameId(model.point().name, pin.FrameType.BODY)
         joints = [read.joints[read.getJointId(name)] for name in model.joint_names]
         result = np.zeros((len(q), 3))
         for k, own in enumerate(q):

@@ -59,7 +59,10 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
         except (ValueError, RuntimeError) as problem:
             raise InputError(f"{path}: not a valid URDF ({_first_complaint(said)}); correct it.") from problem
     _check_locked(path, model, locked)
-    model = pin.buildReducedModel(model, *locked_joints(model, locked))
+    try:
+        model = pin.buildReducedModel(model, *locked_joints(model, locked))
+    except ValueError as problem:  # Pinocchio looks frames up by name, and joints and links are both frames
+        raise InputError(f"{path}: a joint and a link have one name ({problem}); rename one.") from problem
     if model.njoints < 2:
         raise InputError(f"{path}: the URDF has no movable joint; a robot needs at least one.")
     order = [model.getJointId(name) for name in links if model.existJointName(name)]
