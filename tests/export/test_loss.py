@@ -9,13 +9,15 @@ import numpy as np
 import pytest
 
 from flexcal.export.loss import AT_REST, measure_loss, random_poses
-from flexcal.export.urdf import write_urdf
+from flexcal.export.mjcf_file import mjcf_tool, render_mjcf
+from flexcal.export.sdf import render_sdf, sdf_tool
+from flexcal.export.urdf import render_urdf, urdf_tool, write_urdf
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.model.config import BoxConfig
 
 
 def test_backlash_of_one_joint_is_its_lever_times_the_gap(tx90l: RobotModel) -> None:
-    """Half the gap of the first joint, which gravity does not load but where its bearings tilt, at the tool's distance from its axis."""
+    """Half the gap of the second joint, times the tool's distance from its axis."""
     gap = 1e-4
     rigid = replace(tx90l, bearing_frames={})
     model = rigid.with_values({"joint_2.backlash": gap})
@@ -45,3 +47,31 @@ def test_a_robot_without_points_names_what_is_lost_without_millimetres(
     export = write_urdf(replace(tx90l, points={}), tmp_path / "robot.urdf")
     assert export.loss.error is None and export.lost == ("elastic deflection",)
     assert "declares no point" in str(export)
+
+
+def test_a_transmission_error_is_its_lever_times_the_wave(tx90l: RobotModel) -> None:
+    wave = 1e-4
+    rigid = replace(tx90l, bearing_frames={})
+    model = rigid.with_values({"joint_3.transmission_2_sin": wave, "joint_1.length_x": 1e-3})
+    loss = measure_loss(model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST)
+    q, _ = random_poses(model, None, np.random.default_rng(0))
+    lever = np.linalg.norm(point_kinematics(model, q).geometry_jacobian[:, :3, 12], axis=1)
+    expected = wave * np.abs(np.sin(2 * q[:, 2])) * lever
+    assert loss.error is not None and [term.name for term in loss.terms] == ["transmission error"]
+    assert loss.error.mean == pytest.approx(expected.mean(), rel=1e-3)
+
+
+@pytest.mark.parametrize("form", ["urdf", "mjcf", "sdf"])
+def test_the_file_is_what_is_measured(tx90l: RobotModel, form: str) -> None:
+    """A millimetre that goes wrong in the text is found in the error."""
+    rigid = replace(tx90l, bearing_frames={})
+    render, read = {
+        "urdf": (render_urdf, urdf_tool),
+        "mjcf": (render_mjcf, mjcf_tool),
+        "sdf": (lambda model: render_sdf(model, tx90l), sdf_tool),
+    }[form]
+    text = render(rigid).text
+    assert "0.478" in text
+    loss = measure_loss(rigid, read(rigid, text.replace("0.478", "0.479", 1)), ())
+    assert loss.error is not None and loss.terms == ()
+    assert loss.error.mean == pytest.approx(1e-3) and loss.error.max == pytest.approx(1e-3)

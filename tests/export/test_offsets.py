@@ -71,7 +71,7 @@ def test_base_and_tool_help(tx90l: RobotModel, erroneous) -> None:
 
 
 def test_motor_values_follow_the_ratio(tx90l: RobotModel, erroneous) -> None:
-    text = render_offsets(erroneous(tx90l), tx90l).text
+    text = render_offsets(erroneous(tx90l), tx90l, keep_frames=True).text
     rows = [line.split(",") for line in text.splitlines() if ",offset," in line]
     for row, ratio in zip(rows, tx90l.ratio, strict=True):
         value, degrees, motor = float(row[3]), float(row[5]), float(row[6])

@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.errors import FlexcalError
 from flexcal.export.frames import X, Y, Z, shifted, transform, turned
 from flexcal.model import RobotModel
 from flexcal.model.joint import normals_to
@@ -57,13 +56,9 @@ class DhChain:
     x: np.ndarray
 
 
-def chain_axes(model: RobotModel, point: str) -> Axes:
-    """The axes of the joints between base and a target, geometric errors included; raises `FlexcalError` for an unknown point."""
-    last, position, rotation = point_placement(model, point)
-    chain: list[int] = []
-    while last >= 0:
-        chain.insert(0, last)
-        last = model.joints[last].parent
+def chain_axes(model: RobotModel, point: str, chain: tuple[int, ...]) -> Axes:
+    """The axes of the joints `chain` between base and a target, geometric errors included."""
+    _, position, rotation = point_placement(model, point)
     at = np.eye(4)
     points, directions = [], []
     for i in chain:
@@ -71,7 +66,7 @@ def chain_axes(model: RobotModel, point: str) -> Axes:
         points.append(axis[:3, 3])
         directions.append(axis[:3, :3] @ model.joints[i].axis)
         at = at @ transform(*link_placement(model, i))
-    return Axes(tuple(chain), np.array(points), np.array(directions), at @ transform(position, rotation))
+    return Axes(chain, np.array(points), np.array(directions), at @ transform(position, rotation))
 
 
 def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChain:
@@ -108,14 +103,6 @@ def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChai
     normals[-1] = frame[:3, 0]
     frame = frame @ joint_transform(0.0, d[-1])
     return DhChain(base, theta, d, a, alpha, beta, np.linalg.solve(frame, axes.tool), normals)
-
-
-def require_points(model: RobotModel, format_name: str) -> None:
-    """Raise `FlexcalError` for a robot without a target, to which a chain would lead."""
-    if not model.points:
-        raise FlexcalError(
-            f"{format_name} are of the chain from the base to a point, and {model.path} declares none; add one under `points:`."
-        )
 
 
 def joint_transform(theta: float, d: float) -> np.ndarray:

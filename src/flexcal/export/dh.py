@@ -10,13 +10,13 @@ from typing import Literal
 
 import numpy as np
 
+from flexcal.export.chain import chain_to
 from flexcal.export.denavit_hartenberg import (
     NEARLY_PARALLEL,
     DhChain,
     chain_axes,
     dh_chain,
     nominal_angle,
-    require_points,
 )
 from flexcal.export.exported import Rendered
 from flexcal.export.frames import X, Y, Z, from_six, shifted, six_numbers, turned
@@ -61,15 +61,13 @@ def render_dh(
     beta stands for d between axes that are nominally within 1° of parallel (Hayati, Mirmirani 1985); with `four_parameters` it is never
     used. Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    require_points(model, "Denavit-Hartenberg parameters")
-    target = model.point(point).name
-    axes = chain_axes(model, target)
-    before = dh_chain(chain_axes(nominal, target), hayati=not four_parameters)
-    after = dh_chain(axes, hayati=not four_parameters, like=before)
-    names = [(model.joints[i].name, model.joints[i].kind) for i in axes.joints]
+    target, chain = chain_to(model, point, "Denavit-Hartenberg parameters")
+    before = dh_chain(chain_axes(nominal, target, chain), hayati=not four_parameters)
+    after = dh_chain(chain_axes(model, target, chain), hayati=not four_parameters, like=before)
+    names = [(model.joints[i].name, model.joints[i].kind) for i in chain]
     rows = [_rows(chain, names, convention) for chain in (before, after)]
     text = _csv(*rows)
-    left = [name for i, name in enumerate(model.joint_names) if i not in axes.joints]
+    left = [name for i, name in enumerate(model.joint_names) if i not in chain]
     remarks = _remarks(before, after, [name for name, _ in names], four_parameters)
     if left:
         remarks += (f"Not in the table, for they do not move the point '{target}': {', '.join(left)}.",)
@@ -79,7 +77,7 @@ def render_dh(
     )
     return Rendered(
         text,
-        _tool_map(text, convention, list(axes.joints)),
+        _tool_map(text, convention, list(chain)),
         AT_REST,
         "#",
         about=(

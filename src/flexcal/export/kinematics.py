@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.export.chain import chain_to
 from flexcal.export.denavit_hartenberg import (
     Axes,
     DhChain,
@@ -19,12 +20,10 @@ from flexcal.export.denavit_hartenberg import (
     dh_chain,
     joint_transform,
     link_transform,
-    require_points,
 )
 from flexcal.export.exported import Rendered
 from flexcal.export.frames import Z, from_six, six_numbers, transform, turned
 from flexcal.export.loss import AT_REST, ToolMap
-from flexcal.export.offset_fit import chain_of
 from flexcal.model import RobotModel
 from flexcal.model.rotations import rotation_vector
 from flexcal.model.urdf import read_urdf
@@ -43,19 +42,14 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
     The last frame is at the URDF's `tool0` along the last axis, or at the last link without one. Raises `FlexcalError` for a robot that
     is not one chain of six revolute joints, or has no point at its end.
     """
-    require_points(model, "Placements of joints")
-    point = model.point().name
-    if (
-        chain_of(model, point) != list(range(6))
-        or model.n != 6
-        or {j.kind for j in model.joints} != {"revolute"}
-    ):
+    point, chain = chain_to(model, None, "Placements of joints")
+    if chain != (0, 1, 2, 3, 4, 5) or model.n != 6 or {j.kind for j in model.joints} != {"revolute"}:
         raise FlexcalError(
             f"a kinematics file is of one chain of six revolute joints, which {model.name} is not; export urdf or mdh instead."
         )
     root = _base_of_description(nominal)
-    before = dh_chain(_seen_from(root, chain_axes(nominal, point)), hayati=True)
-    after = dh_chain(_seen_from(root, chain_axes(model, point)), hayati=True, like=before)
+    before = dh_chain(_seen_from(root, chain_axes(nominal, point, chain)), hayati=True)
+    after = dh_chain(_seen_from(root, chain_axes(model, point, chain)), hayati=True, like=before)
     back = before.d[-1] - _flange_reach(nominal, root, before)
     placements = [after.base @ joint_transform(after.theta[0], after.d[0])]
     for k in range(1, 6):

@@ -47,6 +47,11 @@ def render_mjcf(model: RobotModel) -> Rendered:
         ) from problem
     text = _with_all_digits(spec.to_xml(), compiled)
     remarks = ["Looks and collision bodies stay in the URDF."]
+    held = model.payload
+    if held is not None and held.mass > 0:
+        remarks.append(
+            f"The payload of {held.mass:.3g} kg is part of the link {model.joints[held.joint].link}."
+        )
     if model.coulomb[np.isfinite(model.coulomb)].any():
         remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
     springs = [

@@ -40,11 +40,11 @@ def fit_offsets(model: RobotModel, nominal: RobotModel, point: str, *, keep_fram
     """
     q, _ = random_poses(model, point, np.random.default_rng(1))
     wanted, flank = tool_positions(model, q, point=point)
-    moving = np.isin(np.arange(model.n), chain_of(model, point))
-    fitted = _solve(nominal, q, wanted, point, moving, keep_frames=keep_frames)
-    still = _solve(nominal, q, wanted, point, np.zeros(model.n, dtype=bool), keep_frames=keep_frames)
     n = model.n
-    columns = _columns(nominal, q, fitted, point, moving, keep_frames=keep_frames)
+    free = _free(n, frames=not keep_frames)
+    fitted = _solve(nominal, q, wanted, point, free)
+    still = _solve(nominal, q, wanted, point, free & (np.arange(n + 9) >= n))
+    columns = _columns(nominal, q, fitted, point, free)
     spread = _position_spread(model, q, flank, point)
     std = np.zeros(n + 9)
     if spread.shape[1]:
@@ -70,35 +70,25 @@ def what_offsets_leave(
     nominal: RobotModel, q: np.ndarray, moved: np.ndarray, point: str, *, keep_frames: bool
 ) -> np.ndarray:
     """What the best offsets, to first order, leave of tool displacements `moved` (N, 3) at `q` (N, n)."""
-    moving = np.isin(np.arange(nominal.n), chain_of(nominal, point))
-    columns = _columns(nominal, q, np.zeros(nominal.n + 9), point, moving, keep_frames=keep_frames)
+    none, free = np.zeros(nominal.n + 9), _free(nominal.n, frames=not keep_frames)
+    columns = _columns(nominal, q, none, point, free)
     absorbed = columns @ _least_squares(columns, moved.ravel())
     return moved - absorbed.reshape(moved.shape)
 
 
-def chain_of(model: RobotModel, point: str) -> list[int]:
-    """Indices of the joints that move a target."""
-    at, chain = model.point(point).joint, []
-    while at >= 0:
-        chain.insert(0, at)
-        at = model.joints[at].parent
-    return chain
+def _free(n: int, *, frames: bool) -> np.ndarray:
+    """Which parameters of `offset_tool` are fitted, (n + 9,): all of them, or the offsets alone without `frames`."""
+    return (np.arange(n + 9) < n) | frames
 
 
 def _solve(
-    nominal: RobotModel,
-    q: np.ndarray,
-    wanted: np.ndarray,
-    point: str,
-    moving: np.ndarray,
-    *,
-    keep_frames: bool,
+    nominal: RobotModel, q: np.ndarray, wanted: np.ndarray, point: str, free: np.ndarray
 ) -> np.ndarray:
-    """Gauss-Newton from zero, (n + 9,)."""
+    """Gauss-Newton from zero over the `free` parameters, (n + 9,)."""
     found = np.zeros(nominal.n + 9)
     rest = _rest_rows(nominal.n, len(q))
     for _ in range(_STEPS):
-        columns = _columns(nominal, q, found, point, moving, keep_frames=keep_frames)
+        columns = _columns(nominal, q, found, point, free)
         missing = (wanted - offset_tool(nominal, q, found, point)).ravel()
         rows, right = np.vstack([columns, rest]), np.concatenate([missing, -rest @ found])
         step = _least_squares(rows, right)
@@ -113,28 +103,21 @@ def _solve(
 
 
 def _columns(
-    nominal: RobotModel,
-    q: np.ndarray,
-    parameters: np.ndarray,
-    point: str,
-    moving: np.ndarray,
-    *,
-    keep_frames: bool,
+    nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, point: str, free: np.ndarray
 ) -> np.ndarray:
-    """Derivative (3 N, n + 9) of `offset_tool` by its parameters; those that stay have none."""
+    """Derivative (3 N, n + 9) of `offset_tool` by its parameters, zero for those that are not `free`."""
     n = nominal.n
     at = point_kinematics(nominal, q + parameters[:n], point=point)
     turn = vector_rotation(parameters[n + 3 : n + 6])
     columns = np.zeros((len(q), 3, n + 9))
     by_offset = at.geometry_jacobian[:, :, : 6 * n : 6]
     lever = (at.orientation @ parameters[n + 6 :])[:, :, None]
-    columns[:, :, :n] = turn @ (by_offset[:, :3] + np.cross(by_offset[:, 3:], lever, axis=1)) * moving
-    if not keep_frames:
-        where = offset_tool(nominal, q, parameters, point) - parameters[n : n + 3]
-        columns[:, :, n : n + 3] = np.eye(3)
-        columns[:, :, n + 3 : n + 6] = -np.cross(where[:, :, None], np.eye(3)[None], axis=1)
-        columns[:, :, n + 6 :] = turn @ at.orientation
-    return columns.reshape(-1, n + 9)
+    columns[:, :, :n] = turn @ (by_offset[:, :3] + np.cross(by_offset[:, 3:], lever, axis=1))
+    where = offset_tool(nominal, q, parameters, point) - parameters[n : n + 3]
+    columns[:, :, n : n + 3] = np.eye(3)
+    columns[:, :, n + 3 : n + 6] = -np.cross(where[:, :, None], np.eye(3)[None], axis=1)
+    columns[:, :, n + 6 :] = turn @ at.orientation
+    return (columns * free).reshape(-1, n + 9)
 
 
 def _least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray:

@@ -8,11 +8,11 @@ from io import StringIO
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.export.denavit_hartenberg import require_points
+from flexcal.export.chain import chain_to
 from flexcal.export.exported import Rendered
 from flexcal.export.frames import SIX, from_six, six_numbers, transform
 from flexcal.export.loss import AT_REST, GEOMETRY, ToolMap
-from flexcal.export.offset_fit import OffsetFit, chain_of, fit_offsets, offset_tool, what_offsets_leave
+from flexcal.export.offset_fit import OffsetFit, fit_offsets, offset_tool, what_offsets_leave
 from flexcal.model import RobotModel
 from flexcal.model.rotations import rotation_vector, vector_rotation
 from flexcal.units import DEGREE, MILLIMETRE
@@ -27,10 +27,8 @@ def render_offsets(
 
     Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    require_points(model, "Joint offsets")
-    target = model.point(point).name
+    target, chain = chain_to(model, point, "Joint offsets")
     fit = fit_offsets(model, nominal, target, keep_frames=keep_frames)
-    chain = chain_of(model, target)
     text = _csv(model, fit, chain, keep_frames=keep_frames)
     placed = "as it is" if keep_frames else "with base and tool placed as well as they go"
     remarks = [
@@ -114,7 +112,7 @@ def _base_numbers(base: np.ndarray) -> dict[str, float]:
     return six_numbers(transform(base[:3], vector_rotation(base[3:])))
 
 
-def _csv(model: RobotModel, fit: OffsetFit, chain: list[int], *, keep_frames: bool) -> str:
+def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_frames: bool) -> str:
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)

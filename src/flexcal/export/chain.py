@@ -1,0 +1,23 @@
+"""The chain of joints between the base and a target."""
+
+from __future__ import annotations
+
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel
+
+
+def chain_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:
+    """Name of a target (default: the first) and indices of the joints that move it, from the base on.
+
+    Raises `FlexcalError` for an unknown point, and for a robot without any, to which the `format_name` could lead.
+    """
+    if not model.points:
+        raise FlexcalError(
+            f"{format_name} are of the chain from the base to a point, and {model.path} declares none; add one under `points:`."
+        )
+    target = model.point(point)
+    at, chain = target.joint, []
+    while at >= 0:
+        chain.insert(0, at)
+        at = model.joints[at].parent
+    return target.name, tuple(chain)
