@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,11 @@ import pytest
 from panda import ALPHA_QUARTERS, A, D, panda
 
 from flexcal.errors import FlexcalError
+from flexcal.estimation import Parameter, Parameters
 from flexcal.export.dh import render_dh
 from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.names import GEOMETRY
+from flexcal.model.posterior import Posterior
 
 
 @pytest.fixture
@@ -113,6 +117,27 @@ def test_parallel_axes_need_beta(ur5: RobotModel, erroneous, pinocchio_of, rng: 
     assert "nearly parallel" in " ".join(four.remarks) and "to their common normal" in " ".join(four.remarks)
     ours = np.array([stand(far, "standard", own) for own in q])
     np.testing.assert_allclose(ours, pinocchio_of(wrong)(q), atol=1e-7)
+
+
+def test_standard_deviations_are_the_scatter(ur5: RobotModel, erroneous, rng: np.random.Generator) -> None:
+    """Of 150 robots drawn from a posterior in which everything hangs together."""
+    names = [f"{joint}.{key}" for joint in ur5.joint_names for key in GEOMETRY]
+    wrong = erroneous(ur5)
+    mixing = rng.normal(size=(len(names), len(names)))
+    root = 1e-4 * mixing / np.linalg.norm(mixing, axis=1)[:, None]
+    parameters = Parameters(Parameter(name, "1", wrong.value(name)) for name in names)
+    model = replace(wrong, posterior=Posterior(parameters, root @ root.T))
+    said = render_dh(model, ur5, "modified").table["joints"]
+    drawn = []
+    values = parameters.coordinates()[:, None] + root @ rng.normal(size=(len(names), 150))
+    for column in values.T:
+        one = wrong.with_values(dict(zip(names, column.tolist(), strict=True)))
+        joints = render_dh(one, ur5, "modified").table["joints"]
+        drawn.append([list(row["calibrated"].values()) for row in joints.values()])
+    scatter = np.std(drawn, axis=0)
+    std = np.array([list(row["std"].values()) for row in said.values()])
+    np.testing.assert_allclose(std, scatter, rtol=0.25, atol=1e-12)
+    assert (std > 1e-6).sum() >= 20
 
 
 def test_slides_and_branches(tree: RobotModel, erroneous, rng: np.random.Generator, tmp_path: Path) -> None:

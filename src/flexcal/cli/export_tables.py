@@ -14,19 +14,20 @@ _LENGTHS = ("a", "d", "x", "y", "z")
 
 
 def dh_table(document: Mapping[str, Any]) -> Table:
-    """One row a joint: its calibrated parameters, each with its change from nominal below."""
-    table = Table(
-        title=f"{document['convention']} Denavit-Hartenberg, calibrated (change)", title_justify="left"
-    )
+    """One row a joint: its calibrated parameters, below each its change from nominal and its standard deviation."""
+    title = f"{document['convention']} Denavit-Hartenberg: calibrated, (change), ± std"
+    table = Table(title=title, title_justify="left")
     table.add_column("joint")
     keys = list(next(iter(document["joints"].values()))["calibrated"])
     for key in keys:
         table.add_column(f"{key} {'mm' if key in _LENGTHS else '°'}", justify="right")
     for name, row in document["joints"].items():
-        new, old = row["calibrated"], row["nominal"]
-        table.add_row(
-            name, *(f"{_shown(key, new[key])}\n({_change(key, new[key] - old[key])})" for key in keys)
+        new, old, std = row["calibrated"], row["nominal"], row["std"]
+        lines = (
+            (_shown(key, new[key]), f"({_change(key, new[key] - old[key])})", _spread(key, std))
+            for key in keys
         )
+        table.add_row(name, *("\n".join(filter(None, cell)) for cell in lines))
     return table
 
 
@@ -65,3 +66,7 @@ def _shown(key: str, value: float) -> str:
 
 def _change(key: str, value: float) -> str:
     return f"{value / MILLIMETRE:+z.3f}" if key in _LENGTHS else f"{remainder(value, 2 * pi) / DEGREE:+z.4f}"
+
+
+def _spread(key: str, std: Mapping[str, float] | None) -> str:
+    return "" if std is None or not std[key] else f"± {_shown(key, std[key])}"

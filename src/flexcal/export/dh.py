@@ -21,6 +21,7 @@ from flexcal.export.denavit_hartenberg import (
 from flexcal.export.exported import Rendered
 from flexcal.export.frames import X, Y, Z, from_six, shifted, six_numbers, turned
 from flexcal.export.loss import AT_REST, ToolMap
+from flexcal.export.spread import posterior_spread
 from flexcal.model import RobotModel
 
 Convention = Literal["standard", "modified"]
@@ -31,7 +32,7 @@ UNITS = {
     "theta": "rad", "d": "m", "a": "m", "alpha": "rad", "beta": "rad",
     "x": "m", "y": "m", "z": "m", "roll": "rad", "pitch": "rad", "yaw": "rad",
 }  # fmt: skip
-COLUMNS = ("joint", "type", "parameter", "unit", "nominal", "calibrated", "difference")
+COLUMNS = ("joint", "type", "parameter", "unit", "nominal", "calibrated", "difference", "std")
 _ORDER = {
     "standard": ("theta", "d", "a", "alpha", "beta"),
     "modified": ("alpha", "a", "beta", "theta", "d"),
@@ -63,17 +64,22 @@ def render_dh(
     """
     target, chain = chain_to(model, point, "Denavit-Hartenberg parameters")
     before = dh_chain(chain_axes(nominal, target, chain), hayati=not four_parameters)
-    after = dh_chain(chain_axes(model, target, chain), hayati=not four_parameters, like=before)
     names = [(model.joints[i].name, model.joints[i].kind) for i in chain]
-    rows = [_rows(chain, names, convention) for chain in (before, after)]
-    text = _csv(*rows)
+
+    def calibrated(changed: RobotModel) -> DhChain:
+        return dh_chain(chain_axes(changed, target, chain), hayati=not four_parameters, like=before)
+
+    after = calibrated(model)
+    old, new = (_rows(dh, names, convention) for dh in (before, after))
+    std = _std(model, new, lambda changed: _rows(calibrated(changed), names, convention))
+    text = _csv(old, new, std)
     left = [name for i, name in enumerate(model.joint_names) if i not in chain]
     remarks = _remarks(before, after, [name for name, _ in names], four_parameters)
     if left:
         remarks += (f"Not in the table, for they do not move the point '{target}': {', '.join(left)}.",)
     base, *joints, tool = (
-        (name, {"type": kind, "nominal": old, "calibrated": new})
-        for (name, kind, old), (_, _, new) in zip(*rows, strict=True)
+        (name, {"type": kind, "nominal": was, "calibrated": now, "std": spread})
+        for (name, kind, was), (_, _, now), spread in zip(old, new, std, strict=True)
     )
     return Rendered(
         text,
@@ -84,6 +90,7 @@ def render_dh(
             *_SAYS[convention],
             "q adds to theta, or to d of a prismatic joint. The rows base and tool are Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll): "
             f"from the robot's base to the first frame, and from the last frame to the point '{target}'.",
+            "std: what the uncertainty of the calibrated parameters makes of each.",
         ),
         remarks=remarks,
         table={"convention": convention, "joints": dict(joints), "base": base[1], "tool": tool[1]},
@@ -131,16 +138,38 @@ def _rows(chain: DhChain, names: list[tuple[str, str]], convention: Convention) 
     return [*rows, ("tool", "fixed", six_numbers(chain.tool))]
 
 
-def _csv(nominal: list[Row], calibrated: list[Row]) -> str:
+def _std(
+    model: RobotModel, rows: list[Row], rows_of: Callable[[RobotModel], list[Row]]
+) -> list[dict[str, float] | None]:
+    """Standard deviations of the joints' `rows`; None for base and tool, and where nothing was estimated."""
+
+    def change(changed: RobotModel) -> np.ndarray:
+        found = []
+        for (_, _, now), (_, _, was) in zip(rows_of(changed)[1:-1], rows[1:-1], strict=True):
+            found += [_difference(key, now[key], was[key]) for key in was]
+        return np.array(found)
+
+    spread = np.linalg.norm(posterior_spread(model, change), axis=1)
+    if not spread.any():
+        return [None] * len(rows)
+    values = iter(spread.tolist())
+    return [None, *({key: next(values) for key in row} for _, _, row in rows[1:-1]), None]
+
+
+def _difference(key: str, one: float, other: float) -> float:
+    change = one - other
+    return math.remainder(change, 2 * math.pi) if UNITS[key] == "rad" else change
+
+
+def _csv(nominal: list[Row], calibrated: list[Row], std: list[dict[str, float] | None]) -> str:
     stream = StringIO()
     writer = csv.writer(stream, lineterminator="\n")
     writer.writerow(COLUMNS)
-    for (name, kind, old), (_, _, new) in zip(nominal, calibrated, strict=True):
+    for (name, kind, old), (_, _, new), spread in zip(nominal, calibrated, std, strict=True):
         for key in new:
-            change = new[key] - old[key]
-            if UNITS[key] == "rad":
-                change = math.remainder(change, 2 * math.pi)
-            writer.writerow([name, kind, key, UNITS[key], repr(old[key]), repr(new[key]), repr(change)])
+            change = repr(_difference(key, new[key], old[key]))
+            known = "" if spread is None else repr(spread[key])
+            writer.writerow([name, kind, key, UNITS[key], repr(old[key]), repr(new[key]), change, known])
     return stream.getvalue()
 
 

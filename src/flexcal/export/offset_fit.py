@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.export.loss import Distances, random_poses, tool_positions
+from flexcal.export.spread import posterior_spread
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.model.rotations import rotation_vector, vector_rotation
 
@@ -45,14 +46,10 @@ def fit_offsets(model: RobotModel, nominal: RobotModel, point: str, *, keep_fram
     fitted = _solve(nominal, q, wanted, point, free)
     still = _solve(nominal, q, wanted, point, free & (np.arange(n + 9) >= n))
     columns = _columns(nominal, q, fitted, point, free)
-    spread = _position_spread(model, q, flank, point)
-    std = np.zeros(n + 9)
-    if spread.shape[1]:
-        response = _least_squares(
-            np.vstack([columns, _rest_rows(n, len(q))]),
-            np.vstack([spread, np.zeros((9, spread.shape[1]))]),
-        )
-        std = np.linalg.norm(response, axis=1)
+    spread = posterior_spread(model, lambda m: tool_positions(m, q, point=point, flank=flank)[0].ravel())
+    rows = np.vstack([columns, _rest_rows(n, len(q))])
+    response = _least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
+    std = np.linalg.norm(response, axis=1)
     before = Distances.of(wanted - offset_tool(nominal, q, still, point))
     return OffsetFit(fitted[:n], std[:n], fitted[n : n + 6], fitted[n + 6 :], before)
 
@@ -128,27 +125,3 @@ def _least_squares(rows: np.ndarray, right: np.ndarray) -> np.ndarray:
 
 def _rest_rows(n: int, poses: int) -> np.ndarray:
     return _REST * np.sqrt(3 * poses) * np.eye(n + 9)[n:]
-
-
-def _position_spread(model: RobotModel, q: np.ndarray, flank: np.ndarray, point: str) -> np.ndarray:
-    """What one standard deviation in each independent direction of the posterior moves the target by, (3 N, directions), m."""
-    posterior = model.posterior
-    known = [name for name in posterior.parameters.names if posterior.determines(name)]
-    parameters = posterior.parameters.subset(known)
-    covariance = posterior.marginal(known)
-    std = np.sqrt(np.diag(covariance))
-    centre = parameters.coordinates()
-    slopes = []
-    for k in range(len(known)):
-        sides = []
-        for sign in (1, -1):
-            moved = centre.copy()
-            moved[k] += sign * std[k]
-            values = dict(zip(known, parameters.natural(moved).tolist(), strict=True))
-            sides.append(tool_positions(model.with_values(values), q, point=point, flank=flank)[0])
-        slopes.append((sides[0] - sides[1]).ravel() / 2)
-    if not slopes:
-        return np.zeros((q.size // model.n * 3, 0))
-    correlation = covariance / np.outer(std, std)
-    values, vectors = np.linalg.eigh(correlation)
-    return np.column_stack(slopes) @ (vectors * np.sqrt(np.clip(values, 0, None)))
