@@ -7,7 +7,6 @@ from io import StringIO
 
 import numpy as np
 
-from flexcal.errors import InputError
 from flexcal.export.chain import chain_to
 from flexcal.export.exported import Rendered
 from flexcal.export.frames import SIX, from_six, six_numbers, transform
@@ -39,6 +38,10 @@ def render_offsets(
     if left:
         remarks.append(
             f"Without an offset here, for they do not move the point '{target}': {', '.join(left)}."
+        )
+    if model.config.drives.coupling:
+        remarks.append(
+            "Values at the motor are by its own ratio alone: couplings between motors are not in them."
         )
     frames = (
         ()
@@ -81,17 +84,13 @@ def render_offsets(
 
 
 def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
-    """Parameters (n + 9,) of `offset_tool` that a table's `text` holds; raises `InputError` for a joint that the robot does not have."""
+    """Parameters (n + 9,) of `offset_tool` that a table's `text` holds; raises `FlexcalError` for a joint that the robot does not have."""
     found = np.zeros(nominal.n + 9)
     pose: dict[str, float] = dict.fromkeys(SIX, 0.0)
     lines = (line for line in text.splitlines() if not line.startswith("#"))
     for row in csv.DictReader(lines):
         value = float(row["value"])
         if row["parameter"] == "offset":
-            if row["joint"] not in nominal.joint_names:
-                raise InputError(
-                    f"the table has an offset of '{row['joint']}', which {nominal.name} does not have."
-                )
             found[nominal.joint_index(row["joint"])] = value
         elif row["joint"] == "tool":
             found[nominal.n + 6 + "xyz".index(row["parameter"])] = value
