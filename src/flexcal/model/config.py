@@ -84,7 +84,7 @@ class CouplingConfig:
 class DrivesConfig:
     """Drive values referred to the joint, one entry per joint: kg m², N m s/rad, N m, turns per turn.
 
-    `ratio` and `coupling` are for the identification of dynamics.
+    `ratio` is for exported joint offsets, `coupling` for the identification of dynamics.
     """
 
     rotor_inertia: tuple[float, ...] | None = None
