@@ -30,6 +30,7 @@ def _any_number(metavar: str, kind: Callable[[str], Any]) -> PrimitiveConstructo
 
 Paths = Annotated[tuple, _any_number("FILE...", Path)]
 Numbers = Annotated[tuple, _any_number("X...", float)]
+Texts = Annotated[tuple, _any_number("TEXT...", str)]
 PoseFiles = Annotated[
     Positional[Paths],
     arg(

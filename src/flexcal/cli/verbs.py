@@ -64,6 +64,26 @@ STEPS = (
         ),
     ),
     Step(
+        "Begin with a robot of your own",
+        (
+            Verb(
+                ("init",),
+                "init",
+                "Init",
+                "a robot.yaml for its URDF, with comments on what to complete",
+                "flexcal init robot.urdf",
+                ("robot.yaml",),
+            ),
+            Verb(
+                ("import",),
+                "import_file",
+                "Import",
+                "measurements with other columns and units to flexcal's; says what it guessed",
+                "flexcal import robot.yaml measured.csv --out poses.csv",
+            ),
+        ),
+    ),
+    Step(
         "Before that, where CAD does not know the masses well: inertias and friction, from recordings of exciting motion",
         (
             Verb(

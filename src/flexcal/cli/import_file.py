@@ -1,0 +1,127 @@
+"""`flexcal import`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Optional
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, MaybePath, Robot, Texts, require_robot
+from flexcal.errors import InputError
+from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.workflow.import_file import ImportedFile
+
+_MOVED = 0.02
+"""A point that fits better so far (m) from where it was declared is worth a word."""
+
+
+@dataclass(frozen=True)
+class Import:
+    """Turn measurements with other names and units into flexcal's columns in SI units: measured poses, or a log of joints.
+
+    FILE is text with separators, Excel, MAT up to version 7, Parquet, or a ROS recording (MCAP, rosbag2). Columns are recognised by the
+    joints' names, usual words and numbers; units where they stand beside the names, else by magnitude. What was guessed is shown on the
+    first rows, and what is left out is named. Without --out nothing is written.
+
+    Then the nominal robot is laid through the points. Where it cannot be, nothing is written, and what would explain it is proposed.
+    """
+
+    robot: Robot
+    file: Annotated[Positional[Path], arg(metavar="FILE", help="the measurements; of a rosbag2, the folder")]
+    map: Annotated[Texts, arg(metavar="NAME=COLUMN...", help_behavior_hint="(default: as guessed)")] = ()
+    """What columns are, over the guess: q2=-J2[deg]+90 x=X[mm] tau1=12.5*I1[A] temperature=none, in quotes where there are spaces."""
+    out: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show the guess)")
+    ] = None
+    """The file to write, CSV or Parquet."""
+    sheet: Annotated[
+        Optional[str],  # noqa: UP045
+        arg(metavar="NAME", help_behavior_hint="(default: the first)"),
+    ] = None
+    """Sheet of an Excel file."""
+    topic: Annotated[
+        Optional[str],  # noqa: UP045
+        arg(metavar="NAME", help_behavior_hint="(default: the only one)"),
+    ] = None
+    """Topic of the measured points in a ROS recording."""
+    unchecked: bool = False
+    """Write although the nominal robot does not go with the points."""
+    write_signals: bool = False
+    """Also add the block 'signals:' to robot.yaml, at its end, so that files with these columns are read as they are."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Import, and show what was guessed."""
+        from flexcal.cli.import_tables import first_rows_table
+        from flexcal.workflow.import_file import import_file
+
+        require_robot(self.robot, self.file)
+        console = Console(self.json)
+        found = import_file(
+            self.robot,
+            self.file,
+            mapped=self.map,
+            out=self.out,
+            sheet=self.sheet,
+            topic=self.topic,
+            unchecked=self.unchecked,
+        )
+        console.show(first_rows_table(found))
+        for left in found.left_out:
+            console.say(f"left out: {left.column}: {left.why}")
+        for remark in found.remarks:
+            console.say(remark)
+        self._say_fit(console, found)
+        if not found.trusted and not self.unchecked:
+            raise InputError(self._doubt(found))
+        if self.write_signals:
+            self._add_signals(console, found)
+        if self.out is not None:
+            rows = len(next(iter(found.columns.values())))
+            console.say(f"wrote {self.out}: {rows} rows")
+        console.finish(found.document(), self._following(found))
+
+    def _say_fit(self, console: Console, found: ImportedFile) -> None:
+        fit = found.misfit
+        if fit is None:
+            return
+        console.say(f"the nominal robot, laid through the points, misses them by {fit.rms / MILLIMETRE:.2f} mm (rms)")
+        shift = float(((fit.moved - found.model.point().xyz) ** 2).sum() ** 0.5)
+        if not fit.doubtful and shift > _MOVED and fit.moved_rms < 0.5 * fit.rms:
+            place = ", ".join(f"{value:.3f}" for value in fit.moved)
+            console.say(
+                f"with the point at [{place}] in its frame only {fit.moved_rms / MILLIMETRE:.2f} mm: check its xyz under `points:` in {self.robot}"
+            )
+
+    def _doubt(self, found: ImportedFile) -> str:
+        fit = found.misfit
+        assert fit is not None
+        share = f"{100 * fit.moved_rms / fit.reach:.0f} % of its reach"
+        what = f"{self.file}: the points are not this robot's as the columns are read: it misses them by {share}"
+        if not fit.proposal:
+            return f"{what}; check the order, units and signs of the columns, or write them with --unchecked."
+        options = "".join(f" '{option}'" for option in fit.options)
+        return f"{what}; {fit.proposal}" + (f": --map{options}" if options else "; correct the file") + "."
+
+    def _add_signals(self, console: Console, found: ImportedFile) -> None:
+        from flexcal.workflow.signals_block import add_signals
+
+        if not found.signals:
+            console.say("robot.yaml needs no `signals:` for these columns")
+            return
+        add_signals(self.robot, found.signals)
+        console.say(f"added `signals:` to {self.robot}")
+
+    def _following(self, found: ImportedFile) -> str:
+        if self.out is None:
+            return f"if the guess is right, the same with --out {'log' if found.kind == 'log' else 'poses'}.csv, else with --map"
+        if found.kind == "log":
+            return f"flexcal identify dynamics {self.robot} {self.out}"
+        if found.kind == "joints":
+            return f"flexcal design poses {self.robot} --from {self.out} --out plan.yaml"
+        return f"flexcal calibrate {self.robot} {self.out}, or flexcal verify on poses that were kept for that"

@@ -1,0 +1,53 @@
+"""`flexcal init`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Optional
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Folder, Json
+
+
+@dataclass(frozen=True)
+class Init:
+    """Begin with a robot of your own: write a robot.yaml for its URDF, with comments on what to complete.
+
+    The joints of a gripper, and others beside the arm, are locked; the frame that carries the reflector is guessed from its name. Both
+    are said. The URDF stays where it is.
+    """
+
+    urdf: Annotated[Positional[Path], arg(metavar="URDF", help="the robot's URDF, not xacro")]
+    out: Folder = Path(".")
+    """Folder for robot.yaml."""
+    tip: Annotated[
+        Optional[str],  # noqa: UP045
+        arg(metavar="LINK", help_behavior_hint="(default: the end of the one long chain)"),
+    ] = None
+    """The link where the arm ends, for a URDF with several arms."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Write it, and say what was guessed."""
+        from flexcal.workflow.init_robot import init_robot
+
+        console = Console(self.json)
+        found = init_robot(self.urdf, self.out, tip=self.tip)
+        arm, model = found.arm, found.model
+        console.say(f"{model.name}: {model.n} joints ({', '.join(model.joint_names)}), reach {model.reach:.2f} m")
+        if arm.locked:
+            stand = ", ".join(f"{name} at {value:g}" for name, value in arm.locked.items())
+            console.say(f"no part of the arm, locked: {stand}")
+        others = f"; also there: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
+        console.say(f"the reflector is taken to sit in the frame {arm.frame}{others}")
+        for remark in found.remarks:
+            console.say(remark)
+        console.say(f"wrote {found.file}")
+        console.finish(
+            found.document(),
+            f"put the place of the reflector under `points:` in {found.file}, then flexcal design poses {found.file} "
+            f"--out {self.out / 'poses.yaml'}; or, with measurements at hand, flexcal import {found.file} FILE",
+        )

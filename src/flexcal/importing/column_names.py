@@ -1,0 +1,81 @@
+"""What the name of a column says: words, a number, a unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+
+_UNITS = {
+    "deg": ("deg", "degree", "degrees", "degs", "°", "º", "grad"),
+    "rad": ("rad", "rads", "radian", "radians"),
+    "turn": ("turn", "turns", "rev"),
+    "m": ("m", "meter", "meters", "metre", "metres"),
+    "mm": ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
+    "um": ("um", "µm", "μm", "micron", "microns"),
+    "s": ("s", "sec", "second", "seconds"),
+    "ms": ("ms", "msec", "millisecond", "milliseconds"),
+    "us": ("us", "µs", "μs", "usec"),
+    "rad/s": ("rad/s", "rad/sec", "rads^-1"),
+    "deg/s": ("deg/s", "°/s", "deg/sec", "grad/s"),
+    "rpm": ("rpm", "1/min", "u/min"),
+    "m/s": ("m/s",),
+    "mm/s": ("mm/s",),
+    "rad/s^2": ("rad/s^2", "rad/s²", "rad/s2"),
+    "deg/s^2": ("deg/s^2", "deg/s²", "deg/s2", "°/s²", "°/s^2"),
+    "N m": ("nm", "n m", "n*m", "n·m", "newtonmeter"),
+    "N": ("n",),
+    "A": ("a", "amp", "amps", "ampere"),
+    "mA": ("ma",),
+    "kg": ("kg",),
+    "g": ("g",),
+}
+_SPELLINGS = {spelling: unit for unit, spellings in _UNITS.items() for spelling in spellings}
+_OTHER_UNITS = ("-", "1", "c", "°c", "degc", "k", "v", "%", "none", "hz")
+_AS_WORD = {"deg", "degree", "degrees", "rad", "radian", "radians", "mm", "um", "ms", "us", "nm", "ma", "rpm", "kg"}
+"""Units that a last word of a name is taken for."""
+_LAST_WORD = {"m", "s", "a", "n"}
+"""Units that it is taken for after other words only, and no number."""
+_BRACKETS = re.compile(r"[\[({<]\s*([^\])}>]*?)\s*[\])}>]\s*$")
+_WORDS = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[θφτσω]")
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """`column` as it stands in the file; its words in lower case, without numbers and unit; the last number in it; the unit."""
+
+    column: str
+    words: tuple[str, ...]
+    number: int | None
+    unit: str | None
+
+
+def is_unit(text: str) -> bool:
+    """Whether a cell under a header is a unit, in brackets or not."""
+    plain = text.strip().strip("[](){}<>").strip().lower()
+    return plain in _SPELLINGS or plain in _OTHER_UNITS
+
+
+def unit_of(text: str) -> str | None:
+    """The unit that a text means, as `signals:` writes it."""
+    return _SPELLINGS.get(text.strip().strip("[](){}<>").strip().lower())
+
+
+def parse_name(column: str, unit: str | None = None) -> ColumnName:
+    """Take a name apart; `unit` is what the file says besides."""
+    text, found = column, None if unit is None else unit_of(unit)
+    bracket = _BRACKETS.search(column)
+    if bracket and not bracket[1].isdigit():
+        text, found = column[: bracket.start()], found or unit_of(bracket[1])
+    parts = [part.lower() for part in _WORDS.findall(text)]
+    if found is None and len(parts) > 1:
+        last = parts[-1]
+        after_words = len(parts) > 2 or not parts[0].isdigit()
+        if last in _AS_WORD or (last in _LAST_WORD and after_words and not _is_short(parts[:-1])):
+            found, parts = _SPELLINGS[last], parts[:-1]
+    numbers = [int(part) for part in parts if part.isdigit()]
+    words = tuple(part for part in parts if not part.isdigit())
+    return ColumnName(column, words, numbers[-1] if numbers else None, found)
+
+
+def _is_short(parts: list[str]) -> bool:
+    return all(len(part) < 2 and part not in ("x", "y", "z", "t") for part in parts)

@@ -1,0 +1,49 @@
+"""Which reader a file needs, by its name."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flexcal.errors import InputError
+from flexcal.importing.foreign_table import ForeignTable
+
+_TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
+_EXCEL = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
+_ROS = (".mcap", ".db3", ".bag")
+
+
+def read_foreign(path: Path, *, sheet: str | None = None, topic: str | None = None) -> ForeignTable:
+    """Read a table of another program: text with separators, Excel, MAT, Parquet, or a ROS recording.
+
+    `sheet` is that of an Excel file, `topic` that of the points in a recording. Raises `InputError` where the file cannot be read, and
+    where the library for it is not installed.
+    """
+    suffix = path.suffix.lower()
+    if not path.exists():
+        raise InputError(f"{path}: there is no such file; check the name and the folder.")
+    if suffix in _ROS or (path.is_dir() and (path / "metadata.yaml").is_file()):
+        from flexcal.importing.ros_recordings import read_ros
+
+        return read_ros(path, topic)
+    if path.is_dir():
+        raise InputError(
+            f"{path} is a folder without metadata.yaml, so no recording of ROS 2; name a file in it."
+        )
+    if suffix in _TEXT:
+        from flexcal.importing.separated_text import read_text
+
+        return read_text(path)
+    if suffix in _EXCEL:
+        from flexcal.importing.excel_files import read_excel
+
+        return read_excel(path, sheet)
+    if suffix == ".mat":
+        from flexcal.importing.mat_files import read_mat
+
+        return read_mat(path)
+    if suffix == ".parquet":
+        from flexcal.importing.parquet_files import read_parquet
+
+        return read_parquet(path)
+    known = ", ".join((*_TEXT, *_EXCEL[:2], ".mat", ".parquet", *_ROS))
+    raise InputError(f"{path}: files that end in '{suffix}' are not understood; known are {known}.")

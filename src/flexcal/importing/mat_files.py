@@ -1,0 +1,65 @@
+"""MATLAB's MAT-files up to version 7."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data.table import Table, TableFile
+from flexcal.errors import InputError
+from flexcal.importing.foreign_table import ForeignTable
+
+
+def read_mat(path: Path) -> ForeignTable:
+    """Read the variables of a MAT-file as columns, structs as name.field and matrices as name[0], name[1], …
+
+    Rows are the length that most variables share; what has another shape is left out and named. Raises `InputError` where the file is
+    none, is of version 7.3, or holds no numbers.
+    """
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
+    except NotImplementedError:
+        raise InputError(
+            f"{path}: MAT-files of version 7.3 are not read; in MATLAB, save it again with save(…, '-v7')."
+        ) from None
+    except (MatReadError, ValueError, TypeError, OSError) as problem:
+        reason = " ".join(str(problem).split()) or type(problem).__name__
+        raise InputError(f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'.") from problem
+    variables: dict[str, np.ndarray] = {}
+    others: list[str] = []
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _collect(name, value, variables, others)
+    lengths = Counter(length for value in variables.values() for length in set(value.shape) if length > 1)
+    if not lengths:
+        raise InputError(f"{path}: it holds no columns of numbers; a table object is no such: save its columns.")
+    most = max(lengths.values())
+    rows = max(length for length, count in lengths.items() if count == most)
+    columns: dict[str, np.ndarray] = {}
+    for name, value in variables.items():
+        if value.ndim == 1 and len(value) == rows:
+            columns[name] = value
+        elif value.ndim == 2 and rows in value.shape:
+            matrix = value if value.shape[0] == rows else value.T
+            columns |= {f"{name}[{k}]": matrix[:, k] for k in range(matrix.shape[1])}
+        else:
+            others.append(name)
+    notes = (f"no column of {rows} rows, left out: {', '.join(others)}",) if others else ()
+    return ForeignTable(Table(TableFile(path, tuple(columns), 1), 1, columns), notes=notes)
+
+
+def _collect(name: str, value: Any, variables: dict[str, np.ndarray], others: list[str]) -> None:
+    fields = getattr(value, "_fieldnames", None)
+    if fields is not None:
+        for field in fields:
+            _collect(f"{name}.{field}", getattr(value, field), variables, others)
+    elif isinstance(value, np.ndarray) and value.dtype.kind in "fiub" and 1 <= value.ndim <= 2:
+        variables[name] = value.astype(float)
+    else:
+        others.append(name)

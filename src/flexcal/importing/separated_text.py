@@ -1,0 +1,95 @@
+"""Tables as text: commas, semicolons, tabs or spaces, decimal points or commas, whatever precedes the header."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.table import Table, TableFile
+from flexcal.errors import InputError
+from flexcal.importing.foreign_table import ForeignTable
+from flexcal.importing.header_rows import NUMBER, find_header
+
+_SEPARATORS = ("\t", ";", ",", " ")
+_LOOKED_AT = 200
+"""Rows in which the header is looked for, and the last ones by which the separator is known."""
+
+
+def read_text(path: Path) -> ForeignTable:
+    """Read a table of text; raises `InputError` where it is empty or its rows have different lengths.
+
+    The separator is the first of tab, semicolon, comma and space that splits the last rows into as many cells each.
+    """
+    lines = _decoded(path).splitlines()
+    while lines and not lines[-1].strip():
+        lines.pop()
+    if not lines:
+        raise InputError(f"{path} line 1: the file is empty; it needs a header and rows.")
+    last = [line for line in lines[-_LOOKED_AT:] if line.strip() and not line.startswith("#")][1:] or lines
+    separator, width = _separator(path, last)
+    header = find_header(path, [_cells(line, separator) for line in lines[:_LOOKED_AT]], width, "line")
+    rows = _rows(path, lines, header.first, separator, width)
+    comma = separator != "," and any("," in cell for row in rows[-_LOOKED_AT:] for cell in row)
+    columns = {name: values([row[k] for row in rows], comma) for k, name in enumerate(header.names)}
+    first = header.first + 1
+    table = Table(TableFile(path, header.names, first), first, columns)
+    return ForeignTable(table, header.units, header.named, header.notes)
+
+
+def values(cells: Sequence[str], comma: bool = False) -> np.ndarray:
+    """Numbers (N,), NaN for what is none, or texts (N,) where most cells are none; with `comma`, decimal commas."""
+    plain = [cell.replace(",", ".") for cell in cells] if comma else cells
+    try:
+        return np.array(plain, dtype=float)
+    except ValueError:
+        numbers = np.array([float(cell) if NUMBER.fullmatch(cell) else np.nan for cell in plain])
+    filled = sum(bool(cell) for cell in cells)
+    return numbers if 2 * np.isfinite(numbers).sum() > filled else np.array(cells, dtype=str)
+
+
+def _decoded(path: Path) -> str:
+    try:
+        content = path.read_bytes()
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252", errors="replace")
+
+
+def _cells(line: str, separator: str) -> list[str]:
+    if separator == " ":
+        return line.split()
+    return [cell.strip() for cell in next(csv.reader([line], delimiter=separator), [])]
+
+
+def _separator(path: Path, rows: Sequence[str]) -> tuple[str, int]:
+    for separator in _SEPARATORS:
+        widths = {len(_cells(row, separator)) for row in rows}
+        if len(widths) == 1 and (width := widths.pop()) > 1:
+            return separator, width
+    raise InputError(
+        f"{path}: its last rows are not separated into as many values each by commas, semicolons, tabs or spaces; "
+        "export it again as CSV."
+    )
+
+
+def _rows(path: Path, lines: Sequence[str], first: int, separator: str, width: int) -> list[list[str]]:
+    rows = []
+    for number, line in enumerate(lines[first:], start=first + 1):
+        cells = _cells(line, separator)
+        if not any(cells):
+            raise InputError(f"{path} line {number}: the line is empty; remove it.")
+        if len(cells) != width:
+            raise InputError(
+                f"{path} line {number}: there are {len(cells)} values, but {width} columns; complete the line or remove it."
+            )
+        rows.append(cells)
+    return rows

@@ -1,0 +1,169 @@
+"""A robot.yaml made for a URDF, to be completed by hand."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import dataclass
+from os.path import relpath
+from pathlib import Path
+from typing import Any
+
+from flexcal.atomic import write_text
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.model.joint import Joint
+from flexcal.model.urdf_arm import Arm, find_arm
+from flexcal.units import DEGREE
+
+_PLAIN = re.compile(r"[A-Za-z_./][\w./ -]*")
+_NO_TEXT = {"true", "false", "null", "yes", "no", "on", "off"}
+
+
+@dataclass(frozen=True)
+class InitialisedRobot:
+    """The robot.yaml that was written, the robot that it describes, and what its owner should know about the URDF."""
+
+    file: Path
+    model: RobotModel
+    arm: Arm
+    remarks: tuple[str, ...]
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        return {
+            "file": self.file,
+            "robot": self.model.name,
+            "joints": list(self.model.joint_names),
+            "locked": self.arm.locked,
+            "frame": self.arm.frame,
+            "frames": list(self.arm.frames),
+            "reach_m": self.model.reach,
+            "remarks": list(self.remarks),
+        }
+
+
+def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedRobot:
+    """Write `out`/robot.yaml for a URDF, read it back, and look at masses and collision shapes.
+
+    Raises `InputError` as `find_arm` and reading a robot do, and where there is a robot.yaml already; nothing is written then.
+    """
+    arm = find_arm(urdf, tip)
+    file = out / "robot.yaml"
+    if file.exists():
+        raise InputError(f"{file} is there already and is never changed; give another folder with --out.")
+    link = relpath(urdf, out)
+    write_text(file, _minimal(link, arm))
+    try:
+        model = RobotModel.from_yaml(file, estimates=False)
+        write_text(file, _commented(link, arm, model))
+        model = RobotModel.from_yaml(file, estimates=False)
+        return InitialisedRobot(file, model, arm, tuple(_remarks(model)))
+    except BaseException:
+        file.unlink(missing_ok=True)
+        raise
+
+
+def _minimal(urdf: str, arm: Arm) -> str:
+    return f"robot: {_text(urdf)}\n{_locked(arm)}"
+
+
+def _locked(arm: Arm) -> str:
+    if not arm.locked:
+        return ""
+    listed = ", ".join(f"{_text(name)}: {value:.10g}" for name, value in arm.locked.items())
+    return f"locked: {{{listed}}}\n"
+
+
+def _commented(urdf: str, arm: Arm, model: RobotModel) -> str:
+    n = model.n
+    width = max(len(name) for name in model.joint_names)
+    rows = [f"#   q{i:<3}{joint.name:<{width}}  {_range(joint)}" for i, joint in enumerate(model.joints, 1)]
+    others = f"; also on it: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
+    zeros, gains = ", ".join(["0"] * n), ", ".join(["1.0"] * n)
+    first = _text(model.joint_names[min(1, n - 1)])
+    columns = ", ".join(f"J{i}" for i in range(1, n + 1))
+    held = f"\n# Movable joints that are no part of the arm stand still, here (rad or m):\n{_locked(arm)}"
+    return f"""# {model.name}: {n} joints. Units are m, rad, kg, s, N m. Complete `points:` before you measure; all else may wait.
+robot: {_text(urdf)}
+
+# The joints, in the order of the columns q1 … q{n} of every file:
+{chr(10).join(rows)}
+{held if arm.locked else ""}
+# What the instrument sees: the centre of the reflector, m along the axes of a frame of the URDF. {_text(arm.frame)} was guessed
+# from its name{others}. Measure xyz with a ruler, to a centimetre or so: the calibration finds the rest.
+# Off the last joint's axis (by 0.1 m, say) it also shows how far that joint turns.
+points:
+  smr: {{frame: {_text(arm.frame)}, xyz: [0.0, 0.0, 0.0]}}
+
+gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot on a wall or a ceiling
+
+# What the robot holds while it is measured: kg, and its centre of mass in the frame, m.
+# payload: {{frame: {_text(arm.frame)}, mass: 5.0, com: [0.0, 0.0, 0.1], mass_std: 0.02}}
+
+# Where the instrument stands, m in the base frame, to plan poses that it sees.
+# stations: {{tracker: {{xyz: [3.0, 0.0, 1.0], line_of_sight: true}}}}
+
+# Where the robot will work, m in the base frame: poses are chosen for it.
+# working_volume: {{lower: [0.3, -0.4, 0.1], upper: [0.8, 0.4, 0.7]}}
+
+# Joints with backlash, to have it found from the measured points.
+# geometry: {{terms: auto, backlash: [{first}]}}
+
+# Drives, referred to the joint, one number a joint: kg m², N m s/rad, N m.
+# drives:
+#   rotor_inertia: [{zeros}]
+#   viscous: [{zeros}]
+#   coulomb: [{zeros}]
+
+# Elastic joints, for the frequency experiments: a first guess of stiffness (N m/rad) and damping (N m s/rad).
+# elastic:
+#   - joint: {first}
+#     drive: {{stiffness: 1.0e5, damping: 100}}
+
+# Only for files that are read as they are; 'flexcal import' makes files in the usual columns and units instead.
+# signals:
+#   q: {{columns: [{columns}], unit: deg}}
+#   tau: {{columns: [{columns.replace("J", "I")}], unit: A, gain: [{gains}]}}     # N m/A at the joint
+"""
+
+
+def _range(joint: Joint) -> str:
+    if not math.isfinite(joint.upper - joint.lower):
+        return f"{joint.kind}, without limits"
+    if joint.kind == "prismatic":
+        return f"prismatic, {joint.lower:.4g} to {joint.upper:.4g} m"
+    degrees = f"{joint.lower / DEGREE:.4g} to {joint.upper / DEGREE:.4g} deg"
+    return f"{joint.kind}, {joint.lower:.4g} to {joint.upper:.4g} rad ({degrees})"
+
+
+def _text(name: str) -> str:
+    """A name as YAML has it, in quotes where it needs them."""
+    plain = _PLAIN.fullmatch(name) and name.strip() == name and name.lower() not in _NO_TEXT
+    return name if plain else json.dumps(name, ensure_ascii=False)
+
+
+def _remarks(model: RobotModel) -> list[str]:
+    from flexcal.design import CollisionChecker
+
+    remarks = []
+    massless = [joint.link for joint, mass in zip(model.joints, model.mass, strict=True) if not mass > 0]
+    if massless:
+        remarks.append(
+            f"the URDF gives no mass to what {', '.join(massless)} carries: nothing can be said about deflection under its weight"
+        )
+    try:
+        checker = CollisionChecker(model, floor=None)
+    except InputError as problem:
+        remarks.append(
+            f"{problem} Until then 'design poses' cannot keep the robot from hitting itself, and stops".replace(
+                "\n", " "
+            )
+        )
+        return remarks
+    if not checker.shapes:
+        remarks.append(
+            "the URDF has no collision shapes: 'design poses' cannot keep the robot from hitting itself"
+        )
+    return remarks
