@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import gc
+import io
 import os
 import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
+from contextlib import redirect_stderr
 from importlib import import_module
 
 from flexcal.cli.letters import show_near_letters
@@ -80,18 +82,24 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
     from flexcal.cli.outputs import outputs
+    from flexcal.cli.refusal import refusal, refuse_unknown_options
 
     command = getattr(import_module(f"flexcal.cli.{verb.module}"), verb.command)
+    refuse_unknown_options(verb, arguments)
+    said = io.StringIO()
     try:
-        parsed = tyro.cli(
-            command,
-            prog=f"flexcal {verb.name}",
-            args=arguments,
-            config=(tyro.conf.FlagCreatePairsOff,),
-            description=_description(command.__doc__ or "", verb.example),
-        )
-    except SystemExit as stop:  # --help, or arguments that do not parse: tyro has said so
-        return stop.code if isinstance(stop.code, int) else FAILED
+        with redirect_stderr(said):
+            parsed = tyro.cli(
+                command,
+                prog=f"flexcal {verb.name}",
+                args=arguments,
+                config=(tyro.conf.FlagCreatePairsOff,),
+                description=_description(command.__doc__ or "", verb.example),
+            )
+    except SystemExit as stop:
+        if stop.code == 0:  # --help
+            return 0
+        raise refusal(verb, said.getvalue()) from None
     with outputs(parsed.out, verb.leaves, page=verb.page):
         parsed.run()
     return 0

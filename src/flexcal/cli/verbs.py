@@ -267,6 +267,18 @@ STEPS = (
             ),
         ),
     ),
+    Step(
+        "For the shell",
+        (
+            Verb(
+                ("completion",),
+                "completion",
+                "Completion",
+                "completion of verbs, options and their choices for bash, zsh or fish",
+                "flexcal completion bash",
+            ),
+        ),
+    ),
 )
 
 VERBS = tuple(verb for step in STEPS for verb in step.verbs)

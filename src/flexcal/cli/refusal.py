@@ -1,0 +1,44 @@
+"""Arguments that do not parse: one sentence in the place of what the parser says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from flexcal.cli.verb_options import options_of
+from flexcal.cli.verbs import Verb
+from flexcal.errors import InputError
+from flexcal.structuring import suggestion
+
+_RULE = re.compile(r"^[\s─━-]+$")
+
+
+def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
+    """Raise `InputError` at the first argument that looks like an option of the verb and is none, with the nearest."""
+    known = [option.name for option in options_of(verb)]
+    for argument in arguments:
+        name = argument.partition("=")[0]
+        if not name.startswith("--") or name == "--help":
+            continue
+        plain = name.replace("_", "-")
+        if plain not in known:
+            near = suggestion(plain, known) or f"; there are {', '.join(known)}."
+            raise InputError(f"'flexcal {verb.name}' has no option {name}{near}")
+
+
+def refusal(verb: Verb, said: str) -> InputError:
+    """What the parser said in a box, as one sentence."""
+    lines = [line.strip("│|").rstrip() for line in said.splitlines() if line.strip() and line[0] not in "╭╰+"]
+    end = next((i for i, line in enumerate(lines) if _RULE.match(line)), len(lines))
+    told = lines[:end]
+    explained = f"'flexcal {verb.name} --help' explains."
+    if told and told[0].strip().startswith("Missing from"):
+        needed = [line.strip() for line in told[1:] if line.startswith("     ") and not line.startswith("      ")]
+        return InputError(f"'flexcal {verb.name}' needs {', '.join(needed)}; {explained}")
+    if told and told[0].strip().startswith("Unrecognized options:"):
+        left = told[0].partition(":")[2].strip()
+        return InputError(f"'flexcal {verb.name}' has no place for {left}; {explained}")
+    sentence = " ".join(line.strip() for line in told).rstrip(".").replace(". Expected", "; expected")
+    sentence = re.sub(r"invalid literal for int\(\) with base 10: ('.*?')", r"\1 is no whole number", sentence)
+    sentence = re.sub(r"could not convert string to float: ('.*?')", r"\1 is no number", sentence)
+    return InputError(f"{sentence[:1].lower()}{sentence[1:]}; {explained}")
