@@ -88,5 +88,6 @@ class Calibrate:
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         console.finish(
-            document, f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw"
+            document,
+            f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw (flexcal design poses --random plans some)",
         )

@@ -11,7 +11,7 @@ from typing import Annotated, Any, Literal, TypeVar
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.next_step import measuring
+from flexcal.cli.next_step import measuring, on_the_robot
 from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_robot
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
@@ -94,7 +94,7 @@ class DesignPoses:
         console.say(f"wrote {self.out}: {self.count} random poses")
         console.finish(
             drawn.document(),
-            f"{measuring(self.out, self.robot, 'unseen')}, or measure them on the robot",
+            f"{measuring(self.out, self.robot, 'unseen')}{on_the_robot(self.robot, 'unseen.csv')}",
         )
 
     def _planned(self, console: Console, plan: Callable[..., Planned]) -> Planned:
@@ -142,7 +142,7 @@ class DesignPoses:
         console.say(f"wrote {self.out}: {document['poses']} poses")
         console.finish(
             document,
-            f"{measuring(self.out, self.robot, 'measured')}, or measure them on the robot",
+            f"{measuring(self.out, self.robot, 'measured')}{on_the_robot(self.robot, 'measured.csv')}",
         )
 
     def _continue(self, console: Console) -> None:
@@ -172,7 +172,7 @@ class DesignPoses:
         console.say(f"wrote {self.out}: the next {document['poses']} poses, best first")
         console.finish(
             document,
-            f"{measuring(self.out, self.robot, 'more')}, or measure them on the robot",
+            f"{measuring(self.out, self.robot, 'more')}{on_the_robot(self.robot, 'more.csv')}",
         )
 
     def _say_pool(self, console: Console, document: Mapping[str, Any]) -> None:

@@ -58,6 +58,7 @@ class Import:
     def run(self) -> None:
         """Import, and show what was guessed."""
         from flexcal.cli.import_tables import first_rows_table
+        from flexcal.importing import reasons_of
         from flexcal.workflow.import_file import import_file
 
         require_robot(self.robot, self.file)
@@ -72,8 +73,8 @@ class Import:
             unchecked=self.unchecked,
         )
         console.show(first_rows_table(found))
-        for left in found.left_out:
-            console.say(f"left out: {left.column}: {left.why}")
+        for left in reasons_of(found.left_out):
+            console.say(f"left out: {left}")
         for remark in found.remarks:
             console.say(remark)
         self._say_fit(console, found)

@@ -20,6 +20,11 @@ def measuring(plan: Path, robot: Path, folder: str) -> str:
     return f"flexcal measure {plan}{named} --cell virtual --out {folder}"
 
 
+def on_the_robot(robot: Path, poses: str) -> str:
+    """The other way to measure poses, where the robot is a real one."""
+    return f"; or measure them on the robot, and flexcal import {robot} FILE --out {poses}"
+
+
 def reading_elsewhere(robot: Path, estimates: Path) -> str:
     """How the verbs that come next find estimates that are not beside robot.yaml."""
     return f"for the next verbs to start from it, write 'estimates: {relpath(estimates, robot.parent)}' into {robot}"

@@ -10,7 +10,8 @@ from flexcal.cli.verbs import Verb
 from flexcal.errors import InputError
 from flexcal.structuring import suggestion
 
-_RULE = re.compile(r"^[\s─━-]+$")
+_RULE = re.compile(r"^\s*[─━-]{3,}\s*$")
+_FRAME = str.maketrans("│|", "  ")
 
 
 def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
@@ -28,17 +29,30 @@ def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
 
 def refusal(verb: Verb, said: str) -> InputError:
     """What the parser said in a box, as one sentence."""
-    lines = [line.strip("│|").rstrip() for line in said.splitlines() if line.strip() and line[0] not in "╭╰+"]
-    end = next((i for i, line in enumerate(lines) if _RULE.match(line)), len(lines))
-    told = lines[:end]
+    told = _told(said)
     explained = f"'flexcal {verb.name} --help' explains."
-    if told and told[0].strip().startswith("Missing from"):
-        needed = [line.strip() for line in told[1:] if line.startswith("     ") and not line.startswith("      ")]
+    if told and told[0].startswith("Missing from"):
+        depth = min(len(line) - len(line.lstrip()) for line in told[1:])
+        needed = [line.strip() for line in told[1:] if line[depth] != " "]
         return InputError(f"'flexcal {verb.name}' needs {', '.join(needed)}; {explained}")
-    if told and told[0].strip().startswith("Unrecognized options:"):
+    if told and told[0].startswith("Unrecognized options:"):
         left = told[0].partition(":")[2].strip()
         return InputError(f"'flexcal {verb.name}' has no place for {left}; {explained}")
     sentence = " ".join(line.strip() for line in told).rstrip(".").replace(". Expected", "; expected")
     sentence = re.sub(r"invalid literal for int\(\) with base 10: ('.*?')", r"\1 is no whole number", sentence)
     sentence = re.sub(r"could not convert string to float: ('.*?')", r"\1 is no number", sentence)
     return InputError(f"{sentence[:1].lower()}{sentence[1:]}; {explained}")
+
+
+def _told(said: str) -> list[str]:
+    """The lines of a box up to its first rule inside, without the title; its frame is drawn, or blank on terminals with few letters."""
+    sections: list[list[str]] = [[]]
+    for line in said.splitlines():
+        text = line.translate(_FRAME).rstrip()
+        if _RULE.match(text):
+            sections.append([])
+        elif text.strip() and line[0] not in "╭╰":
+            sections[-1].append(text)
+    drawn = said.lstrip().startswith("╭")
+    found = sections[0] if drawn or len(sections) < 2 else sections[1]
+    return [found[0].strip(), *found[1:]] if found else []

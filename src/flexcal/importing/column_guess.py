@@ -17,8 +17,11 @@ from flexcal.importing.unit_guess import point_unit, shared_joint_units, time_un
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
 
-_POSITION = {"q", "j", "a", "e", "joint", "joints", "axis", "axes", "ax", "achse", "theta", "th", "θ", "position", "positions", "pos"}
-_POSITION |= {"angle", "angles", "jnt", "gelenk", "winkel", "state", "states", "value", "values", "encoder"}
+_JOINT = {"q", "j", "joint", "joints", "axis", "axes", "ax", "achse", "theta", "th", "θ", "jnt", "gelenk", "angle", "angles", "winkel"}
+"""Words of joint positions, whatever stands beside them; those of `_POSITION` are only with others of these, or a joint's name."""
+_POSITION = _JOINT | {"a", "position", "positions", "pos", "state", "states", "value", "values", "encoder"}
+_NO_JOINT = {"tcp", "cartesian", "pose", "error", "err", "dev", "deviation", "force", "voltage", "limit", "mode", "offset", "digital"}
+_NO_JOINT |= {"analog", "residual", "correction", "delta", "status"}
 _KINDS = (
     ("ddq", {"ddq", "qdd", "acceleration", "accelerations", "acc", "accel"}),
     ("dq", {"dq", "qd", "velocity", "velocities", "vel", "speed", "qdot", "rate"}),
@@ -30,12 +33,13 @@ _MEASURED = {"actual", "act", "ist", "measured", "meas", "measurement", "feedbac
 _COMMANDED = {"target", "desired", "des", "soll", "cmd", "command", "commanded", "ref", "reference", "nominal", "nom", "setpoint"}  # fmt: skip
 _NEUTRAL = _MEASURED | _COMMANDED | {"robot", "arm", "motor", "link", "the", "of", "in"}
 _POINT = {"x", "y", "z"}
+_FUSED = {"px": "x", "py": "y", "pz": "z"}
 _NO_POINT = {"force", "f", "error", "err", "deviation", "dev", "delta", "normal", "velocity", "vel", "v", "speed", "acc", "offset", "rpy"}  # fmt: skip
 _TURN = {"orientation", "quaternion", "quat", "rotation", "rot"}
-_SIGMA = {"sigma", "σ", "std", "sd", "uncertainty", "rms", "stddev"}
+_SIGMA = {"sigma", "σ", "std", "sd", "uncertainty", "stddev"}
 _SINGLE = {
     "t": {"t", "time", "timestamp", "stamp", "zeit", "seconds", "secs"},
-    "pose": {"pose", "poses", "no", "nr", "id", "number", "index", "idx", "measurement", "punkt", "row"},
+    "pose": {"pose", "poses", "no", "nr", "id", "number", "index", "idx", "measurement", "point", "punkt", "sample", "row"},
     "payload": {"payload", "load"},
     "temperature": {"temperature", "temp", "temperatur"},
     "length": {"length", "wire", "distance"},
@@ -57,6 +61,14 @@ class Guess:
     placed: Mapping[str, PlacedColumns]
     texts: Mapping[str, str]
     left_out: tuple[LeftOut, ...]
+
+
+def reasons_of(left_out: Sequence[LeftOut]) -> list[str]:
+    """What was left out and why, columns with the same reason together."""
+    by_reason: dict[str, list[str]] = {}
+    for left in left_out:
+        by_reason.setdefault(left.why, []).append(left.column)
+    return [f"{', '.join(columns)}: {why}" for why, columns in by_reason.items()]
 
 
 def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
@@ -100,19 +112,19 @@ def _guess(
 
 
 def _by_order(foreign: ForeignTable, model: RobotModel) -> Guess:
-    """Without names: a rising whole number or none, the joints, then a point or none."""
+    """Without names: a whole number that counts up or none, the joints, then a point or none."""
     names, n = list(foreign.numbers), model.n
     placed: dict[str, PlacedColumns] = {}
     rest = names
-    if len(names) in (n + 1, n + 4):
-        column = foreign.numbers[names[0]]
-        if (column == np.rint(column)).all() and (np.diff(column) >= 0).all():
-            placed["pose"] = place(foreign, model, "pose", (names[0],), "their order")
-            rest = names[1:]
+    if names and (np.diff(foreign.numbers[names[0]]) == 1).all():
+        placed["pose"] = place(foreign, model, "pose", (names[0],), "their order")
+        rest = names[1:]
     if len(rest) in (n, n + 3):
         placed["q"] = place(foreign, model, "q", tuple(rest[:n]), "their order")
         if len(rest) > n:
             placed["xyz"] = place(foreign, model, "xyz", tuple(rest[n:]), "their order")
+    if "q" not in placed:
+        placed.clear()
     reasons = dict.fromkeys(names, "the file has no header, and their number does not tell")
     return _guess(foreign, placed, {}, reasons)
 
@@ -139,7 +151,7 @@ def _joint_quantities(
         numbers = sorted(columns)
         if numbers in (list(range(model.n)), list(range(1, model.n + 1))):
             groups.setdefault(key, {i - numbers[0]: columns[i] for i in numbers})
-        elif key[0] == "q" and len(numbers) > 1 and numbers[-1] - numbers[0] == len(numbers) - 1:
+        elif key[0] == "q" and len(numbers) > 1:
             why = f"there are {len(numbers)} of them, but {model.n} joints"
             reasons |= {column: why for column in columns.values() if column not in reasons}
     return _best(groups, model.n, reasons)
@@ -211,8 +223,9 @@ def _kind(words: Sequence[str], *, named: bool, unit: str | None) -> str | None:
         return "current"
     for quantity, spoken in _KINDS:
         if set(telling) & spoken:
-            others = set(telling) - spoken - _POSITION
-            return quantity if not others or named or quantity != "q" else None
+            others = {word for word in telling if word not in spoken | _POSITION and len(word) > 1}
+            sure = named or not others or (set(telling) & _JOINT and not others & _NO_JOINT)
+            return quantity if quantity != "q" or sure else None
     if named and not telling:
         return "q"
     return None
@@ -223,9 +236,10 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
     groups: dict[str, dict[tuple[str, ...], dict[str, str]]] = {"xyz": {}, "sigma_xyz": {}, "quaternion": {}}
     for name in names:
         words = set(name.words)
-        parts = [word for word in name.words if word in _POINT | {"w"}]
+        parts = [_FUSED.get(word, word) for word in name.words if word in _POINT | _FUSED.keys() | {"w"}]
         fused = [word for word in name.words if word in VECTORS["quaternion"]]
-        rest = tuple(word for word in name.words if word not in parts and word not in fused)
+        rest = tuple(w for w in name.words if w not in parts and w not in fused and w not in _FUSED)
+        rest += () if name.number is None else (str(name.number),)
         if fused or (words & (_TURN | {"q"}) and parts):
             axis = fused[0] if fused else f"q{parts[-1]}"
             groups["quaternion"].setdefault(rest, {})[axis] = name.column
@@ -256,7 +270,7 @@ def _singles(
     for name in names:
         words = set(name.words)
         for quantity, spoken in (*_SINGLE.items(), ("sigma", _SIGMA)):
-            others = words - spoken - _NEUTRAL - {"point"}
+            others = words - spoken - _NEUTRAL
             if not words & spoken or others or name.number is not None:
                 continue
             values = foreign.numbers[name.column]

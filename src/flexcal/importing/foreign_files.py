@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from flexcal.errors import InputError
@@ -12,10 +13,13 @@ _EXCEL = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
 _ROS = (".mcap", ".db3", ".bag")
 
 
-def read_foreign(path: Path, *, sheet: str | None = None, topic: str | None = None) -> ForeignTable:
+def read_foreign(
+    path: Path, joints: Sequence[str], *, sheet: str | None = None, topic: str | None = None
+) -> ForeignTable:
     """Read a table of another program: text with separators, Excel, MAT, Parquet, or a ROS recording.
 
-    `sheet` is that of an Excel file, `topic` that of the points in a recording. Raises `InputError` where the file cannot be read, and
+    `joints` are the robot's, by which a recording's messages are chosen; `sheet` is that of an Excel file, `topic` that of the points in
+    a recording. Raises `InputError` where the file cannot be read, and
     where the library for it is not installed.
     """
     suffix = path.suffix.lower()
@@ -24,7 +28,7 @@ def read_foreign(path: Path, *, sheet: str | None = None, topic: str | None = No
     if suffix in _ROS or (path.is_dir() and (path / "metadata.yaml").is_file()):
         from flexcal.importing.ros_recordings import read_ros
 
-        return read_ros(path, topic)
+        return read_ros(path, joints, topic)
     if path.is_dir():
         raise InputError(
             f"{path} is a folder without metadata.yaml, so no recording of ROS 2; name a file in it."

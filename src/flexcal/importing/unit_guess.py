@@ -13,11 +13,11 @@ _OVER = 0.05
 """A joint may be past its limits by this share of its range: limits of URDFs are rounded, and some robots go past them."""
 _LARGEST = 4.0
 """Points of one target lie within so many times the reach of their middle."""
-_RATES = (1.0, 22_000.0)
+_SLOWEST_IN_MS = 110.0
 
 
 def joint_unit(model: RobotModel, joint: int, values: np.ndarray) -> str:
-    """The unit of a joint's positions (N,): the larger of the two in which nearly all are within its limits."""
+    """The unit of a joint's positions (N,): rad (m) where all are within its limits, which some robots pass a little, else deg (mm)."""
     kind = model.joints[joint]
     units = {"m": 1.0, "mm": 1e-3} if kind.kind == "prismatic" else {"rad": 1.0, "deg": np.pi / 180}
     lower = kind.lower if np.isfinite(kind.lower) else -2 * np.pi
@@ -47,9 +47,6 @@ def point_unit(model: RobotModel, xyz: np.ndarray) -> str:
 
 
 def time_unit(t: np.ndarray) -> str:
-    """The unit of time stamps (N,): that in which they come between once and 22000 times a second."""
+    """The unit of time stamps (N,) by their usual step: seconds from once a second on, milliseconds from ten times a second on, else us."""
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
-    for unit, factor in (("s", 1.0), ("ms", 1e-3), ("us", 1e-6)):
-        if step > 0 and _RATES[0] <= 1.05 / (step * factor) and 1 / (step * factor) <= _RATES[1]:
-            return unit
-    return "s"
+    return "s" if step <= 1.1 else "ms" if step <= _SLOWEST_IN_MS else "us"

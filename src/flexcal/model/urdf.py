@@ -135,8 +135,17 @@ def _kind_and_axis(joint) -> tuple[str, np.ndarray]:
     kind = "prismatic" if short.startswith("P") else "revolute"
     if short[-1] in "XYZ":
         return kind, np.eye(3)["XYZ".index(short[-1])]
-    axis = np.array(joint.extract().axis if hasattr(joint, "extract") else joint.axis, dtype=float)
+    plain = joint.extract() if hasattr(joint, "extract") else joint
+    axis = np.array(plain.axis if hasattr(plain, "axis") else _turning(joint), dtype=float)
     return kind, axis / np.linalg.norm(axis)
+
+
+def _turning(joint) -> np.ndarray:
+    """The axis (3,) of an unbounded joint, which Pinocchio keeps in the motion subspace alone."""
+    data, q = joint.createData(), np.zeros(joint.idx_q + joint.nq)
+    q[joint.idx_q] = 1.0
+    joint.calc(data, q)
+    return np.array(data.S).ravel()[3:]
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -57,8 +58,10 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
     above = {link: name for name, link in carried.items()}
     ways = {link: _way(link, above, joints) for link in above}
     if tip is None:
-        beside = {name for name in movable if name in mimics or _grips(name, carried[name])}
-        chain = _only_chain(path, ways, beside)
+        alike = {name for name in movable if name in mimics or _GRIPPER.search(name)}
+        beyond = {name: {n for way in ways.values() if name in way for n in way[way.index(name) :]} for name in alike}
+        beside = {name for name in alike if beyond[name] & set(movable) <= alike}
+        chain = _only_chain(path, {link: [n for n in way if n in movable] for link, way in ways.items()}, beside, ways)
     else:
         if tip not in ways:
             near = suggestion(tip, list(ways)) or f"; the links are {', '.join(ways)}."
@@ -91,13 +94,13 @@ def _way(link: str, above: dict[str, str], joints: dict[str, Element]) -> tuple[
     return tuple(reversed(way))
 
 
-def _only_chain(path: Path, ways: dict[str, tuple[str, ...]], beside: set[str]) -> tuple[str, ...]:
-    """The one long chain of movable joints that are not `beside` it; raises `InputError` that lists the tips where there are several."""
-    root = read_elements(path)
-    fixed = {j.attributes["name"] for j in root.all("joint") if j.attributes["type"] == "fixed"}
+def _only_chain(
+    path: Path, moving: Mapping[str, Sequence[str]], beside: set[str], ways: dict[str, tuple[str, ...]]
+) -> tuple[str, ...]:
+    """The one long chain out of those `moving` the links, less what is `beside` it; raises `InputError` that lists the tips of several."""
     ends: dict[tuple[str, ...], str] = {}
-    for link, way in sorted(ways.items(), key=lambda item: _rank(item[0], ways), reverse=True):
-        ends[tuple(name for name in way if name not in fixed and name not in beside)] = link
+    for link in sorted(moving, key=lambda link: _rank(link, ways), reverse=True):
+        ends[tuple(name for name in moving[link] if name not in beside)] = link
     ends.pop((), None)
     longest = {c: link for c, link in ends.items() if not any(c == o[: len(c)] and c != o for o in ends)}
     if not longest:
@@ -105,19 +108,13 @@ def _only_chain(path: Path, ways: dict[str, tuple[str, ...]], beside: set[str]) 
             f"{path}: every movable joint looks like a gripper's ({', '.join(sorted(beside))}); say where the arm ends with --tip LINK."
         )
     most = max(len(chain) for chain in longest)
-    arms = [chain for chain in longest if len(chain) > _FEW or len(chain) == most]
-    if most <= 2 * _FEW:
-        arms = list(longest)
+    arms = [chain for chain in longest if len(chain) > _FEW or most <= 2 * _FEW]
     if len(arms) > 1:
         listed = ", ".join(f"{longest[chain]} ({len(chain)} joints)" for chain in arms)
         raise InputError(
             f"{path}: the URDF has several chains; say which is the arm, as --tip LINK: {listed}."
         )
     return arms[0]
-
-
-def _grips(joint: str, link: str) -> bool:
-    return bool(_GRIPPER.search(joint) or _GRIPPER.search(link))
 
 
 def _rank(link: str, ways: dict[str, tuple[str, ...]]) -> tuple[int, bool, int]:

@@ -36,7 +36,8 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
     carried: dict[str, str] = {}
     parents: dict[str, str] = {}
     for name, joint in joints.items():
-        if joint.find("mimic") is not None and name not in locked:
+        follows = joint.find("mimic") is not None and joint.attributes.get("type") != "fixed"
+        if follows and name not in locked:
             raise joint.error(
                 f"joint '{name}' mimics another one, which flexcal does not handle; say where it stands under `locked:` in robot.yaml."
             )

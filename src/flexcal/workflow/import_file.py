@@ -26,6 +26,7 @@ from flexcal.importing import (
     check_nominal,
     guess_columns,
     read_foreign,
+    reasons_of,
 )
 from flexcal.model import RobotModel
 from flexcal.units import MILLIMETRE
@@ -113,7 +114,7 @@ def import_file(
     where the file cannot be read, joint positions are not recognised, or a value is missing or cannot be.
     """
     model = RobotModel.from_yaml(robot, estimates=False)
-    foreign = read_foreign(file, sheet=sheet, topic=topic)
+    foreign = read_foreign(file, model.joint_names, sheet=sheet, topic=topic)
     guess = guess_columns(foreign, model)
     if mapped:
         guess = apply_map(mapped, guess, foreign, model)
@@ -141,18 +142,25 @@ def _kind(
     foreign: ForeignTable, guess: Guess, model: RobotModel
 ) -> tuple[Literal["poses", "log", "joints"], Guess]:
     """What the file holds, and the guess with what belongs to that only, in the order of the columns to write."""
-    if "q" not in guess.placed:
-        left = "; ".join(f"{item.column}: {item.why}" for item in guess.left_out[:12])
+    unsure = [left for left in guess.left_out if "could both be" in left.why]
+    if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
+        left = "; ".join(reasons_of(guess.left_out))
+        what = f"the joint positions q1 … q{model.n}" if "q" not in guess.placed else "the measured points x, y, z"
+        example = "q1=COLUMN[deg]" if "q" not in guess.placed else "x=COLUMN[mm]"
         raise InputError(
-            f"{foreign.table.file.path}: the joint positions q1 … q{model.n} were not recognised ({left}); "
-            f"say which they are: --map q1=COLUMN[deg] and so on."
+            f"{foreign.table.file.path}: {what} were not recognised ({left}); say which they are: --map {example} and so on."
         )
     kind = "poses" if {"xyz", "length"} & guess.placed.keys() else "log" if "t" in guess.placed else "joints"
     wanted = {"poses": _POSES, "log": _LOG, "joints": ("pose", "q", "payload")}[kind]
     placed = {quantity: guess.placed[quantity] for quantity in wanted if quantity in guess.placed}
-    reasons = {"payload": "robot.yaml declares no payload"}
+    reasons = {
+        "payload": "robot.yaml declares no payload",
+        "quaternion": "calibrate takes points alone; --map qw=… and so on keeps it",
+    }
     if model.payload is None:
         placed.pop("payload", None)
+    if "quaternion" in placed and placed["quaternion"].why != "--map":
+        placed.pop("quaternion")
     what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions only"}[kind]
     left = [
         LeftOut(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))

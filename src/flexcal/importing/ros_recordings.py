@@ -1,0 +1,167 @@
+"""Recordings of ROS: MCAP, rosbag2 and bags of ROS 1, through rosbags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data.table import Table, TableFile
+from flexcal.errors import InputError
+from flexcal.importing.foreign_table import ForeignTable
+from flexcal.importing.standstill import points_at_rest
+
+_JOINTS = "sensor_msgs/msg/JointState"
+_POINTS = ("geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped")
+_FIELDS = {"position": "rad", "velocity": "rad/s", "effort": "N m"}
+
+
+@dataclass(frozen=True, eq=False)
+class _Stream:
+    """Values of one topic: `stamped` (N,) by their senders and `received` (N,), s; names and fields of joints, or points (N, 3)."""
+
+    topic: str
+    stamped: np.ndarray
+    received: np.ndarray
+    fields: dict[str, np.ndarray]
+    names: tuple[str, ...] = ()
+
+
+def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTable:
+    """Joint states as a log; with measured points beside them (PointStamped, PoseStamped), the poses in which the robot stood still.
+
+    Of several messages with joint states those with most of `joints` are taken. Times are those of the senders, or of reception where
+    some have none. Raises `InputError` where rosbags is not installed, the recording cannot be read, has no joint states, or has points
+    of several topics and `topic` names none of them.
+    """
+    try:
+        from rosbags.highlevel import AnyReader
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError:
+        raise InputError(f"{path}: recordings of ROS need rosbags: pip install 'flexcal[ros]'.") from None
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+            topics = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_JOINTS, *_POINTS)}
+            seen = sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})
+            chosen = _point_topic(path, topics, topic)
+            states = _joint_states(reader)
+            points = None if chosen is None else _points(reader, chosen)
+    except InputError:
+        raise
+    except Exception as problem:  # whatever a reader of a foreign, perhaps broken file may raise
+        reason = " ".join(str(problem).split())[:200] or type(problem).__name__
+        raise InputError(f"{path}: not a readable recording of ROS ({reason}); record it again.") from problem
+    if not states:
+        raise InputError(
+            f"{path}: there are no joint states (sensor_msgs/JointState) in it; there are {', '.join(seen) or 'no messages'}."
+        )
+    best = max(states, key=lambda s: (len(set(s.names) & set(joints)), len(s.names), len(s.received)))
+    notes = [
+        f"the joint states of {', '.join(other.names)} on {other.topic} are left out" for other in states if other is not best
+    ]
+    if points is None:
+        return _log(path, best, notes)
+    return _poses(path, best, points, notes)
+
+
+def _point_topic(path: Path, topics: dict[str, str], asked: str | None) -> str | None:
+    having = sorted(name for name, kind in topics.items() if kind in _POINTS)
+    if asked is not None:
+        if asked not in having:
+            raise InputError(
+                f"{path}: there are no points on the topic '{asked}'; there are some on {', '.join(having) or 'none'}."
+            )
+        return asked
+    if len(having) > 1:
+        raise InputError(f"{path}: several topics have points: {', '.join(having)}; name one with --topic.")
+    return having[0] if having else None
+
+
+def _joint_states(reader: Any) -> list[_Stream]:
+    """A stream for every topic and set of names."""
+    found: dict[tuple[str, tuple[str, ...]], list[tuple[float, float, list[np.ndarray]]]] = {}
+    for topic, received, message in _messages(reader, (_JOINTS,)):
+        values = [np.asarray(getattr(message, field), dtype=float) for field in _FIELDS]
+        names = tuple(message.name)
+        if len(values[0]) == len(names) > 0:
+            found.setdefault((topic, names), []).append((_stamp(message), received, values))
+    streams = []
+    for (topic, names), rows in found.items():
+        fields = {}
+        for k, field in enumerate(_FIELDS):
+            if all(len(row[2][k]) == len(names) for row in rows):
+                fields[field] = np.array([row[2][k] for row in rows])
+        streams.append(_stream(topic, rows, fields, names))
+    return streams
+
+
+def _points(reader: Any, topic: str) -> _Stream:
+    rows = []
+    for name, received, message in _messages(reader, _POINTS):
+        if name == topic:
+            place = message.point if hasattr(message, "point") else message.pose.position
+            rows.append((_stamp(message), received, [place.x, place.y, place.z]))
+    return _stream(topic, rows, {"xyz": np.array([row[2] for row in rows], dtype=float).reshape(-1, 3)})
+
+
+def _messages(reader: Any, kinds: Sequence[str]) -> Any:
+    connections = [c for c in reader.connections if c.msgtype in kinds]
+    for connection, received, raw in reader.messages(connections=connections) if connections else ():
+        yield connection.topic, received * 1e-9, reader.deserialize(raw, connection.msgtype)
+
+
+def _stamp(message: Any) -> float:
+    stamp = message.header.stamp
+    return stamp.sec + stamp.nanosec * 1e-9
+
+
+def _stream(
+    topic: str, rows: Sequence[tuple[float, float, Any]], fields: dict[str, np.ndarray], names: tuple[str, ...] = ()
+) -> _Stream:
+    return _Stream(topic, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]), fields, names)
+
+
+def _log(path: Path, states: _Stream, notes: list[str]) -> ForeignTable:
+    t = states.stamped if states.stamped.all() else states.received
+    columns = {"t": t - t[0]}
+    units = {"t": "s"}
+    for field, values in states.fields.items():
+        for k, name in enumerate(states.names):
+            columns[f"{name} {field}"] = values[:, k]
+            units[f"{name} {field}"] = _FIELDS[field]
+    if "effort" in states.fields:
+        notes.append("effort is taken to be in N m at the joint; some drivers put currents there")
+    return _table(path, columns, units, notes)
+
+
+def _poses(path: Path, states: _Stream, points: _Stream, notes: list[str]) -> ForeignTable:
+    same_clock = bool(states.stamped.all() and points.stamped.all())
+    t, at = (states.stamped, points.stamped) if same_clock else (states.received, points.received)
+    q, xyz, sigma, without = points_at_rest(t, states.fields["position"], at, points.fields["xyz"])
+    if not len(q):
+        raise InputError(
+            f"{path}: while points come on {points.topic}, the robot never stands still for half a second; let it rest in every pose."
+        )
+    columns: dict[str, np.ndarray] = {"pose": np.arange(1.0, len(q) + 1)}
+    units: dict[str, str] = {}
+    for k, name in enumerate(states.names):
+        columns[f"{name} position"] = q[:, k]
+        units[f"{name} position"] = "rad"
+    columns |= {axis: xyz[:, k] for k, axis in enumerate("xyz")}
+    units |= dict.fromkeys("xyz", "m")
+    notes.append(f"{len(q)} poses in which the robot stood still and {points.topic} has points, both averaged")
+    if without:
+        notes.append(f"{without} standstills without points are left out")
+    if sigma is not None:
+        columns["sigma"], units["sigma"] = np.full(len(q), sigma), "m"
+        notes.append("sigma is the scatter of the readings about the mean of their pose")
+    if not same_clock:
+        notes.append("some messages have no time stamps, so the times of reception are used")
+    return _table(path, columns, units, notes)
+
+
+def _table(path: Path, columns: dict[str, np.ndarray], units: dict[str, str], notes: list[str]) -> ForeignTable:
+    return ForeignTable(Table(TableFile(path, tuple(columns), 1), 1, columns), units, notes=tuple(notes))

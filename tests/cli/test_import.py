@@ -1,0 +1,89 @@
+"""`flexcal import`: what it shows, writes and refuses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from cli_files import read_csv, snapshot, write_csv
+
+from flexcal.data import read_poses
+from flexcal.model import RobotModel
+
+
+@pytest.fixture
+def foreign(ur5_folder: Path) -> Path:
+    """Forty published poses of the UR5 in degrees and millimetres, under other names, the third joint counted the other way."""
+    header, rows = read_csv(ur5_folder / "grid.csv")
+    rows = rows[::25]
+    rows[:, 1:7] = np.rad2deg(rows[:, 1:7]) * [1, 1, -1, 1, 1, 1]
+    rows[:, 7:] *= 1e3
+    names = ["No", *(f"axis {i}" for i in range(1, 7)), "tracker x", "tracker y", "tracker z"]
+    assert header[0] == "pose" and len(names) == len(header)
+    return write_csv(ur5_folder / "other.csv", names, rows)
+
+
+def test_a_wrong_sign_is_found_and_mapped(run, ur5_folder: Path, foreign: Path) -> None:
+    robot, out = ur5_folder / "robot.yaml", ur5_folder / "poses.csv"
+    before = snapshot(ur5_folder)
+    refused = run("import", robot, foreign, "--out", out)
+    assert refused.status == 2 and snapshot(ur5_folder) == before
+    assert "elbow_joint seems to be counted the other way: --map 'q3=-axis 3[deg]'" in refused.err
+    assert run("import", robot, foreign, "--out", out, "--map", "q3=-axis 3[deg]").status == 0
+    model = RobotModel.from_yaml(robot, estimates=False)
+    poses, published = read_poses(out, model), read_poses(ur5_folder / "grid.csv", model)
+    np.testing.assert_allclose(poses.q, published.q[::25], rtol=1e-12)
+    np.testing.assert_allclose(poses.position, published.position[::25], rtol=1e-12)
+
+
+def test_unchecked_writes_all_the_same(run, ur5_folder: Path, foreign: Path) -> None:
+    out = ur5_folder / "poses.csv"
+    outcome = run("import", ur5_folder / "robot.yaml", foreign, "--out", out, "--unchecked", "--json")
+    assert outcome.status == 0 and out.exists()
+    nominal = outcome.document["nominal"]
+    assert nominal["doubtful"] and nominal["map"] == ["q3=-axis 3[deg]"]
+    assert outcome.document["columns"]["x"] | {"why": ""} == {"from": "tracker x", "unit": "mm", "gain": 1.0, "offset": 0.0, "why": ""}
+
+
+def test_a_log_and_its_signals(run, ur5_folder: Path, rng: np.random.Generator) -> None:
+    t = np.arange(200)
+    rows = np.column_stack([4.0 * t, 20 * rng.normal(size=(200, 6)), rng.normal(size=(200, 6))])
+    names = ["Zeit [ms]", *(f"A{i}" for i in range(1, 7)), *(f"Strom {i} [A]" for i in range(1, 7))]
+    log = write_csv(ur5_folder / "log_of_today.csv", names, rows)
+    robot, out = ur5_folder / "robot.yaml", ur5_folder / "log.parquet"
+    gains = [f"tau{i}={i}.5*Strom {i} [A][A]" for i in range(1, 7)]
+    outcome = run("import", robot, log, "--map", *gains, "--out", out, "--write-signals", "--json")
+    assert outcome.status == 0 and "flexcal identify dynamics" in outcome.err
+    assert outcome.document["kind"] == "log" and outcome.document["left_out"] == {}
+    from flexcal.data import read_recording
+
+    model = RobotModel.from_yaml(robot, estimates=False)
+    converted, direct = read_recording(out, model), read_recording(log, model)
+    np.testing.assert_allclose(converted.q, np.deg2rad(rows[:, 1:7]), rtol=1e-12)
+    np.testing.assert_allclose(converted.torque, rows[:, 7:] * (np.arange(1, 7) + 0.5), rtol=1e-12)
+    np.testing.assert_allclose(direct.torque, converted.torque, rtol=1e-12)
+    assert converted.time_step == pytest.approx(4e-3) and direct.time_step == pytest.approx(4e-3)
+    assert run("import", robot, log, "--map", *gains, "--write-signals").status == 0, "what stands there already is no conflict"
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (lambda text: text.replace("axis 5", "speed 5"), ["q1 … q6 were not recognised", "there are 5 of them, but 6 joints", "--map"]),
+        (lambda text: "\n".join([*text.splitlines()[:3], text.splitlines()[3].rsplit(",", 1)[0] + ",n/a", *text.splitlines()[4:]]), ["other.csv line 4, column tracker z", "no number"]),
+        (lambda text: text.splitlines()[0], ["other.csv"]),
+    ],
+)  # fmt: skip
+def test_faults_are_named_with_their_place(run, ur5_folder: Path, foreign: Path, change, words: list[str]) -> None:
+    foreign.write_text(change(foreign.read_text()))
+    outcome = run("import", ur5_folder / "robot.yaml", foreign)
+    assert outcome.status == 2 and outcome.err.count("\n") == 1
+    assert all(word in outcome.err for word in words), outcome.err
+
+
+def test_points_that_are_left_out_are_named(run, ur5_folder: Path, foreign: Path) -> None:
+    foreign.write_text(foreign.read_text().replace("tracker y", "remark"))
+    outcome = run("import", ur5_folder / "robot.yaml", foreign)
+    assert outcome.status == 0 and "joint positions" in outcome.out
+    assert "left out: tracker x, remark, tracker z: not recognised" in outcome.out

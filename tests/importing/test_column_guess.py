@@ -1,0 +1,100 @@
+"""Columns are recognised by names that people use, their units by what stands there or by magnitude, and what is left out says why."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexcal.importing import guess_columns, reasons_of
+from flexcal.importing.column_names import parse_name
+
+SIX = range(1, 7)
+XYZ = ["x", "y", "z"]
+# header, then the quantities that it holds with their first column and unit; nothing else may be recognised
+HEADERS = [
+    (["pose", *(f"J{i}" for i in SIX), *XYZ], {"pose": "pose", "q": "J1", "xyz": "x"}),
+    ([*(f"A{i}" for i in SIX), "X", "Y", "Z", "A", "B", "C"], {"q": "A1", "xyz": "X"}),
+    ([*(f"q_{i}" for i in range(6)), "x_mm", "y_mm", "z_mm"], {"q": "q_0", "xyz": "x_mm"}),
+    (["time", *(f"position[{i}]" for i in range(6)), *(f"effort[{i}]" for i in range(6))], {"t": "time", "q": "position[0]", "tau": "effort[0]"}),
+    (["Time [s]", *(f"axis{i}_pos" for i in SIX), *(f"axis{i}_vel" for i in SIX)], {"t": "Time [s]", "q": "axis1_pos", "dq": "axis1_vel"}),
+    (["timestamp", *(f"actual_q_{i}" for i in range(6)), *(f"target_q_{i}" for i in range(6)), *(f"actual_TCP_pose_{i}" for i in range(6))], {"t": "timestamp", "q": "actual_q_0"}),
+    (["Nr", *(f"Achse {i} [Grad]" for i in SIX), "X_ist", "Y_ist", "Z_ist", "X_soll", "Y_soll", "Z_soll"], {"pose": "Nr", "q": "Achse 1 [Grad]", "xyz": "X_ist"}),
+    (["Point", *(f"Joint {i} (deg)" for i in SIX), "Measured X [mm]", "Measured Y [mm]", "Measured Z [mm]", "Nominal X [mm]", "Nominal Y [mm]", "Nominal Z [mm]"], {"pose": "Point", "q": "Joint 1 (deg)", "xyz": "Measured X [mm]"}),
+    (["t_ms", *(f"m{i}_angle_deg" for i in SIX)], {"t": "t_ms", "q": "m1_angle_deg"}),
+    ([*(f"rob1_j{i}" for i in SIX), "PosX", "PosY", "PosZ", "Error X", "Error Y", "Error Z"], {"q": "rob1_j1", "xyz": "PosX"}),
+    ([*(f"theta{i}" for i in SIX), "px", "py", "pz", "sigma_x", "sigma_y", "sigma_z", "temp"], {"q": "theta1", "xyz": "px", "sigma_xyz": "sigma_x", "temperature": "temp"}),
+    ([*(f"J{i}" for i in SIX), *(f"E{i}" for i in SIX), *XYZ], {"q": "J1", "xyz": "x"}),
+    (["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3", *(f"pose.position.{a}" for a in XYZ), *(f"pose.orientation.{a}" for a in [*XYZ, "w"])], {"q": "shoulder_pan", "xyz": "pose.position.x", "quaternion": "pose.orientation.w"}),
+    (["wrist_3_joint", "wrist_2_joint", "wrist_1_joint", "elbow_joint", "shoulder_lift_joint", "shoulder_pan_joint", *XYZ], {"q": "shoulder_pan_joint", "xyz": "x"}),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("header", "expected"), HEADERS, ids=[" ".join(header)[:40] for header, _ in HEADERS])
+def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
+    columns = {name: rng.uniform(-2, 2, 30) for name in header}
+    columns |= {name: np.arange(30.0) for name in ("pose", "Nr", "Point") if name in header}
+    guess = guess_columns(made(columns), ur5)
+    assert {quantity: placed.columns[0] for quantity, placed in guess.placed.items()} == expected
+    used = [column for placed in guess.placed.values() for column in placed.columns]
+    assert sorted(used + [left.column for left in guess.left_out]) == sorted(header)
+
+
+@pytest.mark.parametrize(
+    ("header", "words"),
+    [
+        ([*(f"J{i}" for i in SIX), *(f"A{i}" for i in SIX)], "J1 and A1 begin what could both be q"),
+        ([f"J{i}" for i in range(1, 8)], "there are 7 of them, but 6 joints"),
+        ([*(f"J{i}" for i in SIX), *(f"I{i} [A]" for i in SIX)], "currents need a gain in N m/A"),
+        ([*(f"J{i}" for i in SIX), *XYZ, "x2", "y2", "z2"], "x and x2 begin what could both be xyz"),
+    ],
+)
+def test_what_is_left_out_says_why(ur5, made, rng, header, words) -> None:
+    guess = guess_columns(made({name: rng.uniform(-2, 2, 30) for name in header}), ur5)
+    assert any(words in reason for reason in reasons_of(guess.left_out))
+
+
+def test_units_by_magnitude_and_by_name(ur5, made, rng) -> None:
+    q, xyz = rng.uniform(-2.0, 2.0, (30, 6)), rng.uniform(-0.6, 0.6, (30, 3)) + [3.0, 1.0, 0.5]
+    for factor, scale, angle, length in ((1.0, 1.0, "rad", "m"), (np.rad2deg(1.0), 1e3, "deg", "mm")):
+        columns = {f"J{i + 1}": factor * q[:, i] for i in range(6)} | dict(zip("xyz", scale * xyz.T, strict=True))
+        foreign = made(columns)
+        placed = guess_columns(foreign, ur5).placed
+        assert placed["q"].unit == angle and placed["xyz"].unit == length
+        np.testing.assert_allclose(placed["q"].values(foreign.table), q, rtol=1e-14)
+        np.testing.assert_allclose(placed["xyz"].values(foreign.table), xyz, rtol=1e-14)
+    # what stands in the file counts, whatever the magnitude
+    small = made({f"J{i + 1}": q[:, i] for i in range(6)}, {f"J{i + 1}": "deg" for i in range(6)})
+    assert guess_columns(small, ur5).placed["q"].unit == "deg"
+
+
+@pytest.mark.parametrize(("step", "unit"), [(1e-3, "s"), (4.0, "ms"), (250.0, "us")])
+def test_time_by_the_rate(ur5, made, rng, step, unit) -> None:
+    columns = {"time": step * np.arange(50)} | {f"q{i}": rng.uniform(-1, 1, 50) for i in SIX}
+    assert guess_columns(made(columns), ur5).placed["t"].unit == unit
+
+
+def test_without_a_header_order_tells(ur5, made, rng) -> None:
+    columns = {"c1": np.arange(30.0)} | {f"c{k}": rng.uniform(-2, 2, 30) for k in range(2, 11)}
+    placed = guess_columns(made(columns, named=False), ur5).placed
+    assert placed["pose"].columns == ("c1",) and placed["q"].columns[0] == "c2" and placed["xyz"].columns[-1] == "c10"
+    del columns["c9"]
+    assert guess_columns(made(columns, named=False), ur5).placed == {}
+
+
+@pytest.mark.parametrize(
+    ("column", "words", "number", "unit"),
+    [
+        ("J1 [deg]", ("j",), 1, "deg"),
+        ("X (mm)", ("x",), None, "mm"),
+        ("position[0]", ("position",), 0, None),
+        ("JointAngle3", ("joint", "angle"), 3, None),
+        ("x_m", ("x",), None, "m"),
+        ("time_s", ("time",), None, "s"),
+        ("A1", ("a",), 1, None),
+        ("j2s6s200_joint_4", ("j", "s", "s", "joint"), 4, None),
+        ("speed [rad/s]", ("speed",), None, "rad/s"),
+    ],
+)
+def test_names_taken_apart(column, words, number, unit) -> None:
+    name = parse_name(column)
+    assert (name.words, name.number, name.unit) == (words, number, unit)

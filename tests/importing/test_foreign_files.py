@@ -1,0 +1,131 @@
+"""Tables of other programs, written by their own libraries or by hand, read back to what was written."""
+
+from __future__ import annotations
+
+import datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexcal.errors import InputError
+from flexcal.importing import read_foreign
+
+VALUES = np.array([[1, -12.5, 0.001], [2, 3.25, 7.0], [3, 4e-7, 8.125]])
+
+
+def read(path: Path, **options):
+    return read_foreign(path, (), **options)
+
+
+def columns(foreign) -> np.ndarray:
+    return np.stack(list(foreign.numbers.values()), axis=1)
+
+
+TEXTS = {
+    "commas.csv": "Nr,a,b\n1,-12.5,0.001\n2,3.25,7\n3,4e-7,8.125\n",
+    "semicolons.csv": "Nr;a;b\n1;-12,5;0,001\n2;3,25;7\n3;4e-7;8,125\n",
+    "tabs.txt": "Nr\ta\tb\n1\t-12.5\t0.001\n2\t3.25\t7\n3\t4e-7\t8.125\n\n",
+    "spaces.dat": "Nr    a   b\n 1  -12.5  0.001\n 2  3.25   7\n 3  4e-7  8.125\n",
+    "notes.csv": "# made today\nReport, of three\n\nNr,a,b\n[-],[deg],[mm]\n1,-12.5,0.001\n2,3.25,7\n3,4e-7,8.125\n",
+    "quoted.csv": '"Nr","a","b"\r\n"1","-12.5","0.001"\r\n"2","3.25","7"\r\n"3","4e-7","8.125"\r\n',
+}
+
+
+@pytest.mark.parametrize("name", TEXTS)
+def test_text(tmp_path: Path, name: str) -> None:
+    path = tmp_path / name
+    path.write_text(TEXTS[name])
+    foreign = read(path)
+    assert tuple(foreign.numbers) == ("Nr", "a", "b")
+    np.testing.assert_array_equal(columns(foreign), VALUES)
+    line = int(np.flatnonzero([row.replace('"', "").strip().startswith("1") for row in TEXTS[name].splitlines()])[0]) + 1
+    assert foreign.table.first == line
+    if name == "notes.csv":
+        assert foreign.units == {"Nr": "[-]", "a": "[deg]", "b": "[mm]"}
+
+
+@pytest.mark.parametrize(
+    ("encoding", "header"), [("cp1252", "Winkel [°]"), ("utf-8-sig", "Winkel [°]"), ("utf-16", "θ")]
+)
+def test_encodings(tmp_path: Path, encoding: str, header: str) -> None:
+    (tmp_path / "a.csv").write_text(f"{header},b\n1,2\n3,4\n", encoding=encoding)
+    assert tuple(read(tmp_path / "a.csv").numbers) == (header, "b")
+
+
+def test_text_without_header_texts_and_holes(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text("1,2.5,ok\n2,,bad\n3,4.5,ok\n")
+    foreign = read(tmp_path / "a.csv")
+    assert not foreign.named and tuple(foreign.numbers) == ("c1", "c2") and tuple(foreign.texts) == ("c3",)
+    assert np.isnan(foreign.numbers["c2"][1])
+
+
+def test_excel(tmp_path: Path) -> None:
+    openpyxl = pytest.importorskip("openpyxl")
+    book = openpyxl.Workbook()
+    sheet = book.active
+    sheet.title = "points"
+    rows = [["Report"], [], ["Nr", "a", "b", "when"], ["", "deg", "mm", ""]]
+    for row in rows + [[*map(float, values), datetime.date(2026, 1, 2).isoformat()] for values in VALUES]:
+        sheet.append(row)
+    book.create_sheet("other").append(["x", "y"])
+    book.save(tmp_path / "a.xlsx")
+    foreign = read(tmp_path / "a.xlsx")
+    np.testing.assert_array_equal(columns(foreign), VALUES)
+    assert foreign.units == {"a": "deg", "b": "mm"} and tuple(foreign.texts) == ("when",)
+    assert any("'points'" in note and "--sheet" in note for note in foreign.notes)
+    with pytest.raises(InputError, match="no sheet 'third'; there are points, other"):
+        read(tmp_path / "a.xlsx", sheet="third")
+    with pytest.raises(InputError, match="no row of numbers"):
+        read(tmp_path / "a.xlsx", sheet="other")
+
+
+def test_mat(tmp_path: Path, rng: np.random.Generator) -> None:
+    from scipy.io import savemat
+
+    q, point = rng.normal(size=(20, 6)), rng.normal(size=(3, 20))
+    savemat(tmp_path / "a.mat", {"log": {"q": q, "point": point}, "t": np.arange(20.0)[:, None], "note": "text", "gain": 3.0})
+    foreign = read(tmp_path / "a.mat")
+    np.testing.assert_array_equal(np.stack([foreign.numbers[f"log.q[{i}]"] for i in range(6)], axis=1), q)
+    np.testing.assert_array_equal(foreign.numbers["log.point[2]"], point[2])
+    np.testing.assert_array_equal(foreign.numbers["t"], np.arange(20.0))
+    assert any("note" in text and "gain" in text for text in foreign.notes)
+    (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400))
+    with pytest.raises(InputError, match="7.3 are not read.*-v7"):
+        read(tmp_path / "new.mat")
+
+
+def test_parquet(tmp_path: Path) -> None:
+    import polars as pl
+
+    when = [datetime.datetime(2026, 1, 1, 0, 0, second) for second in range(3)]
+    frame = pl.DataFrame({"q": VALUES.tolist(), "t": when, "name": ["a", "b", "c"]})
+    frame.write_parquet(tmp_path / "a.parquet")
+    foreign = read(tmp_path / "a.parquet")
+    np.testing.assert_array_equal(np.stack([foreign.numbers[f"q[{k}]"] for k in range(3)], axis=1), VALUES)
+    np.testing.assert_allclose(np.diff(foreign.numbers["t"]), 1.0)
+    assert foreign.texts["name"].tolist() == ["a", "b", "c"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("a.csv", "", "line 1: the file is empty"),
+        ("a.csv", "just words\nand more\n", "export it again as CSV|no row of numbers"),
+        ("a.csv", "a,b\n1,2\n1,2,3\n1,2\n" + "1,2\n" * 300, "line 3: there are 3 values, but 2 columns"),
+        ("a.csv", "a,a\n1,2\n", "line 1: the column 'a' stands twice"),
+        ("a.csv", "a,b\n1,2\n\n" + "1,2\n" * 300, "line 3: the line is empty"),
+        ("a.mat", "nothing of the kind", "not a readable MAT-file"),
+        ("a.parquet", "nothing", "not a readable Parquet"),
+        ("a.xlsx", "nothing", "not a readable Excel"),
+        ("a.mcap", "nothing", "not a readable recording"),
+        ("a.db3", "nothing", "not a readable recording"),
+        ("a.step", "nothing", "'.step' are not understood"),
+    ],
+)
+def test_bad_files_are_refused(tmp_path: Path, name: str, content: str, words: str) -> None:
+    (tmp_path / name).write_text(content)
+    with pytest.raises(InputError, match=words):
+        read(tmp_path / name)
+    with pytest.raises(InputError, match="no such file"):
+        read(tmp_path / f"other_{name}")
