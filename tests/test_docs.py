@@ -91,3 +91,11 @@ def test_the_pooling_is_as_wide_as_it_says(methods: str) -> None:
     text = " ".join(methods.split())
     assert f"pooled over {POOLED_LINES} neighbouring lines ({3 * POOLED_LINES} degrees of freedom)" in text
     assert f"fewer than {SMALLEST_FREEDOM} are refused" in text
+
+
+def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
+    from flexcal.cli.verbs import VERBS
+
+    page = (root / "docs" / "command-line.md").read_text(encoding="utf-8")
+    rows = [line for line in page.splitlines() if line.startswith("| `flexcal ")]
+    assert rows == [f"| `{verb.example}` | {verb.summary} |" for verb in VERBS]

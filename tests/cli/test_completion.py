@@ -40,13 +40,17 @@ def test_fish_completes(run, tmp_path: Path) -> None:
     for words, expected in TRIED.items():
         line = " ".join(["flexcal", *words])
         program = f"source {script}; complete -C '{line}'"
-        done = subprocess.run(["fish", "--no-config", "-c", program], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            ["fish", "--no-config", "-c", program], capture_output=True, text=True, check=True
+        )
         assert {found.split("\t")[0] for found in done.stdout.splitlines()} == expected
 
 
 @pytest.mark.skipif(shutil.which("zsh") is None, reason="zsh is not installed")
 def test_zsh_takes_the_script(run) -> None:
-    script = f"autoload -U compinit; compinit -u -D\n{run('completion', 'zsh').out}\nprint -r -- $_comps[flexcal]"
+    script = (
+        f"autoload -U compinit; compinit -u -D\n{run('completion', 'zsh').out}\nprint -r -- $_comps[flexcal]"
+    )
     done = subprocess.run(["zsh", "-f", "-c", script], capture_output=True, text=True, check=True)
     assert "_flexcal" in done.stdout and done.stderr == ""
 
@@ -54,7 +58,11 @@ def test_zsh_takes_the_script(run) -> None:
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.name)
 def test_every_option_is_that_of_the_help(run, verb) -> None:
     page = run(*verb.words, "--help").out
-    shown = {word.strip("[]|") for word in page.split("usage:")[1].split("\n\n")[0].split() if word.startswith("[--")}
+    shown = {
+        word.strip("[]|")
+        for word in page.split("usage:")[1].split("\n\n")[0].split()
+        if word.startswith("[--")
+    }
     options = options_of(verb)
     assert "--json" in {option.name for option in options}
     for option in options:

@@ -13,10 +13,16 @@ from flexcal.model import RobotModel
 ARM = """<link name="{side}_{k}"/><joint name="{side}_joint_{k}" type="{kind}"><parent link="{parent}"/><child link="{side}_{k}"/>
 <axis xyz="0 {k} 1"/><origin xyz="0.1 0 0.2"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""
 
+_SHOULDER = '<limit lower="-2.0" upper="2.0" effort="300" velocity="3"/>'
+MIMICKING = urdf_text().replace(_SHOULDER, f'{_SHOULDER}<mimic joint="elbow"/>')
+
 
 def chain(side: str, count: int, kind: str = "revolute") -> str:
     """Joints side_joint_1 … from the base on."""
-    return "".join(ARM.format(side=side, k=k, kind=kind, parent=f"{side}_{k - 1}" if k > 1 else "base") for k in range(1, count + 1))
+    return "".join(
+        ARM.format(side=side, k=k, kind=kind, parent=f"{side}_{k - 1}" if k > 1 else "base")
+        for k in range(1, count + 1)
+    )
 
 
 def robot(tmp_path: Path, *parts: str) -> Path:
@@ -71,11 +77,15 @@ def test_two_arms_ask_for_the_tip(run, tmp_path: Path) -> None:
     assert "left_6 (6 joints)" in asked.err and "right_7 (7 joints)" in asked.err
     document = run("init", urdf, "--out", tmp_path, "--tip", "right_7", "--json").document
     assert document["joints"] == [f"right_joint_{k}" for k in range(1, 8)]
-    assert document["locked"] == {f"left_joint_{k}": 0 for k in range(1, 7)} and document["frame"] == "right_7"
+    assert (
+        document["locked"] == {f"left_joint_{k}": 0 for k in range(1, 7)} and document["frame"] == "right_7"
+    )
 
 
 def test_a_short_branch_beside_the_arm_is_locked(run, tmp_path: Path) -> None:
-    document = run("init", robot(tmp_path, chain("arm", 6), chain("camera", 2)), "--out", tmp_path, "--json").document
+    document = run(
+        "init", robot(tmp_path, chain("arm", 6), chain("camera", 2)), "--out", tmp_path, "--json"
+    ).document
     assert document["joints"] == [f"arm_joint_{k}" for k in range(1, 7)]
     assert set(document["locked"]) == {"camera_joint_1", "camera_joint_2"}
 
@@ -83,7 +93,10 @@ def test_a_short_branch_beside_the_arm_is_locked(run, tmp_path: Path) -> None:
 def test_joints_without_limits(run, tmp_path: Path) -> None:
     outcome = run("init", robot(tmp_path, chain("arm", 3, "continuous")), "--out", tmp_path)
     assert outcome.status == 0
-    assert "continuous" in (tmp_path / "robot.yaml").read_text() or "without limits" in (tmp_path / "robot.yaml").read_text()
+    assert (
+        "continuous" in (tmp_path / "robot.yaml").read_text()
+        or "without limits" in (tmp_path / "robot.yaml").read_text()
+    )
 
 
 @pytest.mark.parametrize(
@@ -94,10 +107,12 @@ def test_joints_without_limits(run, tmp_path: Path) -> None:
         ("<robot name='x'/>", "a.urdf.xacro", ["xacro", "a.urdf"]),
         ("<robot name='x' xmlns:xacro='u'><xacro:macro name='m'/></robot>", "a.urdf", ["xacro"]),
         ("<robot name='x'><link name='a'/></robot>", "a.urdf", ["no movable joint"]),
-        (urdf_text().replace('<limit lower="-2.0" upper="2.0" effort="300" velocity="3"/>', '<limit lower="-2" upper="2" effort="300" velocity="3"/><mimic joint="elbow"/>'), "a.urdf", ["shoulder", "mimics"]),
+        (MIMICKING, "a.urdf", ["shoulder", "mimics"]),
     ],
 )  # fmt: skip
-def test_bad_files_are_refused_in_a_sentence(run, tmp_path: Path, content: str, name: str, words: list[str]) -> None:
+def test_bad_files_are_refused_in_a_sentence(
+    run, tmp_path: Path, content: str, name: str, words: list[str]
+) -> None:
     (tmp_path / name).write_text(content)
     before = snapshot(tmp_path)
     outcome = run("init", tmp_path / name, "--out", tmp_path / "new")

@@ -1,4 +1,4 @@
-"""From an empty folder to a calibrated URDF, with a robot that is in no example and a file of foreign columns: every step names the next."""
+"""From an empty folder to a calibrated URDF, with a robot of no example and a file of foreign columns: every step names the next."""
 
 from __future__ import annotations
 
@@ -53,12 +53,18 @@ def test_from_a_urdf_to_a_calibrated_urdf(run, tmp_path: Path, monkeypatch: pyte
     assert "next: flexcal export urdf robot.yaml" in verified.err
 
     Path("targets.csv").write_text("pose,q1,q2,q3,q4,q5,q6\n1,0.2,-0.3,0.4,0.5,-0.6,0.7\n")
-    assert "run commands.csv on the robot" in following(run("compensate", robot, "targets.csv", "--out", "commands.csv"))
+    assert "run commands.csv on the robot" in following(
+        run("compensate", robot, "targets.csv", "--out", "commands.csv")
+    )
     assert run("export", "urdf", robot, "--out", "calibrated.urdf").status == 0
 
     # the exported robot is the true one: its flange moves as that does, up to where the base stands
     Path("check").mkdir()
-    text = robot.read_text().replace("newcomer.urdf", "../calibrated.urdf").replace(f"frame: flange, xyz: {MARK.tolist()}", "frame: smr, xyz: [0, 0, 0]")
+    text = (
+        robot.read_text()
+        .replace("newcomer.urdf", "../calibrated.urdf")
+        .replace(f"frame: flange, xyz: {MARK.tolist()}", "frame: smr, xyz: [0, 0, 0]")
+    )
     Path("check/robot.yaml").write_text(text)
     found = RobotModel.from_yaml("check/robot.yaml")
     q = np.random.default_rng(5).uniform(-1.5, 1.5, (40, 6))

@@ -18,7 +18,11 @@ MakeTable = Callable[..., ForeignTable]
 def made() -> MakeTable:
     """A foreign table of named columns (N,)."""
 
-    def make(columns: dict[str, np.ndarray], units: dict[str, str] | None = None, *, named: bool = True) -> ForeignTable:
-        return ForeignTable(Table(TableFile(Path("foreign.csv"), tuple(columns), 2), 2, columns), units or {}, named)
+    def make(
+        columns: dict[str, np.ndarray], units: dict[str, str] | None = None, *, named: bool = True
+    ) -> ForeignTable:
+        return ForeignTable(
+            Table(TableFile(Path("foreign.csv"), tuple(columns), 2), 2, columns), units or {}, named
+        )
 
     return make

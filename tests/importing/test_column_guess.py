@@ -10,27 +10,42 @@ from flexcal.importing.column_names import parse_name
 
 SIX = range(1, 7)
 XYZ = ["x", "y", "z"]
-# header, then the quantities that it holds with their first column and unit; nothing else may be recognised
 HEADERS = [
-    (["pose", *(f"J{i}" for i in SIX), *XYZ], {"pose": "pose", "q": "J1", "xyz": "x"}),
-    ([*(f"A{i}" for i in SIX), "X", "Y", "Z", "A", "B", "C"], {"q": "A1", "xyz": "X"}),
-    ([*(f"q_{i}" for i in range(6)), "x_mm", "y_mm", "z_mm"], {"q": "q_0", "xyz": "x_mm"}),
-    (["time", *(f"position[{i}]" for i in range(6)), *(f"effort[{i}]" for i in range(6))], {"t": "time", "q": "position[0]", "tau": "effort[0]"}),
-    (["Time [s]", *(f"axis{i}_pos" for i in SIX), *(f"axis{i}_vel" for i in SIX)], {"t": "Time [s]", "q": "axis1_pos", "dq": "axis1_vel"}),
-    (["timestamp", *(f"actual_q_{i}" for i in range(6)), *(f"target_q_{i}" for i in range(6)), *(f"actual_TCP_pose_{i}" for i in range(6))], {"t": "timestamp", "q": "actual_q_0"}),
-    (["Nr", *(f"Achse {i} [Grad]" for i in SIX), "X_ist", "Y_ist", "Z_ist", "X_soll", "Y_soll", "Z_soll"], {"pose": "Nr", "q": "Achse 1 [Grad]", "xyz": "X_ist"}),
-    (["Point", *(f"Joint {i} (deg)" for i in SIX), "Measured X [mm]", "Measured Y [mm]", "Measured Z [mm]", "Nominal X [mm]", "Nominal Y [mm]", "Nominal Z [mm]"], {"pose": "Point", "q": "Joint 1 (deg)", "xyz": "Measured X [mm]"}),
-    (["t_ms", *(f"m{i}_angle_deg" for i in SIX)], {"t": "t_ms", "q": "m1_angle_deg"}),
-    ([*(f"rob1_j{i}" for i in SIX), "PosX", "PosY", "PosZ", "Error X", "Error Y", "Error Z"], {"q": "rob1_j1", "xyz": "PosX"}),
-    ([*(f"theta{i}" for i in SIX), "px", "py", "pz", "sigma_x", "sigma_y", "sigma_z", "temp"], {"q": "theta1", "xyz": "px", "sigma_xyz": "sigma_x", "temperature": "temp"}),
-    ([*(f"J{i}" for i in SIX), *(f"E{i}" for i in SIX), *XYZ], {"q": "J1", "xyz": "x"}),
-    (["shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3", *(f"pose.position.{a}" for a in XYZ), *(f"pose.orientation.{a}" for a in [*XYZ, "w"])], {"q": "shoulder_pan", "xyz": "pose.position.x", "quaternion": "pose.orientation.w"}),
-    (["wrist_3_joint", "wrist_2_joint", "wrist_1_joint", "elbow_joint", "shoulder_lift_joint", "shoulder_pan_joint", *XYZ], {"q": "shoulder_pan_joint", "xyz": "x"}),
+    ("pose|J*|x|y|z", {"pose": "pose", "q": "J1", "xyz": "x"}),
+    ("A*|X|Y|Z|A|B|C", {"q": "A1", "xyz": "X"}),
+    ("q_#|x_mm|y_mm|z_mm", {"q": "q_0", "xyz": "x_mm"}),
+    ("time|position[#]|effort[#]", {"t": "time", "q": "position[0]", "tau": "effort[0]"}),
+    ("Time [s]|axis*_pos|axis*_vel", {"t": "Time [s]", "q": "axis1_pos", "dq": "axis1_vel"}),
+    ("timestamp|actual_q_#|target_q_#|actual_TCP_pose_#", {"t": "timestamp", "q": "actual_q_0"}),
+    ("Nr|Achse * [Grad]|X_ist|Y_ist|Z_ist|X_soll|Y_soll|Z_soll", {"pose": "Nr", "q": "Achse 1 [Grad]", "xyz": "X_ist"}),
+    ("Point|Joint * (deg)|Measured X [mm]|Measured Y [mm]|Measured Z [mm]|Nominal X [mm]|Nominal Y [mm]|Nominal Z [mm]",
+     {"pose": "Point", "q": "Joint 1 (deg)", "xyz": "Measured X [mm]"}),
+    ("t_ms|m*_angle_deg", {"t": "t_ms", "q": "m1_angle_deg"}),
+    ("rob1_j*|PosX|PosY|PosZ|Error X|Error Y|Error Z", {"q": "rob1_j1", "xyz": "PosX"}),
+    ("theta*|px|py|pz|sigma_x|sigma_y|sigma_z|temp",
+     {"q": "theta1", "xyz": "px", "sigma_xyz": "sigma_x", "temperature": "temp"}),
+    ("J*|E*|x|y|z", {"q": "J1", "xyz": "x"}),
+    ("shoulder_pan|shoulder_lift|elbow|wrist_1|wrist_2|wrist_3|pose.position.x|pose.position.y|pose.position.z|"
+     "pose.orientation.x|pose.orientation.y|pose.orientation.z|pose.orientation.w",
+     {"q": "shoulder_pan", "xyz": "pose.position.x", "quaternion": "pose.orientation.w"}),
+    ("wrist_3_joint|wrist_2_joint|wrist_1_joint|elbow_joint|shoulder_lift_joint|shoulder_pan_joint|x|y|z",
+     {"q": "shoulder_pan_joint", "xyz": "x"}),
 ]  # fmt: skip
+"""Headers, and the quantities in them with their first column; * stands for the numbers of the joints from 1, # from 0."""
 
 
-@pytest.mark.parametrize(("header", "expected"), HEADERS, ids=[" ".join(header)[:40] for header, _ in HEADERS])
+def written_out(header: str) -> list[str]:
+    """The names of all columns."""
+    names = []
+    for name in header.split("|"):
+        count = 6 if set(name) & {"*", "#"} else 1
+        names += [name.replace("*", str(i + 1)).replace("#", str(i)) for i in range(count)]
+    return names
+
+
+@pytest.mark.parametrize(("header", "expected"), HEADERS, ids=[header[:40] for header, _ in HEADERS])
 def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
+    header = written_out(header)
     columns = {name: rng.uniform(-2, 2, 30) for name in header}
     columns |= {name: np.arange(30.0) for name in ("pose", "Nr", "Point") if name in header}
     guess = guess_columns(made(columns), ur5)
@@ -54,9 +69,11 @@ def test_what_is_left_out_says_why(ur5, made, rng, header, words) -> None:
 
 
 def test_units_by_magnitude_and_by_name(ur5, made, rng) -> None:
-    q, xyz = rng.uniform(-2.0, 2.0, (30, 6)), rng.uniform(-0.6, 0.6, (30, 3)) + [3.0, 1.0, 0.5]
+    q, xyz = rng.uniform(-2.0, 2.0, (30, 6)), rng.uniform(-0.6, 0.6, (30, 3)) + np.array([3.0, 1.0, 0.5])
     for factor, scale, angle, length in ((1.0, 1.0, "rad", "m"), (np.rad2deg(1.0), 1e3, "deg", "mm")):
-        columns = {f"J{i + 1}": factor * q[:, i] for i in range(6)} | dict(zip("xyz", scale * xyz.T, strict=True))
+        columns = {f"J{i + 1}": factor * q[:, i] for i in range(6)} | dict(
+            zip("xyz", scale * xyz.T, strict=True)
+        )
         foreign = made(columns)
         placed = guess_columns(foreign, ur5).placed
         assert placed["q"].unit == angle and placed["xyz"].unit == length
@@ -76,7 +93,11 @@ def test_time_by_the_rate(ur5, made, rng, step, unit) -> None:
 def test_without_a_header_order_tells(ur5, made, rng) -> None:
     columns = {"c1": np.arange(30.0)} | {f"c{k}": rng.uniform(-2, 2, 30) for k in range(2, 11)}
     placed = guess_columns(made(columns, named=False), ur5).placed
-    assert placed["pose"].columns == ("c1",) and placed["q"].columns[0] == "c2" and placed["xyz"].columns[-1] == "c10"
+    assert (
+        placed["pose"].columns == ("c1",)
+        and placed["q"].columns[0] == "c2"
+        and placed["xyz"].columns[-1] == "c10"
+    )
     del columns["c9"]
     assert guess_columns(made(columns, named=False), ur5).placed == {}
 

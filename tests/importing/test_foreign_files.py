@@ -39,7 +39,14 @@ def test_text(tmp_path: Path, name: str) -> None:
     foreign = read(path)
     assert tuple(foreign.numbers) == ("Nr", "a", "b")
     np.testing.assert_array_equal(columns(foreign), VALUES)
-    line = int(np.flatnonzero([row.replace('"', "").strip().startswith("1") for row in TEXTS[name].splitlines()])[0]) + 1
+    line = (
+        int(
+            np.flatnonzero(
+                [row.replace('"', "").strip().startswith("1") for row in TEXTS[name].splitlines()]
+            )[0]
+        )
+        + 1
+    )
     assert foreign.table.first == line
     if name == "notes.csv":
         assert foreign.units == {"Nr": "[-]", "a": "[deg]", "b": "[mm]"}
@@ -84,14 +91,19 @@ def test_mat(tmp_path: Path, rng: np.random.Generator) -> None:
     from scipy.io import savemat
 
     q, point = rng.normal(size=(20, 6)), rng.normal(size=(3, 20))
-    savemat(tmp_path / "a.mat", {"log": {"q": q, "point": point}, "t": np.arange(20.0)[:, None], "note": "text", "gain": 3.0})
+    savemat(
+        tmp_path / "a.mat",
+        {"log": {"q": q, "point": point}, "t": np.arange(20.0)[:, None], "note": "text", "gain": 3.0},
+    )
     foreign = read(tmp_path / "a.mat")
     np.testing.assert_array_equal(np.stack([foreign.numbers[f"log.q[{i}]"] for i in range(6)], axis=1), q)
     np.testing.assert_array_equal(foreign.numbers["log.point[2]"], point[2])
     np.testing.assert_array_equal(foreign.numbers["t"], np.arange(20.0))
     assert any("note" in text and "gain" in text for text in foreign.notes)
-    (tmp_path / "new.mat").write_bytes(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400))
-    with pytest.raises(InputError, match="7.3 are not read.*-v7"):
+    (tmp_path / "new.mat").write_bytes(
+        b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400)
+    )
+    with pytest.raises(InputError, match=r"7\.3 are not read.*-v7"):
         read(tmp_path / "new.mat")
 
 

@@ -12,8 +12,15 @@ from flexcal.importing import apply_map, guess_columns
 @pytest.fixture
 def foreign(made, rng):
     columns = {f"J{i}": rng.uniform(-100, 100, 12) for i in range(1, 7)}
-    columns |= {"X [mm]": rng.uniform(-500, 500, 12), "h, up": rng.uniform(-500, 500, 12), "Y": rng.uniform(-500, 500, 12)}
-    columns |= {f"I{i}": rng.uniform(-9, 9, 12) for i in range(1, 7)} | {"T": np.full(12, 20.0), "who": np.full(12, "me")}
+    columns |= {
+        "X [mm]": rng.uniform(-500, 500, 12),
+        "h, up": rng.uniform(-500, 500, 12),
+        "Y": rng.uniform(-500, 500, 12),
+    }
+    columns |= {f"I{i}": rng.uniform(-9, 9, 12) for i in range(1, 7)} | {
+        "T": np.full(12, 20.0),
+        "who": np.full(12, "me"),
+    }
     return made(columns)
 
 
@@ -23,14 +30,18 @@ def mapped(ur5, foreign, *entries):
 
 def test_signs_factors_units_and_offsets(ur5, foreign) -> None:
     table = foreign.numbers
-    guess = mapped(ur5, foreign, "q2=-J2[deg]+90,q3=J4", "q4=J3[rad]", "x=X [mm]", "y=-2*Y[mm]", "z=h, up[um]")
+    guess = mapped(
+        ur5, foreign, "q2=-J2[deg]+90,q3=J4", "q4=J3[rad]", "x=X [mm]", "y=-2*Y[mm]", "z=h, up[um]"
+    )
     q = guess.placed["q"].values(foreign.table)
     np.testing.assert_allclose(q[:, 0], np.deg2rad(table["J1"]))
     np.testing.assert_allclose(q[:, 1], np.deg2rad(90 - table["J2"]))
     np.testing.assert_allclose(q[:, 2], np.deg2rad(table["J4"]))
     np.testing.assert_allclose(q[:, 3], table["J3"])
     xyz = guess.placed["xyz"].values(foreign.table)
-    np.testing.assert_allclose(xyz, np.stack([table["X [mm]"] * 1e-3, -2e-3 * table["Y"], 1e-6 * table["h, up"]], axis=1))
+    np.testing.assert_allclose(
+        xyz, np.stack([table["X [mm]"] * 1e-3, -2e-3 * table["Y"], 1e-6 * table["h, up"]], axis=1)
+    )
     torques = mapped(ur5, foreign, *(f"tau{i}={10 * i}*I{i}[A]" for i in range(1, 7))).placed["tau"]
     np.testing.assert_allclose(torques.values(foreign.table)[:, 2], 30 * table["I3"])
 
@@ -44,14 +55,18 @@ def test_the_signals_block_says_the_same(ur5, foreign, tmp_path) -> None:
     from flexcal.workflow.signals_block import add_signals
 
     shutil.copytree(ur5.path.parent, tmp_path / "ur5")
-    placed = mapped(ur5, foreign, "q2=-J2[deg]+90,q3=J4", "q4=J3[rad]", "x=X [mm]", "y=-2*Y[mm]", "z=h, up[um]").placed
+    placed = mapped(
+        ur5, foreign, "q2=-J2[deg]+90,q3=J4", "q4=J3[rad]", "x=X [mm]", "y=-2*Y[mm]", "z=h, up[um]"
+    ).placed
     robot = tmp_path / "ur5" / "robot.yaml"
     before = robot.read_text()
     add_signals(robot, {name: item.config() for name, item in placed.items() if name in ("q", "xyz")})
     assert robot.read_text().startswith(before)
     signals = mapped_signals(RobotModel.from_yaml(robot, estimates=False))
     for name in ("q", "xyz"):
-        np.testing.assert_allclose(signals[name].values(foreign.table), placed[name].values(foreign.table), rtol=1e-12)
+        np.testing.assert_allclose(
+            signals[name].values(foreign.table), placed[name].values(foreign.table), rtol=1e-12
+        )
     add_signals(robot, {"q": placed["q"].config()})
     with pytest.raises(InputError, match="has `signals:` already"):
         add_signals(robot, {"q": {"columns": [f"A{i}" for i in range(6)]}})

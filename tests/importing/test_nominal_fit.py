@@ -19,7 +19,7 @@ def measured(tx90l):
     lower, upper = (np.array([getattr(joint, side) for joint in tx90l.joints]) for side in ("lower", "upper"))
     q = rng.uniform(0.8 * lower, 0.8 * upper, (25, 6))
     points = point_kinematics(tx90l, q, jacobians=False).position @ rpy_rotation(np.array([0.1, 0.2, 1.0])).T
-    return q, points + [2.0, -1.0, 0.5] + rng.normal(0, 5e-4, points.shape)
+    return q, points + np.array([2.0, -1.0, 0.5]) + rng.normal(0, 5e-4, points.shape)
 
 
 def test_a_robot_that_fits(tx90l, measured) -> None:

@@ -32,13 +32,19 @@ def write(path: Path, storage: str, joints, messages) -> Path:
     with Writer(path, version=9, storage_plugin=StoragePlugin[storage]) as writer:
         topics = {}
         for topic, t, values in messages:
-            kind = "sensor_msgs/msg/JointState" if topic == "/joint_states" else "geometry_msgs/msg/PointStamped"
+            kind = (
+                "sensor_msgs/msg/JointState" if topic == "/joint_states" else "geometry_msgs/msg/PointStamped"
+            )
             if topic not in topics:
                 topics[topic] = writer.add_connection(topic, kind, typestore=store)
             if topic == "/joint_states":
-                message = types[kind](header=header(t), name=joints, position=values, velocity=0 * values, effort=2 * values)
+                message = types[kind](
+                    header=header(t), name=joints, position=values, velocity=0 * values, effort=2 * values
+                )
             else:
-                message = types[kind](header=header(t), point=types["geometry_msgs/msg/Point"](*map(float, values)))
+                message = types[kind](
+                    header=header(t), point=types["geometry_msgs/msg/Point"](*map(float, values))
+                )
             writer.write(topics[topic], round((t + 0.004) * 1e9), store.serialize_cdr(message, kind))
     return path
 
@@ -52,7 +58,11 @@ def stop_and_go(ur5, q: np.ndarray, rng: np.random.Generator, *, points: bool):
         t = 100.0 + k / RATE
         yield "/joint_states", t, now[ORDER] + rng.normal(0, 1e-6, 6)
         if points and k % 5 == 0:
-            yield "/tracker", t, point_kinematics(ur5, now[None], jacobians=False).position[0] + rng.normal(0, NOISE, 3)
+            yield (
+                "/tracker",
+                t,
+                point_kinematics(ur5, now[None], jacobians=False).position[0] + rng.normal(0, NOISE, 3),
+            )
 
 
 @pytest.mark.parametrize("storage", ["MCAP", "SQLITE3"])
@@ -74,7 +84,9 @@ def test_poses_where_the_robot_stands_still(ur5, tmp_path: Path, rng, storage: s
 def test_joint_states_alone_are_a_log(ur5, tmp_path: Path, rng) -> None:
     q = rng.uniform(-1.5, 1.5, (3, 6))
     messages = list(stop_and_go(ur5, q, rng, points=False))
-    foreign = read_foreign(write(tmp_path / "bag", "MCAP", [ur5.joint_names[i] for i in ORDER], messages), ur5.joint_names)
+    foreign = read_foreign(
+        write(tmp_path / "bag", "MCAP", [ur5.joint_names[i] for i in ORDER], messages), ur5.joint_names
+    )
     placed = guess_columns(foreign, ur5).placed
     logged = np.array([values for _, _, values in messages])
     np.testing.assert_array_equal(placed["q"].values(foreign.table)[:, ORDER], logged)
@@ -86,7 +98,9 @@ def test_what_cannot_be_used_is_said(ur5, tmp_path: Path, rng) -> None:
     q = rng.uniform(-1.5, 1.5, (2, 6))
     both = [*stop_and_go(ur5, q, rng, points=True), ("/other", 100.0, np.ones(3))]
     path = write(tmp_path / "two", "MCAP", list(ur5.joint_names), both)
-    with pytest.raises(InputError, match="several topics have points: /other, /tracker; name one with --topic"):
+    with pytest.raises(
+        InputError, match="several topics have points: /other, /tracker; name one with --topic"
+    ):
         read_foreign(path, ur5.joint_names)
     with pytest.raises(InputError, match="no points on the topic '/third'"):
         read_foreign(path, ur5.joint_names, topic="/third")

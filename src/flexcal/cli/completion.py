@@ -25,9 +25,7 @@ class Completion:
     """
 
     shell: Annotated[Positional[Literal["bash", "zsh", "fish"]], arg(help="which shell")]
-    out: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: standard output)")
-    ] = None
+    out: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: standard output)")] = None
     """The file to write it to."""
     json: Json = False
 

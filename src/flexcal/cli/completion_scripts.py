@@ -70,14 +70,21 @@ def _bash() -> str:
     choices, options = [], []
     for verb in VERBS:
         found = options_of(verb)
-        options.append(f"            {quote(verb.name)}) words={quote(' '.join([o.name for o in found] + ['--help']))} ;;")
+        options.append(
+            f"            {quote(verb.name)}) words={quote(' '.join([o.name for o in found] + ['--help']))} ;;"
+        )
         choices += [
             f"        {quote(f'{verb.name} {option.name}')}) words={quote(' '.join(option.choices))} ;;"
             for option in found
             if option.choices
         ]
     choices.append("        'completion completion') words='bash zsh fish' ;;")
-    parts = {"GROUPS": groups, "CHOICES": choices, "OPTIONS": options, "FIRST": [quote(" ".join(_first_words()))]}
+    parts = {
+        "GROUPS": groups,
+        "CHOICES": choices,
+        "OPTIONS": options,
+        "FIRST": [quote(" ".join(_first_words()))],
+    }
     script = _BASH
     for key, lines in parts.items():
         script = script.replace(f"@{key}@", "\n".join(lines))
@@ -90,7 +97,9 @@ def _fish() -> str:
     for word in dict.fromkeys(verb.words[0] for verb in VERBS):
         alone = [verb.summary for verb in VERBS if verb.words == (word,)]
         said = alone[0] if alone else ", ".join(_groups()[word])
-        lines.append(f"complete -c flexcal -f -n 'not __fish_seen_subcommand_from {firsts}' -a {word} -d {quote(said)}")
+        lines.append(
+            f"complete -c flexcal -f -n 'not __fish_seen_subcommand_from {firsts}' -a {word} -d {quote(said)}"
+        )
     for verb in VERBS:
         seen = f"__fish_seen_subcommand_from {verb.words[0]}"
         if len(verb.words) > 1:
@@ -101,7 +110,13 @@ def _fish() -> str:
             )
             seen += f"; and __fish_seen_subcommand_from {verb.words[1]}"
         for option in options_of(verb):
-            takes = "" if option.flag else f" -x -a {quote(' '.join(option.choices))}" if option.choices else " -r"
+            takes = (
+                ""
+                if option.flag
+                else f" -x -a {quote(' '.join(option.choices))}"
+                if option.choices
+                else " -r"
+            )
             lines.append(f"complete -c flexcal -n '{seen}' -l {option.name[2:]}{takes}")
     lines.append("complete -c flexcal -f -n '__fish_seen_subcommand_from completion' -a 'bash zsh fish'")
     return "\n".join(lines) + "\n"

@@ -35,9 +35,7 @@ class Import:
     file: Annotated[Positional[Path], arg(metavar="FILE", help="the measurements; of a rosbag2, the folder")]
     map: Annotated[Texts, arg(metavar="NAME=COLUMN...", help_behavior_hint="(default: as guessed)")] = ()
     """What columns are, over the guess: q2=-J2[deg]+90 x=X[mm] tau1=12.5*I1[A] temperature=none, in quotes where there are spaces."""
-    out: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show the guess)")
-    ] = None
+    out: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show the guess)")] = None
     """The file to write, CSV or Parquet."""
     sheet: Annotated[
         Optional[str],  # noqa: UP045
@@ -91,19 +89,24 @@ class Import:
         fit = found.misfit
         if fit is None:
             return
-        console.say(f"the nominal robot, laid through the points, misses them by {fit.rms / MILLIMETRE:.2f} mm (rms)")
+        console.say(
+            f"the nominal robot, laid through the points, misses them by {fit.rms / MILLIMETRE:.2f} mm (rms)"
+        )
         shift = float(((fit.moved - found.model.point().xyz) ** 2).sum() ** 0.5)
         if not fit.doubtful and shift > _MOVED and fit.moved_rms < 0.5 * fit.rms:
             place = ", ".join(f"{value:.3f}" for value in fit.moved)
             console.say(
-                f"with the point at [{place}] in its frame only {fit.moved_rms / MILLIMETRE:.2f} mm: check its xyz under `points:` in {self.robot}"
+                f"with the point at [{place}] in its frame only {fit.moved_rms / MILLIMETRE:.2f} mm: "
+                f"check its xyz under `points:` in {self.robot}"
             )
 
     def _doubt(self, found: ImportedFile) -> str:
         fit = found.misfit
         assert fit is not None
         share = f"{100 * fit.moved_rms / fit.reach:.0f} % of its reach"
-        what = f"{self.file}: the points are not this robot's as the columns are read: it misses them by {share}"
+        what = (
+            f"{self.file}: the points are not this robot's as the columns are read: it misses them by {share}"
+        )
         if not fit.proposal:
             return f"{what}; check the order, units and signs of the columns, or write them with --unchecked."
         options = "".join(f" '{option}'" for option in fit.options)
@@ -125,4 +128,6 @@ class Import:
             return f"flexcal identify dynamics {self.robot} {self.out}"
         if found.kind == "joints":
             return f"flexcal design poses {self.robot} --from {self.out} --out plan.yaml"
-        return f"flexcal calibrate {self.robot} {self.out}, or flexcal verify on poses that were kept for that"
+        return (
+            f"flexcal calibrate {self.robot} {self.out}, or flexcal verify on poses that were kept for that"
+        )

@@ -19,7 +19,9 @@ def first_rows_table(found: ImportedFile) -> Table:
     """One row a column of flexcal: the file's column, its unit, the first values in SI, and why."""
     what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions"}[found.kind]
     rows = len(next(iter(found.columns.values())))
-    table = Table(title=escape(f"{found.file}: {what}, {rows} rows; the first in SI units"), title_justify="left")
+    table = Table(
+        title=escape(f"{found.file}: {what}, {rows} rows; the first in SI units"), title_justify="left"
+    )
     table.add_column("")
     table.add_column("column")
     table.add_column("unit")
@@ -34,10 +36,18 @@ def first_rows_table(found: ImportedFile) -> Table:
             sign = "" if placed.gains[i] == 1 else "−" if placed.gains[i] == -1 else f"{placed.gains[i]:g} · "
             offset = f" {placed.offsets[i]:+g}" if placed.offsets[i] else ""
             column = f"{sign}{placed.columns[i]}{offset}"
-            table.add_row(name, escape(column), placed.units[i] or "", *_first(found, name), placed.why if not i else "″")
+            table.add_row(
+                name,
+                escape(column),
+                placed.units[i] or "",
+                *_first(found, name),
+                placed.why if not i else "″",
+            )
     for name in found.columns:
         if name not in listed:
-            table.add_row(name, "", "", *_first(found, name), "rows are numbered" if name == "pose" else "its name")
+            table.add_row(
+                name, "", "", *_first(found, name), "rows are numbered" if name == "pose" else "its name"
+            )
     return table
 
 

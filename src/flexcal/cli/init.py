@@ -37,7 +37,9 @@ class Init:
         console = Console(self.json)
         found = init_robot(self.urdf, self.out, tip=self.tip)
         arm, model = found.arm, found.model
-        console.say(f"{model.name}: {model.n} joints ({', '.join(model.joint_names)}), reach {model.reach:.2f} m")
+        console.say(
+            f"{model.name}: {model.n} joints ({', '.join(model.joint_names)}), reach {model.reach:.2f} m"
+        )
         if arm.locked:
             stand = ", ".join(f"{name} at {value:g}" for name, value in arm.locked.items())
             console.say(f"no part of the arm, locked: {stand}")

@@ -39,7 +39,9 @@ def refusal(verb: Verb, said: str) -> InputError:
         left = told[0].partition(":")[2].strip()
         return InputError(f"'flexcal {verb.name}' has no place for {left}; {explained}")
     sentence = " ".join(line.strip() for line in told).rstrip(".").replace(". Expected", "; expected")
-    sentence = re.sub(r"invalid literal for int\(\) with base 10: ('.*?')", r"\1 is no whole number", sentence)
+    sentence = re.sub(
+        r"invalid literal for int\(\) with base 10: ('.*?')", r"\1 is no whole number", sentence
+    )
     sentence = re.sub(r"could not convert string to float: ('.*?')", r"\1 is no number", sentence)
     return InputError(f"{sentence[:1].lower()}{sentence[1:]}; {explained}")
 

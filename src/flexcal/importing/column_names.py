@@ -31,7 +31,22 @@ _UNITS = {
 }
 _SPELLINGS = {spelling: unit for unit, spellings in _UNITS.items() for spelling in spellings}
 _OTHER_UNITS = ("-", "1", "c", "°c", "degc", "k", "v", "%", "none", "hz")
-_AS_WORD = {"deg", "degree", "degrees", "rad", "radian", "radians", "mm", "um", "ms", "us", "nm", "ma", "rpm", "kg"}
+_AS_WORD = {
+    "deg",
+    "degree",
+    "degrees",
+    "rad",
+    "radian",
+    "radians",
+    "mm",
+    "um",
+    "ms",
+    "us",
+    "nm",
+    "ma",
+    "rpm",
+    "kg",
+}
 """Units that a last word of a name is taken for."""
 _LAST_WORD = {"m", "s", "a", "n"}
 """Units that it is taken for after other words only, and no number."""

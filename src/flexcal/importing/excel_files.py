@@ -23,7 +23,7 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
         import fastexcel
     except ImportError:
         raise InputError(
-            f"{path}: Excel files need fastexcel: pip install 'flexcal[excel]', or save the sheet as CSV."
+            f"{path}: Excel files need fastexcel: pip install fastexcel; or save the sheet as CSV."
         ) from None
     try:
         book = fastexcel.read_excel(path)
@@ -43,7 +43,9 @@ def read_excel(path: Path, sheet: str | None) -> ForeignTable:
     columns = {name: _column(cells) for name, cells in zip(header.names, exact, strict=True)}
     first = header.first + 1
     others = [name for name in names if name != chosen]
-    notes = header.notes + ((f"of the sheets only '{chosen}' was read; --sheet names another",) if others else ())
+    notes = header.notes + (
+        (f"of the sheets only '{chosen}' was read; --sheet names another",) if others else ()
+    )
     table = Table(TableFile(path, header.names, first), first, columns)
     return ForeignTable(table, header.units, header.named, notes)
 

@@ -49,14 +49,19 @@ def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: 
         quantity = next((q for q, columns in names.items() if name in columns or name == q), None)
         if quantity is None:
             known = [column for columns in names.values() for column in columns]
-            near = suggestion(name, known) or f"; known are q1 … q{model.n}, x, y, z, t, tau1 … tau{model.n} and others."
+            near = (
+                suggestion(name, known)
+                or f"; known are q1 … q{model.n}, x, y, z, t, tau1 … tau{model.n} and others."
+            )
             raise InputError(f"--map {entry}: there is no '{name}'{near}")
         if source == "none":
             placed.pop(quantity, None)
         elif name not in names[quantity]:
             raise InputError(f"--map {entry}: say it for each of {', '.join(names[quantity])}.")
         else:
-            said.setdefault(quantity, {})[names[quantity].index(name)] = _source(entry, quantity, source, foreign)
+            said.setdefault(quantity, {})[names[quantity].index(name)] = _source(
+                entry, quantity, source, foreign
+            )
     for quantity, entries in said.items():
         placed[quantity] = _said(quantity, entries, placed.get(quantity), names[quantity], foreign, model)
     mapped = {column for quantity in said for column in placed[quantity].columns}
@@ -66,7 +71,9 @@ def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: 
     taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
     reasons = {left.column: left.why for left in guess.left_out}
     left = tuple(
-        LeftOut(column, reasons.get(column, "not mapped")) for column in foreign.table.columns if column not in taken
+        LeftOut(column, reasons.get(column, "not mapped"))
+        for column in foreign.table.columns
+        if column not in taken
     )
     return Guess(placed, texts, left)
 

@@ -30,7 +30,9 @@ def read_mat(path: Path) -> ForeignTable:
         ) from None
     except (MatReadError, ValueError, TypeError, OSError) as problem:
         reason = " ".join(str(problem).split()) or type(problem).__name__
-        raise InputError(f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'.") from problem
+        raise InputError(
+            f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
+        ) from problem
     variables: dict[str, np.ndarray] = {}
     others: list[str] = []
     for name, value in content.items():
@@ -38,7 +40,9 @@ def read_mat(path: Path) -> ForeignTable:
             _collect(name, value, variables, others)
     lengths = Counter(length for value in variables.values() for length in set(value.shape) if length > 1)
     if not lengths:
-        raise InputError(f"{path}: it holds no columns of numbers; a table object is no such: save its columns.")
+        raise InputError(
+            f"{path}: it holds no columns of numbers; a table object is no such: save its columns."
+        )
     most = max(lengths.values())
     rows = max(length for length, count in lengths.items() if count == most)
     columns: dict[str, np.ndarray] = {}

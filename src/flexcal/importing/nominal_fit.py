@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexcal.importing.column_names import parse_name
 from flexcal.importing.placed_columns import PlacedColumns
 from flexcal.model import point_kinematics
 from flexcal.units import DEGREE, MILLIMETRE
@@ -106,7 +107,9 @@ def _explained(
         return tool.miss(joints, points, _ROUNDS)[0] < enough
 
     if fits(q, xyz * [1.0, 1.0, -1.0]):
-        return replace(found, proposal="the points are in a left-handed frame: one of x, y, z counts the other way")
+        return replace(
+            found, proposal="the points are in a left-handed frame: one of x, y, z counts the other way"
+        )
     for order in _orders(model.n):
         if fits(q[:, order], xyz):
             columns = [placed.columns[i] for i in order]
@@ -119,7 +122,9 @@ def _explained(
             if signs[i] < 0:
                 words.append(f"{joint.name} seems to be counted the other way")
             if zeros[i]:
-                words.append(f"{joint.name} seems to be {abs(zeros[i]) / DEGREE:.0f} degrees from the URDF's zero")
+                words.append(
+                    f"{joint.name} seems to be {abs(zeros[i]) / DEGREE:.0f} degrees from the URDF's zero"
+                )
         return replace(found, proposal="; ".join(words), options=_options(placed, None, signs, zeros, model))
     return found
 
@@ -188,6 +193,7 @@ def _options(
         gain = sign * placed.gains[source]
         offset = sign * placed.offsets[source] + zero / scale
         factor = "-" if gain == -1 else "" if gain == 1 else f"{gain:g}*"
-        text = f"q{i + 1}={factor}{placed.columns[source]}[{unit}]"
+        column = placed.columns[source]
+        text = f"q{i + 1}={factor}{column}" + ("" if parse_name(column).unit == unit else f"[{unit}]")
         texts.append(text + (f"{offset:+.10g}" if offset else ""))
     return tuple(texts)

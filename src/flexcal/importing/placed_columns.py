@@ -42,7 +42,11 @@ class PlacedColumns:
         """How SI values come from the columns."""
         factors = np.array([_factor(self.quantity, unit) for unit in self.units])
         return Signal(
-            self.quantity, self.columns, np.array(self.gains) * factors, None, np.array(self.offsets) * factors
+            self.quantity,
+            self.columns,
+            np.array(self.gains) * factors,
+            None,
+            np.array(self.offsets) * factors,
         )
 
     def values(self, table: Table) -> np.ndarray:

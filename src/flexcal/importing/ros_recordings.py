@@ -41,7 +41,7 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
-        raise InputError(f"{path}: recordings of ROS need rosbags: pip install 'flexcal[ros]'.") from None
+        raise InputError(f"{path}: recordings of ROS need rosbags: pip install rosbags.") from None
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             topics = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_JOINTS, *_POINTS)}
@@ -60,7 +60,9 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         )
     best = max(states, key=lambda s: (len(set(s.names) & set(joints)), len(s.names), len(s.received)))
     notes = [
-        f"the joint states of {', '.join(other.names)} on {other.topic} are left out" for other in states if other is not best
+        f"the joint states of {', '.join(other.names)} on {other.topic} are left out"
+        for other in states
+        if other is not best
     ]
     if points is None:
         return _log(path, best, notes)
@@ -119,9 +121,14 @@ def _stamp(message: Any) -> float:
 
 
 def _stream(
-    topic: str, rows: Sequence[tuple[float, float, Any]], fields: dict[str, np.ndarray], names: tuple[str, ...] = ()
+    topic: str,
+    rows: Sequence[tuple[float, float, Any]],
+    fields: dict[str, np.ndarray],
+    names: tuple[str, ...] = (),
 ) -> _Stream:
-    return _Stream(topic, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]), fields, names)
+    return _Stream(
+        topic, np.array([row[0] for row in rows]), np.array([row[1] for row in rows]), fields, names
+    )
 
 
 def _log(path: Path, states: _Stream, notes: list[str]) -> ForeignTable:
@@ -152,7 +159,9 @@ def _poses(path: Path, states: _Stream, points: _Stream, notes: list[str]) -> Fo
         units[f"{name} position"] = "rad"
     columns |= {axis: xyz[:, k] for k, axis in enumerate("xyz")}
     units |= dict.fromkeys("xyz", "m")
-    notes.append(f"{len(q)} poses in which the robot stood still and {points.topic} has points, both averaged")
+    notes.append(
+        f"{len(q)} poses in which the robot stood still and {points.topic} has points, both averaged"
+    )
     if without:
         notes.append(f"{without} standstills without points are left out")
     if sigma is not None:
@@ -163,5 +172,7 @@ def _poses(path: Path, states: _Stream, points: _Stream, notes: list[str]) -> Fo
     return _table(path, columns, units, notes)
 
 
-def _table(path: Path, columns: dict[str, np.ndarray], units: dict[str, str], notes: list[str]) -> ForeignTable:
+def _table(
+    path: Path, columns: dict[str, np.ndarray], units: dict[str, str], notes: list[str]
+) -> ForeignTable:
     return ForeignTable(Table(TableFile(path, tuple(columns), 1), 1, columns), units, notes=tuple(notes))

@@ -59,9 +59,14 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
     ways = {link: _way(link, above, joints) for link in above}
     if tip is None:
         alike = {name for name in movable if name in mimics or _GRIPPER.search(name)}
-        beyond = {name: {n for way in ways.values() if name in way for n in way[way.index(name) :]} for name in alike}
+        beyond = {
+            name: {n for way in ways.values() if name in way for n in way[way.index(name) :]}
+            for name in alike
+        }
         beside = {name for name in alike if beyond[name] & set(movable) <= alike}
-        chain = _only_chain(path, {link: [n for n in way if n in movable] for link, way in ways.items()}, beside, ways)
+        chain = _only_chain(
+            path, {link: [n for n in way if n in movable] for link, way in ways.items()}, beside, ways
+        )
     else:
         if tip not in ways:
             near = suggestion(tip, list(ways)) or f"; the links are {', '.join(ways)}."
@@ -75,9 +80,7 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
             f"joint '{held[0]}' is on the way to the tool and mimics another one, which flexcal does not handle; "
             "use a URDF in which it is fixed or moves by itself."
         )
-    frames = [
-        link for link in ways if tuple(n for n in ways[link] if n in movable) == chain and link != tip
-    ]
+    frames = [link for link in ways if tuple(n for n in ways[link] if n in movable) == chain and link != tip]
     ordered = ([] if tip is None else [tip]) + sorted(frames, key=lambda link: _rank(link, ways))
     locked = {name: _at_rest(joints[name]) for name in movable if name not in chain}
     return Arm(chain, locked, ordered[0], tuple(ordered))

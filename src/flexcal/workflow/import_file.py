@@ -145,7 +145,11 @@ def _kind(
     unsure = [left for left in guess.left_out if "could both be" in left.why]
     if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
         left = "; ".join(reasons_of(guess.left_out))
-        what = f"the joint positions q1 … q{model.n}" if "q" not in guess.placed else "the measured points x, y, z"
+        what = (
+            f"the joint positions q1 … q{model.n}"
+            if "q" not in guess.placed
+            else "the measured points x, y, z"
+        )
         example = "q1=COLUMN[deg]" if "q" not in guess.placed else "x=COLUMN[mm]"
         raise InputError(
             f"{foreign.table.file.path}: {what} were not recognised ({left}); say which they are: --map {example} and so on."
@@ -169,7 +173,9 @@ def _kind(
         for column in item.columns
     ]
     texts = guess.texts if kind == "poses" else {}
-    left += [LeftOut(column, f"no part of {what}") for name, column in guess.texts.items() if name not in texts]
+    left += [
+        LeftOut(column, f"no part of {what}") for name, column in guess.texts.items() if name not in texts
+    ]
     return kind, Guess(placed, texts, (*guess.left_out, *left))
 
 

@@ -1,0 +1,45 @@
+"""The words by which people name columns."""
+
+from __future__ import annotations
+
+
+def _words(text: str) -> frozenset[str]:
+    return frozenset(text.split())
+
+
+JOINT = _words("q j joint joints axis axes ax achse theta th θ jnt gelenk angle angles winkel")
+"""Of joint positions, whatever stands beside them; the others of `POSITION` are so only with one of these, or a joint's name."""
+POSITION = JOINT | _words("a position positions pos state states value values encoder")
+NO_JOINT = _words("tcp cartesian pose error err dev deviation force voltage limit mode offset digital analog")
+NO_JOINT |= _words("residual correction delta status")
+KINDS = (
+    ("ddq", _words("ddq qdd acceleration accelerations acc accel")),
+    ("dq", _words("dq qd velocity velocities vel speed qdot rate")),
+    ("tau", _words("tau τ torque torques effort efforts moment drehmoment")),
+    ("current", _words("current currents i iq strom amp amps")),
+    ("q", POSITION),
+)
+"""What one column a joint can be, the most telling words first."""
+MEASURED = _words("actual act ist measured meas feedback fb tracker lt smr")
+COMMANDED = _words("target desired des soll cmd command commanded ref reference nominal nom setpoint")
+NEUTRAL = MEASURED | COMMANDED | _words("robot arm motor link the of in")
+POINT = {"x": "x", "y": "y", "z": "z", "px": "x", "py": "y", "pz": "z"}
+NO_POINT = _words("force f error err deviation dev delta normal velocity vel v speed acc offset rpy")
+TURN = _words("orientation quaternion quat rotation rot")
+SIGMA = _words("sigma σ std sd uncertainty stddev")
+SINGLE = {
+    "t": _words("t time timestamp stamp zeit seconds secs"),
+    "pose": _words("pose poses no nr id number index idx measurement point punkt sample row"),
+    "payload": _words("payload load"),
+    "temperature": _words("temperature temp temperatur"),
+    "length": _words("length wire distance"),
+    "sigma": SIGMA,
+}
+"""Quantities with one column."""
+
+
+def rank(words: tuple[str, ...]) -> int:
+    """Measured before plain before commanded."""
+    if set(words) & MEASURED:
+        return 0
+    return 2 if set(words) & COMMANDED else 1

@@ -1,0 +1,118 @@
+"""Columns of which there is one a joint: by the joints' names in the URDF, or by words and numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from flexcal.importing.column_names import ColumnName, parse_name
+from flexcal.importing.column_words import (
+    JOINT,
+    KINDS,
+    NEUTRAL,
+    NO_JOINT,
+    POSITION,
+    SIGMA,
+    SINGLE,
+    TURN,
+    rank,
+)
+
+if TYPE_CHECKING:
+    from flexcal.model import RobotModel
+
+
+def joint_quantities(
+    names: Sequence[ColumnName], model: RobotModel, reasons: dict[str, str]
+) -> dict[str, tuple[str, ...]]:
+    """Columns of every quantity with one a joint; `reasons` gets those that are like them and not used."""
+    groups: dict[tuple[str, tuple[str, ...]], dict[int, str]] = {}
+    numbered: dict[tuple[str, tuple[str, ...]], dict[int, str]] = {}
+    for name in names:
+        joint, words = _joint_of(name, model)
+        quantity = _kind(words, named=joint is not None, unit=name.unit)
+        if quantity is None or set(words) & (TURN | SIGMA | SINGLE["temperature"]):
+            continue
+        if joint is not None:
+            groups.setdefault((quantity, words), {})[joint] = name.column
+        elif name.number is not None:
+            numbered.setdefault((quantity, words), {})[name.number] = name.column
+        locked = [held for held in model.config.locked if _says(name, held) is not None]
+        if joint is None and locked:
+            reasons[name.column] = f"{locked[0]} is locked"
+    for key, columns in numbered.items():
+        numbers = sorted(columns)
+        if numbers in (list(range(model.n)), list(range(1, model.n + 1))):
+            groups.setdefault(key, {i - numbers[0]: columns[i] for i in numbers})
+        elif key[0] == "q" and len(numbers) > 1:
+            why = f"there are {len(numbers)} of them, but {model.n} joints"
+            reasons |= {column: why for column in columns.values() if column not in reasons}
+    return _best(groups, model.n, reasons)
+
+
+def _best(
+    groups: Mapping[tuple[str, tuple[str, ...]], Mapping[int, str]], n: int, reasons: dict[str, str]
+) -> dict[str, tuple[str, ...]]:
+    """Of every quantity the group with all joints that is measured rather than commanded; none where two are alike."""
+    found: dict[str, tuple[str, ...]] = {}
+    for quantity in dict.fromkeys(key[0] for key in groups):
+        of_it = {words: columns for (kind, words), columns in groups.items() if kind == quantity}
+        whole = sorted((words for words in of_it if len(of_it[words]) == n), key=rank)
+        for words in of_it.keys() - set(whole):
+            reasons |= dict.fromkeys(of_it[words].values(), f"only {len(of_it[words])} of {n} joints")
+        if quantity == "current":
+            why = "currents need a gain in N m/A: --map 'tau1=GAIN*COLUMN[A]' and so on"
+            reasons |= {column: why for words in whole for column in of_it[words].values()}
+            continue
+        if len(whole) > 1 and rank(whole[0]) == rank(whole[1]):
+            tied = [of_it[words][0] for words in whole if rank(words) == rank(whole[0])]
+            why = f"{' and '.join(tied)} begin what could both be {quantity}: say which with --map"
+            reasons |= {column: why for words in whole for column in of_it[words].values()}
+            continue
+        for words in whole[1:]:
+            reasons |= dict.fromkeys(of_it[words].values(), f"{of_it[whole[0]][0]} … are taken as {quantity}")
+        if whole:
+            found[quantity] = tuple(of_it[whole[0]][joint] for joint in range(n))
+    return found
+
+
+def _joint_of(name: ColumnName, model: RobotModel) -> tuple[int | None, tuple[str, ...]]:
+    """The joint whose name stands in that of a column, and the other words."""
+    best: tuple[int, int, tuple[str, ...]] | None = None
+    for joint, called in enumerate(model.joint_names):
+        rest = _says(name, called)
+        if rest is not None and (best is None or len(called) > best[0]):
+            best = (len(called), joint, rest)
+    return (None, name.words) if best is None else (best[1], best[2])
+
+
+def _says(name: ColumnName, called: str) -> tuple[str, ...] | None:
+    """The words of a column's name beside a joint's, with or without its last word `joint`; None where it is not in it."""
+    column = _run_together(name.column)
+    for text in (called, called.removesuffix("_joint")):
+        key = _run_together(text)
+        at = f"_{column}_".find(f"_{key}_")
+        if at >= 0 and len(key) > 1:
+            rest = f"_{column}_".replace(f"_{key}_", "_", 1)
+            return parse_name(rest.strip("_") or "q").words
+    return None
+
+
+def _run_together(text: str) -> str:
+    """Letters and digits with single underscores between them."""
+    return "_".join("".join(c.lower() if c.isalnum() else " " for c in text).split())
+
+
+def _kind(words: Sequence[str], *, named: bool, unit: str | None) -> str | None:
+    """The quantity that words speak of; with a joint's name and no word it is its position."""
+    telling = [word for word in words if word not in NEUTRAL]
+    if unit in ("A", "mA"):
+        return "current"
+    for quantity, spoken in KINDS:
+        if set(telling) & spoken:
+            others = {word for word in telling if word not in spoken | POSITION and len(word) > 1}
+            sure = named or not others or (set(telling) & JOINT and not others & NO_JOINT)
+            return quantity if quantity != "q" or sure else None
+    if named and not telling:
+        return "q"
+    return None
