@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from itertools import product
-from typing import TYPE_CHECKING
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexcal.importing.column_names import parse_name
 from flexcal.importing.placed_columns import PlacedColumns
 from flexcal.model import point_kinematics
-from flexcal.units import DEGREE, MILLIMETRE
+from flexcal.units import DEGREE
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
@@ -97,103 +97,107 @@ class _Tool:
         return float(np.sqrt(np.mean(np.sum(left**2, axis=1)))), shift
 
 
+@dataclass(frozen=True, eq=False)
+class _Change:
+    """Another reading of the columns: their `order`, `signs` and `zeros` (rad) of the joints, points in a `mirrored` frame."""
+
+    order: tuple[int, ...]
+    signs: np.ndarray
+    zeros: np.ndarray
+    mirrored: bool = False
+
+    def read(self, q: np.ndarray, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return self.signs * q[:, self.order] + self.zeros, xyz * [1.0, 1.0, -1.0] if self.mirrored else xyz
+
+
 def _explained(
     model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray, placed: PlacedColumns, found: Misfit
 ) -> Misfit:
-    """The misfit with the simplest explanation that makes good most of it."""
+    """The misfit with the simplest explanation that makes good most of it, with the point where it was declared if one does so."""
     enough = min(_MADE_GOOD * found.moved_rms, _ODD * model.reach)
-
-    def fits(joints: np.ndarray, points: np.ndarray) -> bool:
-        return tool.miss(joints, points, _ROUNDS)[0] < enough
-
-    if fits(q, xyz * [1.0, 1.0, -1.0]):
-        return replace(
-            found, proposal="the points are in a left-handed frame: one of x, y, z counts the other way"
-        )
-    for order in _orders(model.n):
-        if fits(q[:, order], xyz):
-            columns = [placed.columns[i] for i in order]
-            text = f"the joints seem to stand in another order: {', '.join(columns)}"
-            return replace(found, proposal=text, options=_options(placed, order, None, None, model))
-    best = _signs_and_zeros(model, tool, q, xyz)
-    if best is not None and fits(best[0] * q + best[1], xyz):
-        words, signs, zeros = [], *best
-        for i, joint in enumerate(model.joints):
-            if signs[i] < 0:
-                words.append(f"{joint.name} seems to be counted the other way")
-            if zeros[i]:
-                words.append(
-                    f"{joint.name} seems to be {abs(zeros[i]) / DEGREE:.0f} degrees from the URDF's zero"
-                )
-        return replace(found, proposal="; ".join(words), options=_options(placed, None, signs, zeros, model))
+    simple = list(_simple_changes(model))
+    for rounds in (1, _ROUNDS):
+        for change in simple:
+            if tool.miss(*change.read(q, xyz), rounds)[0] < enough:
+                return replace(found, **_said(model, placed, change))
+    if model.n <= _MOST_JOINTS:
+        change = _signs_and_zeros(model, tool, q, xyz)
+        if tool.miss(*change.read(q, xyz), _ROUNDS)[0] < enough:
+            return replace(found, **_said(model, placed, change))
     return found
 
 
-def _orders(n: int) -> Iterator[list[int]]:
-    """Other orders of n columns: turned round, the first at the end, two exchanged."""
-    straight = list(range(n))
-    yield straight[::-1]
-    yield [*straight[1:], 0]
-    yield [n - 1, *straight[:-1]]
-    for i in range(n):
-        for j in range(i + 1, n):
-            order = straight.copy()
-            order[i], order[j] = j, i
-            yield order
+def _simple_changes(model: RobotModel) -> Iterator[_Change]:
+    """A left-handed frame; one joint's sign; one joint's zero; another order of the columns."""
+    n = model.n
+    straight, ones, zeros = tuple(range(n)), np.ones(n), np.zeros(n)
+    yield _Change(straight, ones, zeros, mirrored=True)
+    for i in straight:
+        yield _Change(straight, np.where(np.arange(n) == i, -1.0, 1.0), zeros)
+    for i in _turning(model):
+        for turn in _TURNS[1:]:
+            yield _Change(straight, ones, np.where(np.arange(n) == i, turn, 0.0))
+    for order in (straight[::-1], (*straight[1:], 0), (n - 1, *straight[:-1])):
+        yield _Change(order, ones, zeros)
+    for i, j in combinations(straight, 2):
+        exchanged = list(straight)
+        exchanged[i], exchanged[j] = j, i
+        yield _Change(tuple(exchanged), ones, zeros)
 
 
-def _signs_and_zeros(
-    model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray
-) -> tuple[np.ndarray, np.ndarray] | None:
-    """Signs (n,) and zeros (n,), rad, that fit best: all signs, quarter turns one joint at a time; the fewest changes among equals.
+def _turning(model: RobotModel) -> list[int]:
+    """The joints whose zero is seen: not the first and the last, for instrument and point may be anywhere."""
+    return [i for i in range(1, model.n - 1) if model.joints[i].kind != "prismatic"]
 
-    The zeros of the first joint and of the last are not seen where the instrument's frame and the point's place are free.
-    """
-    if model.n > _MOST_JOINTS:
-        return None
-    revolute = [i for i, joint in enumerate(model.joints) if joint.kind != "prismatic"]
-    tried: list[tuple[float, np.ndarray, np.ndarray]] = []
+
+def _signs_and_zeros(model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray) -> _Change:
+    """The signs and zeros that fit best: all signs, quarter turns one joint at a time; the fewest changes among equals."""
+    tried: list[tuple[float, _Change]] = []
     for combination in product((1.0, -1.0), repeat=model.n):
-        signs, zeros = np.array(combination), np.zeros(model.n)
-        rms = tool.miss(signs * q, xyz, _SOME_ROUNDS)[0]
+        change = _Change(tuple(range(model.n)), np.array(combination), np.zeros(model.n))
+        rms = tool.miss(*change.read(q, xyz), _SOME_ROUNDS)[0]
         for _ in range(2):
             before = rms
-            for i in revolute[1:-1]:
+            for i in _turning(model):
                 for turn in _TURNS:
-                    other = zeros.copy()
-                    other[i] = turn
-                    left = tool.miss(signs * q + other, xyz, _SOME_ROUNDS)[0]
+                    zeros = np.where(np.arange(model.n) == i, turn, change.zeros)
+                    other = replace(change, zeros=zeros)
+                    left = tool.miss(*other.read(q, xyz), _SOME_ROUNDS)[0]
                     if left < 0.9 * rms:
-                        rms, zeros = left, other
+                        rms, change = left, other
             if rms > 0.99 * before:
                 break
-        tried.append((rms, signs, zeros))
-    least = min(rms for rms, _, _ in tried)
-    alike = [(signs, zeros) for rms, signs, zeros in tried if rms <= _ALIKE * least]
-    return min(alike, key=lambda item: np.sum(item[0] < 0) + 1.5 * np.sum(item[1] != 0))
+        tried.append((rms, change))
+    least = min(rms for rms, _ in tried)
+    alike = [change for rms, change in tried if rms <= _ALIKE * least]
+    return min(alike, key=lambda change: np.sum(change.signs < 0) + 1.5 * np.sum(change.zeros != 0))
 
 
-def _options(
-    placed: PlacedColumns,
-    order: list[int] | None,
-    signs: np.ndarray | None,
-    zeros: np.ndarray | None,
-    model: RobotModel,
-) -> tuple[str, ...]:
-    """What to write behind --map for the joints that change."""
-    texts = []
-    for i in range(model.n):
-        source = i if order is None else order[i]
-        sign = -1.0 if signs is not None and signs[i] < 0 else 1.0
-        zero = 0.0 if zeros is None else zeros[i]
-        if source == i and sign > 0 and not zero:
-            continue
-        unit = placed.units[source]
-        scale = DEGREE if unit == "deg" else MILLIMETRE if unit == "mm" else 1.0
-        gain = sign * placed.gains[source]
-        offset = sign * placed.offsets[source] + zero / scale
-        factor = "-" if gain == -1 else "" if gain == 1 else f"{gain:g}*"
-        column = placed.columns[source]
-        text = f"q{i + 1}={factor}{column}" + ("" if parse_name(column).unit == unit else f"[{unit}]")
-        texts.append(text + (f"{offset:+.10g}" if offset else ""))
-    return tuple(texts)
+def _said(model: RobotModel, placed: PlacedColumns, change: _Change) -> dict[str, Any]:
+    """`proposal` and `options` of a misfit that a change explains."""
+    words, options = [], []
+    if change.mirrored:
+        words.append("the points are in a left-handed frame: one of x, y, z counts the other way")
+    if change.order != tuple(range(model.n)):
+        words.append(
+            f"the joints seem to stand in another order: {', '.join(placed.columns[i] for i in change.order)}"
+        )
+    for i, joint in enumerate(model.joints):
+        sign, zero, source = change.signs[i], change.zeros[i], change.order[i]
+        if sign < 0:
+            words.append(f"{joint.name} seems to be counted the other way")
+        if zero:
+            words.append(f"{joint.name} seems to be {abs(zero) / DEGREE:.0f} degrees from the URDF's zero")
+        if sign < 0 or zero or source != i:
+            options.append(f"q{i + 1}={_source(placed, source, sign, zero)}")
+    return {"proposal": "; ".join(words), "options": tuple(options)}
+
+
+def _source(placed: PlacedColumns, i: int, sign: float, zero: float) -> str:
+    """Column `i` as --map has it, with another sign, and a zero in rad."""
+    column, unit = placed.columns[i], placed.units[i]
+    gain = sign * placed.gains[i]
+    offset = sign * placed.offsets[i] + zero / (DEGREE if unit == "deg" else 1.0)
+    factor = "-" if gain == -1 else "" if gain == 1 else f"{gain:g}*"
+    named = "" if parse_name(column).unit == unit else f"[{unit}]"
+    return f"{factor}{column}{named}" + (f"{offset:+.10g}" if offset else "")
