@@ -117,3 +117,14 @@ def test_files_that_are_no_robot(tmp_path: Path, text: str) -> None:
     (tmp_path / "arm.urdf").write_text(text)
     with pytest.raises(InputError, match=r"no link|not <robot>|no movable joint"):
         read_urdf(tmp_path / "arm.urdf", {})
+
+
+def test_an_unlimited_joint_about_a_skew_axis(tmp_path: Path) -> None:
+    limited = ARM.replace('<axis xyz="0 2 0"/>', '<axis xyz="0 2 -1"/>')
+    assert limited != ARM and 'type="revolute"' in ARM
+    (tmp_path / "arm.urdf").write_text(limited)
+    (tmp_path / "free.urdf").write_text(limited.replace('type="revolute"', 'type="continuous"'))
+    (joint,), (free,) = (read_urdf(tmp_path / name, {}).joints for name in ("arm.urdf", "free.urdf"))
+    np.testing.assert_allclose(free.axis, np.array([0, 2, -1]) / np.sqrt(5), rtol=1e-15)
+    np.testing.assert_array_equal(free.axis, joint.axis)
+    assert np.isinf(free.upper) and free.kind == "revolute"

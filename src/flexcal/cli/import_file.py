@@ -110,7 +110,11 @@ class Import:
         if not fit.proposal:
             return f"{what}; check the order, units and signs of the columns, or write them with --unchecked."
         options = "".join(f" '{option}'" for option in fit.options)
-        return f"{what}; {fit.proposal}" + (f": --map{options}" if options else "; correct the file") + "."
+        return (
+            f"{what}; {fit.proposal}"
+            + (f": --map{options}" if options else "; put it right with --map, as z=-COLUMN")
+            + "."
+        )
 
     def _add_signals(self, console: Console, found: ImportedFile) -> None:
         from flexcal.workflow.signals_block import add_signals

@@ -56,9 +56,12 @@ _WORDS = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[θφτσω]")
 
 @dataclass(frozen=True)
 class ColumnName:
-    """`column` as it stands in the file; its words in lower case, without numbers and unit; the last number in it; the unit."""
+    """`column` as it stands in the file, `text` without a unit in brackets; its words in lower case, without numbers and unit; the last
+    number in it; the unit.
+    """
 
     column: str
+    text: str
     words: tuple[str, ...]
     number: int | None
     unit: str | None
@@ -89,7 +92,7 @@ def parse_name(column: str, unit: str | None = None) -> ColumnName:
             found, parts = _SPELLINGS[last], parts[:-1]
     numbers = [int(part) for part in parts if part.isdigit()]
     words = tuple(part for part in parts if not part.isdigit())
-    return ColumnName(column, words, numbers[-1] if numbers else None, found)
+    return ColumnName(column, text, words, numbers[-1] if numbers else None, found)
 
 
 def _is_short(parts: list[str]) -> bool:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+from flexcal.data.signals import JOINT_QUANTITIES
 from flexcal.importing.column_names import ColumnName, parse_name
 from flexcal.importing.column_words import (
     JOINT,
@@ -20,6 +21,13 @@ from flexcal.importing.column_words import (
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
+
+_BY_UNIT = {
+    "current": ("A", "mA"),
+    "tau": ("N m",),
+    "dq": ("rad/s", "deg/s", "rpm"),
+    "ddq": ("rad/s^2", "deg/s^2"),
+}
 
 
 def joint_quantities(
@@ -57,15 +65,16 @@ def _best(
     found: dict[str, tuple[str, ...]] = {}
     for quantity in dict.fromkeys(key[0] for key in groups):
         of_it = {words: columns for (kind, words), columns in groups.items() if kind == quantity}
-        whole = sorted((words for words in of_it if len(of_it[words]) == n), key=rank)
+        order = {words: (rank(words), words != (quantity,)) for words in of_it}
+        whole = sorted((words for words in of_it if len(of_it[words]) == n), key=order.__getitem__)
         for words in of_it.keys() - set(whole):
             reasons |= dict.fromkeys(of_it[words].values(), f"only {len(of_it[words])} of {n} joints")
         if quantity == "current":
             why = "currents need a gain in N m/A: --map 'tau1=GAIN*COLUMN[A]' and so on"
             reasons |= {column: why for words in whole for column in of_it[words].values()}
             continue
-        if len(whole) > 1 and rank(whole[0]) == rank(whole[1]):
-            tied = [of_it[words][0] for words in whole if rank(words) == rank(whole[0])]
+        if len(whole) > 1 and order[whole[0]] == order[whole[1]]:
+            tied = [of_it[words][0] for words in whole if order[words] == order[whole[0]]]
             why = f"{' and '.join(tied)} begin what could both be {quantity}: say which with --map"
             reasons |= {column: why for words in whole for column in of_it[words].values()}
             continue
@@ -88,13 +97,13 @@ def _joint_of(name: ColumnName, model: RobotModel) -> tuple[int | None, tuple[st
 
 def _says(name: ColumnName, called: str) -> tuple[str, ...] | None:
     """The words of a column's name beside a joint's, with or without its last word `joint`; None where it is not in it."""
-    column = _run_together(name.column)
+    column = _run_together(name.text)
     for text in (called, called.removesuffix("_joint")):
         key = _run_together(text)
         at = f"_{column}_".find(f"_{key}_")
         if at >= 0 and len(key) > 1:
             rest = f"_{column}_".replace(f"_{key}_", "_", 1)
-            return parse_name(rest.strip("_") or "q").words
+            return parse_name(f"q{rest}").words
     return None
 
 
@@ -106,8 +115,11 @@ def _run_together(text: str) -> str:
 def _kind(words: Sequence[str], *, named: bool, unit: str | None) -> str | None:
     """The quantity that words speak of; with a joint's name and no word it is its position."""
     telling = [word for word in words if word not in NEUTRAL]
-    if unit in ("A", "mA"):
-        return "current"
+    if "_".join(words) in JOINT_QUANTITIES:
+        return "_".join(words)
+    by_unit = next((quantity for quantity, units in _BY_UNIT.items() if unit in units), None)
+    if by_unit is not None:
+        return by_unit
     for quantity, spoken in KINDS:
         if set(telling) & spoken:
             others = {word for word in telling if word not in spoken | POSITION and len(word) > 1}

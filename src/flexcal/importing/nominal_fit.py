@@ -177,7 +177,9 @@ def _said(model: RobotModel, placed: PlacedColumns, change: _Change) -> dict[str
     """`proposal` and `options` of a misfit that a change explains."""
     words, options = [], []
     if change.mirrored:
-        words.append("the points are in a left-handed frame: one of x, y, z counts the other way")
+        words.append(
+            "the points are in a left-handed frame: one of x, y, z counts the other way, or two are exchanged"
+        )
     if change.order != tuple(range(model.n)):
         words.append(
             f"the joints seem to stand in another order: {', '.join(placed.columns[i] for i in change.order)}"

@@ -13,8 +13,8 @@ from flexcal.units import MILLIMETRE
 from flexcal.workflow.pose_remarks import unused_columns
 
 _LOOK = (
-    "these data hardly fit this robot: look for a column with a wrong sign, unit or place in the order, and for points of another "
-    "target or robot; --loss cauchy finds single wrong points"
+    "these data hardly fit this robot: look for a column with a wrong sign, unit or place in the order, for points of another "
+    "target or robot, and for a wrong xyz under `points:` (flexcal import looks for these); --loss cauchy finds single wrong points"
 )
 
 _ABSURD = 100.0
