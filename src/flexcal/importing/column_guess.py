@@ -14,7 +14,7 @@ from flexcal.importing.column_words import NEUTRAL, NO_POINT, POINT, SIGMA, SING
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.joint_columns import joint_quantities
 from flexcal.importing.placed_columns import PlacedColumns
-from flexcal.importing.unit_guess import point_unit, shared_joint_units, time_unit
+from flexcal.importing.unit_guess import joint_units, point_unit, time_unit
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
@@ -167,7 +167,7 @@ def place(
         return PlacedColumns.plain(quantity, columns, tuple(said), f"{why}; the unit stands there")
     values = np.stack([foreign.numbers[column] for column in columns], axis=1)
     if quantity in ("q", "qa"):
-        units = shared_joint_units(model, values)
+        units = joint_units(model, values)
         return PlacedColumns.plain(quantity, columns, units, f"{why}; the unit by the joints' limits")
     if quantity == "xyz":
         units = (point_unit(model, values),) * 3

@@ -55,6 +55,7 @@ def _columns(sheet: Any) -> list[list[Any]]:
 
 
 def _column(cells: list[Any]) -> np.ndarray:
-    if all(isinstance(cell, int | float) or cell is None for cell in cells):
+    numbers = [isinstance(cell, int | float) for cell in cells]
+    if any(numbers) and all(number or cell is None for number, cell in zip(numbers, cells, strict=True)):
         return np.array([np.nan if cell is None else cell for cell in cells], dtype=float)
     return values(["" if cell is None else str(cell) for cell in cells])

@@ -9,32 +9,32 @@ import numpy as np
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
 
-_OVER = 0.05
-"""A joint may be past its limits by this share of its range: limits of URDFs are rounded, and some robots go past them."""
+_OVER = 1.05
+"""Robots go past the limits in their URDF by so much, which are often rounded."""
 _LARGEST = 4.0
 """Points of one target lie within so many times the reach of their middle."""
 _SLOWEST_IN_MS = 110.0
 
 
-def joint_unit(model: RobotModel, joint: int, values: np.ndarray) -> str:
-    """The unit of a joint's positions (N,): rad (m) where all are within its limits, which some robots pass a little, else deg (mm)."""
-    kind = model.joints[joint]
-    units = {"m": 1.0, "mm": 1e-3} if kind.kind == "prismatic" else {"rad": 1.0, "deg": np.pi / 180}
-    lower = kind.lower if np.isfinite(kind.lower) else -2 * np.pi
-    upper = kind.upper if np.isfinite(kind.upper) else 2 * np.pi
-    room = _OVER * (upper - lower)
-    finite = values[np.isfinite(values)]
-    first, second = units
-    within = (finite >= lower - room) & (finite <= upper + room)
-    return first if within.all() else second
+def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
+    """The unit of every column of joint positions (N, n): rad (m) where none is past the widest limit of all such joints, else deg (mm).
+
+    A single joint's limits do not count: one that is counted the other way is past them in any unit.
+    """
+    kinds = np.array([joint.kind == "prismatic" for joint in model.joints])
+    chosen = {}
+    for prismatic, (unit, other) in ((False, ("rad", "deg")), (True, ("m", "mm"))):
+        values = np.abs(q[:, kinds == prismatic])
+        largest = float(np.nanmax(values, initial=0.0))
+        chosen[prismatic] = unit if largest <= _OVER * _widest(model, prismatic) else other
+    return tuple(chosen[bool(prismatic)] for prismatic in kinds)
 
 
-def shared_joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
-    """The unit of every column of joint positions (N, n); revolute joints have one, for no file mixes degrees and radians."""
-    found = [joint_unit(model, i, q[:, i]) for i in range(model.n)]
-    revolute = "deg" if "deg" in found else "rad"
-    slides = "mm" if "mm" in found else "m"
-    return tuple(slides if joint.kind == "prismatic" else revolute for joint in model.joints)
+def _widest(model: RobotModel, prismatic: bool) -> float:
+    """The largest limit (rad or m) of the joints of a kind; a joint without limits turns by 2π."""
+    own = [joint for joint in model.joints if (joint.kind == "prismatic") == prismatic]
+    limits = [abs(limit) for joint in own for limit in (joint.lower, joint.upper)]
+    return max((limit if np.isfinite(limit) else 2 * np.pi for limit in limits), default=0.0)
 
 
 def point_unit(model: RobotModel, xyz: np.ndarray) -> str:

@@ -123,16 +123,18 @@ def import_file(
     remarks = list(foreign.notes)
     if kind == "log" and "tau" not in guess.placed:
         remarks.append("there are no torques: 'identify dynamics' needs tau1 and so on")
-    misfit = None
-    if kind == "poses":
-        _check_poses(foreign, guess, model, columns, values)
-        misfit = _misfit(guess, model, columns, values)
-    elif kind == "log":
-        _check_time(foreign, guess, values["t"][:, 0])
+    misfit = _misfit(guess, model, columns, values) if kind == "poses" else None
     found = ImportedFile(
         file, kind, tuple(guess.placed.values()), guess.left_out, columns, misfit, tuple(remarks), None, model
     )
-    if out is None or not (found.trusted or unchecked):
+    if not (found.trusted or unchecked):
+        return found
+    check_joint_units(model, foreign.table, guess.placed["q"].signal(), values["q"])
+    if kind == "poses":
+        _check_poses(foreign, guess, model, columns, values)
+    elif kind == "log":
+        _check_time(foreign, guess, values["t"][:, 0])
+    if out is None:
         return found
     write_table(out, columns)
     return replace(found, out=out)
@@ -206,7 +208,6 @@ def _converted(
         columns["pose"] = columns["pose"].astype(np.int64)
         values["pose"] = columns["pose"]
     columns |= {name: foreign.table.columns[column] for name, column in guess.texts.items()}
-    check_joint_units(model, foreign.table, guess.placed["q"].signal(), values["q"])
     return columns, values
 
 
