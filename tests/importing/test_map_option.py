@@ -89,6 +89,7 @@ def test_a_guess_is_taken_back(ur5, foreign) -> None:
         ("x=Y", "says nothing of y, z"),
         ("tau1=I1[A]", "by a gain in N m/A"),
         ("q1=who", "holds texts"),
+        ("q1=0*J1", "finite number other than 0"),
         ("q=J1", "say it for each of q1, q2"),
         ("target=J99", "no column 'J99'"),
     ],

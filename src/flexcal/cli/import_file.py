@@ -92,7 +92,7 @@ class Import:
         console.say(
             f"the nominal robot, laid through the points, misses them by {fit.rms / MILLIMETRE:.2f} mm (rms)"
         )
-        shift = float(((fit.moved - found.model.point().xyz) ** 2).sum() ** 0.5)
+        shift = float(((fit.moved - fit.declared) ** 2).sum() ** 0.5)
         if not fit.doubtful and shift > _MOVED and fit.moved_rms < 0.5 * fit.rms:
             place = ", ".join(f"{value:.3f}" for value in fit.moved)
             console.say(

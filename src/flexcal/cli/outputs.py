@@ -28,6 +28,8 @@ def outputs(out: Path | None, names: Sequence[str] = (), *, page: bool = False) 
     if out is None:
         yield
         return
+    if not names and out.is_dir():
+        raise InputError(f"{out} is a folder; name a file in it with --out.")
     folder = out if names else out.parent
     patterns = names or [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
     made = _make(folder)

@@ -66,6 +66,9 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
         if name.lower() == "station"
         or (name.lower() in ("target", "point") and set(values.tolist()) <= set(model.points))
     }
+    for name in foreign.texts.keys() - set(texts.values()):
+        if name.lower() == "target":
+            reasons[name] = "its names are not all under `points:` of robot.yaml"
     texts = {"target" if key == "point" else key: name for key, name in texts.items()}
     return _guess(foreign, placed, texts, reasons)
 

@@ -90,6 +90,8 @@ def _source(
     match = _FACTOR.match(source)
     assert match is not None
     gain = float(match[2] or 1.0) * (-1.0 if match[1] == "-" else 1.0)
+    if not 0 < abs(gain) < float("inf"):
+        raise InputError(f"--map {entry}: the factor must be a finite number other than 0.")
     rest, offset, unit = match[3].strip(), 0.0, None
     if source in foreign.numbers:
         rest, gain = source, 1.0

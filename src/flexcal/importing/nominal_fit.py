@@ -36,12 +36,13 @@ _ALIKE = 1.5
 class Misfit:
     """By how much (rms, m) the registered nominal robot misses the points.
 
-    moved: where in its frame (m) the point would have to be to fit best, and `moved_rms` what that leaves. proposal: what would explain
-    a misfit, in words, and `options` to say so with --map; empty where nothing simple does, or none is needed.
+    declared: where the point is in its frame (m); moved: where it would have to be to fit best, and `moved_rms` what that leaves.
+    proposal: what would explain a misfit, in words, and `options` to say so with --map; empty where nothing simple does, or none is needed.
     """
 
     rms: float
     moved_rms: float
+    declared: np.ndarray
     moved: np.ndarray
     reach: float
     proposal: str = ""
@@ -68,7 +69,8 @@ def check_nominal(
     tool = _Tool(model, point)
     rms, _ = tool.miss(q, xyz, 1)
     moved_rms, shift = tool.miss(q, xyz, _ROUNDS)
-    found = Misfit(rms, moved_rms, model.point(point).xyz + shift, model.reach)
+    declared = model.point(point).xyz
+    found = Misfit(rms, moved_rms, declared, declared + shift, model.reach)
     if moved_rms < _ODD * model.reach:
         return found
     return _explained(model, tool, q, xyz, placed, found)

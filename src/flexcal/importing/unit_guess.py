@@ -11,13 +11,15 @@ if TYPE_CHECKING:
 
 _OVER = 1.05
 """Robots go past the limits in their URDF by so much, which are often rounded."""
+_NEARLY_ALL = 0.95
+"""Share of the rows by which a unit is guessed: a wild value does not change it."""
 _LARGEST = 4.0
 """Points of one target lie within so many times the reach of their middle."""
 _SLOWEST_IN_MS = 110.0
 
 
 def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
-    """The unit of every column of joint positions (N, n): rad (m) where none is past the widest limit of all such joints, else deg (mm).
+    """The unit of every column of joint positions (N, n): rad (m) where few are past the widest limit of all such joints, else deg (mm).
 
     A single joint's limits do not count: one that is counted the other way is past them in any unit.
     """
@@ -25,7 +27,7 @@ def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
     chosen = {}
     for prismatic, (unit, other) in ((False, ("rad", "deg")), (True, ("m", "mm"))):
         values = np.abs(q[:, kinds == prismatic])
-        largest = float(np.nanmax(values, initial=0.0))
+        largest = float(np.nanquantile(values, _NEARLY_ALL, axis=0).max(initial=0.0))
         chosen[prismatic] = unit if largest <= _OVER * _widest(model, prismatic) else other
     return tuple(chosen[bool(prismatic)] for prismatic in kinds)
 
@@ -39,7 +41,8 @@ def _widest(model: RobotModel, prismatic: bool) -> float:
 
 def point_unit(model: RobotModel, xyz: np.ndarray) -> str:
     """The unit of points (N, 3): metres where they fit into a few times the reach, else millimetres or micrometres."""
-    spread = float(np.nanmax(np.linalg.norm(xyz - np.nanmedian(xyz, axis=0), axis=1), initial=0.0))
+    distance = np.linalg.norm(xyz - np.nanmedian(xyz, axis=0), axis=1)
+    spread = float(np.nanquantile(distance, _NEARLY_ALL))
     for unit, factor in (("m", 1.0), ("mm", 1e-3)):
         if spread * factor <= _LARGEST * max(model.reach, 0.1):
             return unit

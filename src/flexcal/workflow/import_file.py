@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.data import PoseSet
 from flexcal.data.joint_limits import check_joint_units
 from flexcal.data.pose_checks import check_metres, check_same_pose
-from flexcal.data.pose_columns import unit_quaternions
+from flexcal.data.pose_columns import check_positive, unit_quaternions
 from flexcal.data.signals import JOINT_QUANTITIES, standard_columns
 from flexcal.data.table import Table, write_table
 from flexcal.errors import InputError
@@ -124,17 +124,20 @@ def import_file(
     if kind == "log" and "tau" not in guess.placed:
         remarks.append("there are no torques: 'identify dynamics' needs tau1 and so on")
     misfit = _misfit(guess, model, columns, values) if kind == "poses" else None
+    if "xyz" in values and misfit is None:
+        why = "there are too few poses" if model.points else "robot.yaml declares no point under `points:`"
+        remarks.append(f"{why}, so they were not compared with the nominal robot")
     found = ImportedFile(
         file, kind, tuple(guess.placed.values()), guess.left_out, columns, misfit, tuple(remarks), None, model
     )
-    if not (found.trusted or unchecked):
+    if misfit is not None and misfit.proposal and not unchecked:
         return found
     check_joint_units(model, foreign.table, guess.placed["q"].signal(), values["q"])
     if kind == "poses":
         _check_poses(foreign, guess, model, columns, values)
     elif kind == "log":
         _check_time(foreign, guess, values["t"][:, 0])
-    if out is None:
+    if out is None or not (found.trusted or unchecked):
         return found
     write_table(out, columns)
     return replace(found, out=out)
@@ -221,6 +224,9 @@ def _check_poses(
     n = len(foreign)
     table: Table = foreign.table
     check_same_pose(values["pose"], values["q"], table)
+    for quantity in ("sigma", "sigma_xyz", "length"):
+        if quantity in values:
+            check_positive(table, guess.placed[quantity].signal(), values[quantity], zero=False)
     place = "xyz" if "xyz" in values else "length"
     poses = PoseSet(
         q=values["q"],
