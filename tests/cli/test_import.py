@@ -104,3 +104,18 @@ def test_points_that_are_left_out_are_named(run, ur5_folder: Path, foreign: Path
     outcome = run("import", ur5_folder / "robot.yaml", foreign)
     assert outcome.status == 0 and "joint positions" in outcome.out
     assert "left out: tracker x, remark, tracker z: not recognised" in outcome.out
+
+
+def test_one_wild_value_is_named_with_its_line(run, ur5_folder: Path) -> None:
+    header, rows = read_csv(ur5_folder / "grid.csv")
+    for column, words in (("x", "line 5, column x"), ("q2", "line 5, column q2")):
+        wild = rows[::25].copy()
+        wild[3, header.index(column)] = 1e6
+        outcome = run("import", ur5_folder / "robot.yaml", write_csv(ur5_folder / "wild.csv", header, wild))
+        assert outcome.status == 2 and words in outcome.err
+
+
+def test_a_folder_is_no_file_to_write(run, ur5_folder: Path) -> None:
+    before = snapshot(ur5_folder)
+    outcome = run("import", ur5_folder / "robot.yaml", ur5_folder / "grid.csv", "--out", ur5_folder)
+    assert outcome.status == 2 and "is a folder" in outcome.err and snapshot(ur5_folder) == before

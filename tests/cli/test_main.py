@@ -25,6 +25,8 @@ def test_help_lists_every_verb_with_an_example(run) -> None:
 def test_steps_come_in_the_order_of_the_procedure(run) -> None:
     page = run("--help").out
     order = [
+        "init",
+        "import",
         "design frequency",
         "measure",
         "identify response",
