@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import (
     Json,
@@ -40,7 +41,7 @@ class Calibrate:
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
     """How the uncertainty of stiffness and inertia enters; both give the same geometry to first order."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 
     def run(self) -> None:
@@ -61,6 +62,7 @@ class Calibrate:
                 secant_scale=self.secant_scale,
                 elasticity=self.elasticity,
                 out=self.out,
+                command=command_line(),
                 progress=progress,
             )
         document = found.document()

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from contextlib import redirect_stderr
 from importlib import import_module
 
+from flexcal.cli.command_line import keep_command_line
 from flexcal.cli.letters import show_near_letters
 from flexcal.cli.verbs import Verb, find_verb, overview, unknown_verb
 from flexcal.errors import FlexcalError
@@ -31,6 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # what a verb imports and reads stays until its end: looking through it for cycles every 700 objects finds none
     gc.set_threshold(100_000)
     show_near_letters()
+    keep_command_line(given)
     try:
         status = _run(given)
         sys.stdout.flush()

@@ -173,7 +173,7 @@ STEPS = (
                 "Calibrate",
                 "measured positions to geometry; says what could not be told apart",
                 "flexcal calibrate robot.yaml poses.csv",
-                ("results.json", "report.html"),
+                ("results.json", "points.csv", "arm.npz", "report.html"),
             ),
         ),
     ),
@@ -186,7 +186,7 @@ STEPS = (
                 "Verify",
                 "accuracy on poses that the calibration never saw",
                 "flexcal verify robot.yaml others.csv",
-                ("results.json", "report.html"),
+                ("results.json", "points.csv", "arm.npz", "report.html"),
             ),
             Verb(
                 ("compensate",),

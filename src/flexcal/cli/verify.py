@@ -7,6 +7,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, require_files, require_robot
 
@@ -19,7 +20,7 @@ class Verify:
     poses: PoseFiles
     estimates: Estimates = None
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
-    """Folder for report.html and results.json; without it there is no report."""
+    """Folder for report.html, results.json and points.csv; without it there is no report."""
     json: Json = False
 
     def run(self) -> None:
@@ -30,7 +31,9 @@ class Verify:
         require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
         console = Console(self.json)
-        found = verify_robot(self.robot, self.poses, estimates=self.estimates, out=self.out)
+        found = verify_robot(
+            self.robot, self.poses, estimates=self.estimates, out=self.out, command=command_line()
+        )
         document = found.document()
         blocks = document["verification"]
         labels = {"nominal": "before (registered only)", "measured": "calibrated"}

@@ -2,47 +2,55 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from flexcal.calibration import Calibration, ErrorStatistics, TermSelection
-from flexcal.model import RobotModel
+from flexcal.estimation import Estimate
 from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
+from flexcal.report.figures.term_scores import TermStep
 from flexcal.report.first_screen import rung, three_facts
-from flexcal.report.notation import NOTHING, millimetres, ratio, statistics_cells
-from flexcal.report.page import Check, Page, Section, Table, Verdict, worst
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, ArmPoses, MeasuredPoints
+from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
+from flexcal.report.page import Check, Page, Section, Table, Text, Verdict, worst
 from flexcal.report.render import write_page
-from flexcal.report.sections.geometry import error_figure, pose_figure
-from flexcal.report.sections.identifiability import identifiability_blocks
+from flexcal.report.sections.geometry import arm_figure, error_figure
+from flexcal.report.sections.identifiability import Determined, identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.terms import terms_section
 from flexcal.report.two_stage import TRUST
+from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
 class CalibrationStudy:
-    """A calibration on measured poses.
+    """A calibration on measured poses, as its folder has it.
 
-    `before` (N, 3) m are the errors of the uncalibrated, rigid robot at the poses of `selected`, after a rigid registration; `rigid` is the
-    fit without further terms, `selected` the one that is kept; `selection` is None where the terms were given. `provenance` holds input
-    files with their hashes, `results` the document of results.json.
+    `results` is the document of results.json, `estimate` the block of estimates.yaml. `points` are those of the fit; they have errors of
+    the rigid model where it is not the calibrated one. `arms` is the calibrated robot at them.
     """
 
-    nominal: RobotModel
-    before: np.ndarray
-    rigid: Calibration
-    selected: Calibration
-    selection: TermSelection | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    results: Mapping[str, Any] = field(default_factory=dict)
-    command: str = ""
+    results: Mapping[str, Any]
+    estimate: Estimate
+    points: MeasuredPoints
+    arms: ArmPoses
+
+    @property
+    def determined(self) -> Determined:
+        """What the poses determine of the calibrated model."""
+        return Determined.stored(self.results["identifiability"]["selected"])
+
+    @property
+    def steps(self) -> tuple[TermStep, ...]:
+        """What the selection of terms tried; empty where the terms were given."""
+        return tuple(
+            TermStep(tuple(step["terms"]), step["order_mm"] * MILLIMETRE, step["workspace_mm"] * MILLIMETRE)
+            for step in self.results["term_selection"]
+        )
 
 
 def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
@@ -52,45 +60,45 @@ def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
 
 def calibration_page(study: CalibrationStudy) -> Page:
     """The page before it becomes HTML."""
-    fit = study.selected
+    results, points = study.results, study.points
     sections = [_accuracy_section(study)]
-    if study.selection is not None and study.selection.table:
-        sections.append(terms_section(study.selection))
+    if study.steps:
+        sections.append(terms_section(study.steps, results["terms"]))
     sections += [
-        residuals_section(fit),
+        residuals_section(results["joints"], points.poses, points.calibrated, study.estimate.outliers),
         Section(
             "geometry",
             "What the poses determine",
             "Not every length and angle can be seen from the points that were measured. What cannot is held at its nominal value, named "
             "here with what stands in for it.",
             (
-                *identifiability_blocks(fit.identifiability, None),
-                parameter_table(fit.estimate, _names(fit), None),
+                *identifiability_blocks(study.determined, None),
+                parameter_table(study.estimate, tuple(results["identifiability"]["selected"]["kept"]), None),
             ),
         ),
-        provenance_section(study.command, None, study.seconds, study.provenance),
+        provenance_section(results["command"], None, {}, study.estimate.provenance),
     ]
-    stations = len(fit.poses.stations)
+    stations = len(points.poses.stations)
     return Page(
-        title=f"{study.nominal.name}: calibration report",
-        subtitle=f"Calibration on {len(fit.poses)} measured points"
+        title=f"{results['robot']}: calibration report",
+        subtitle=f"Calibration on {len(points.poses)} measured points"
         + (f" from {stations} stations" if stations > 1 else "")
-        + f" · terms: {', '.join(term.replace('_', ' ') for term in fit.terms)}",
+        + f" · terms: {', '.join(term.replace('_', ' ') for term in results['terms'])}",
         verdict=calibration_verdict(study),
         sections=sections,
-        document=study.results,
+        document=results,
     )
 
 
 def calibration_verdict(study: CalibrationStudy) -> Verdict:
     """How accurate it was, how accurate it is at the measured poses, and whether that can be trusted."""
-    before, rigid, after = ErrorStatistics.of(study.before), study.rigid.errors, study.selected.errors
+    before, after = study.points.statistics(NOMINAL), study.points.statistics(CALIBRATED)
     checks = calibration_checks(study)
     status = worst(checks)
     answer, headline = TRUST[status]
     rungs = [rung("as delivered", before, "nominal")]
-    if study.rigid is not study.selected:
-        rungs.append(rung("rigid geometry", rigid, "rigid"))
+    if RIGID in study.points.errors:
+        rungs.append(rung("rigid geometry", study.points.statistics(RIGID), "rigid"))
     rungs.append(rung("calibrated", after, "elastic"))
     return Verdict(
         status,
@@ -107,25 +115,32 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
 
 def calibration_checks(study: CalibrationStudy) -> tuple[Check, ...]:
     """The checks behind the verdict."""
-    fit, found = study.selected, study.selected.identifiability
-    table = study.selection.table if study.selection is not None else ()
-    left_out = next(((order, place) for terms, order, place in table if terms == fit.terms), None)
+    results, found, errors = study.results, study.determined, study.points.statistics(CALIBRATED)
+    terms = tuple(results["terms"])
+    left_out = next(((step.order, step.place) for step in study.steps if step.terms == terms), None)
+    drift = results["drift"]
+    distance = math.nan if drift["distance_mm"] is None else drift["distance_mm"] * MILLIMETRE
     return (
-        check_left_out(fit.errors.mean, left_out),
+        check_left_out(errors.mean, left_out),
         check_residual(
-            "Does noise explain what the fit leaves?", fit.estimate, sigma_given=fit.poses.sigma_given
+            "Does noise explain what the fit leaves?",
+            study.estimate,
+            sigma_given=results["fit"]["sigma_given"],
         ),
-        check_rank(len(found.names), found.rank, found.gap),
-        check_drift(fit),
-        check_outliers(fit),
+        check_rank(found.parameters, found.rank, found.gap),
+        check_drift(distance, certain=drift["certain"]),
+        check_outliers(len(study.estimate.outliers), errors),
     )
 
 
 def _accuracy_section(study: CalibrationStudy) -> Section:
-    rows = [("as delivered, after registration", *_row(ErrorStatistics.of(study.before)), NOTHING)]
-    if study.rigid is not study.selected:
-        rows.append(("rigid geometry", *_row(study.rigid.errors), str(study.rigid.identifiability.rank)))
-    rows.append(("calibrated", *_row(study.selected.errors), str(study.selected.identifiability.rank)))
+    points, seen = study.points, study.results["identifiability"]
+    ranks = {NOMINAL: NOTHING, RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
+    rows = []
+    for model, label in _LABELS.items():
+        if model in points.errors:
+            statistics = points.statistics(model)
+            rows.append((label, str(statistics.poses), *statistics_cells(statistics), ranks[model]))
     table = Table(
         "table-accuracy",
         "Errors at the measured poses",
@@ -133,19 +148,23 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
         tuple(rows),
         strong=(len(rows) - 1,),
     )
+    remarks = study.results["remarks"]
     return Section(
         "accuracy",
         "Before and after",
         "Distances between measured and predicted points. These are the poses of the fit; poses that it never saw tell more: measure some "
         "and run flexcal verify.",
-        (table, error_figure(study.selected, study.before), pose_figure(study.selected, study.before)),
+        (
+            table,
+            *([Text((), "Remarks", sentences(remarks))] if remarks else []),
+            arm_figure(study.arms, len(points.poses)),
+            error_figure(points.poses, points.errors[NOMINAL], points.calibrated),
+        ),
     )
 
 
-def _row(statistics: ErrorStatistics) -> tuple[str, ...]:
-    return (str(statistics.poses), *statistics_cells(statistics))
-
-
-def _names(fit: Calibration) -> tuple[str, ...]:
-    kept = set(fit.identifiability.kept_names)
-    return tuple(name for name in fit.estimate.parameters.names if name in kept)
+_LABELS = {
+    NOMINAL: "as delivered, after registration",
+    RIGID: "rigid geometry",
+    CALIBRATED: "calibrated",
+}

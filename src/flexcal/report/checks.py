@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration import Calibration, Drift, ErrorStatistics, Verification
+from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.estimation import Estimate
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Check
@@ -99,14 +99,13 @@ def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = Tru
     return Check(question, answer, "good")
 
 
-def check_drift(calibration: Calibration) -> Check:
-    """Whether what the fit leaves goes with the order of measuring."""
+def check_drift(distance: float, *, certain: bool) -> Check:
+    """Whether what the fit leaves goes with the order of measuring, by so much (m) from the first pose to the last."""
     question = "Did robot and instrument stay as they were while the poses were measured?"
-    drift = Drift.of(calibration)
-    if not drift.certain:
+    if not certain:
         return Check(question, "Nothing speaks against it.", "good")
     answer = (
-        f"What the fit leaves goes with the order of measuring, {millimetres(drift.distance)} mm from the first pose to the last. Let the "
+        f"What the fit leaves goes with the order of measuring, {millimetres(distance)} mm from the first pose to the last. Let the "
         "robot warm up and the instrument settle, or measure in random order if place and order went together."
     )
     return Check(question, answer, "care")
@@ -178,17 +177,12 @@ def check_left_out(mean: float, left_out: tuple[float, float] | None) -> Check:
     return Check(question, answer, "good")
 
 
-def check_outliers(calibration: Calibration) -> Check:
-    """Whether single measurements stand out."""
+def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
+    """Whether single measurements stand out: so many `outliers` of a robust loss, or the worst of the errors."""
     question = "Are there measurements that stand out?"
-    found = len(calibration.estimate.outliers)
-    if found:
-        share = found / len(calibration.poses)
-        answer = (
-            f"{found} of {len(calibration.poses)} were set aside by the robust loss; they are listed below."
-        )
-        return Check(question, answer, "good" if share <= 0.02 else "care")
-    fit = calibration.errors
+    if outliers:
+        answer = f"{outliers} of {fit.poses} were set aside by the robust loss; they are listed below."
+        return Check(question, answer, "good" if outliers <= 0.02 * fit.poses else "care")
     if fit.max > 4 * fit.p90:
         return Check(
             question,

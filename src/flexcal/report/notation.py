@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
 from flexcal.calibration import ErrorStatistics
 from flexcal.units import MILLIMETRE
@@ -71,3 +72,8 @@ def ratio(worse: float, better: float) -> str:
         return "many times"
     times = worse / better
     return f"{times:.0f} times" if times >= 10 else f"{times:.1f} times"
+
+
+def sentences(remarks: Sequence[str]) -> tuple[str, ...]:
+    """Remarks as they end a line of the terminal, as sentences: with a capital and a full stop."""
+    return tuple(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)

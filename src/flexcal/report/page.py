@@ -105,6 +105,19 @@ class Selector:
     options: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Slider:
+    """How many times longer than they are a figure draws the vectors of those traces whose `meta` has the `exaggeration` they come with.
+
+    `factors` are the choices; every option of the selector `key` has its own, `start` at first.
+    """
+
+    label: str
+    key: str
+    factors: tuple[float, ...]
+    start: Mapping[str, float]
+
+
 @dataclass(frozen=True, eq=False)
 class FigureBlock:
     """A figure with what a reader needs: title, how to read it, and a description for those who cannot see it."""
@@ -115,6 +128,7 @@ class FigureBlock:
     caption: str
     description: str
     selectors: tuple[Selector, ...] = ()
+    slider: Slider | None = None
     kind: Literal["figure"] = "figure"
 
 

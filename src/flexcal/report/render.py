@@ -58,6 +58,8 @@ def figure_json(block: FigureBlock) -> str:
     specification = json.loads(str(block.figure.to_json()))
     specification["layout"].pop("template", None)
     selectors = {selector.key: selector.options[0] for selector in block.selectors}
+    if block.slider is not None:
+        specification |= {"stretched_by": block.slider.key, "factors": dict(block.slider.start)}
     return script_json(specification | {"selected": selectors})
 
 

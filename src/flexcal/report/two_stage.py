@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flexcal.calibration import Drift
 from flexcal.report.checks import (
     check_claimed_uncertainty,
     check_drift,
@@ -93,6 +94,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     fit, found = study.calibration, study.stiffness.estimate
     geometry = fit.identifiability
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
+    drift = Drift.of(fit)
     checks = [
         check_fresh_poses(fit.errors, study.elastic_verification.all),
         check_claimed_uncertainty(study.elastic_verification, study.unpredicted_noise),
@@ -102,7 +104,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
             sigma_given=fit.poses.sigma_given,
         ),
         check_residual("Does noise explain what the elastic fit leaves?", found),
-        check_drift(fit),
+        check_drift(drift.distance, certain=drift.certain),
         check_springs(found, stiffness, damping),
         check_rank(len(geometry.names), geometry.rank, geometry.gap),
         check_flanks(study.elastic_verification),

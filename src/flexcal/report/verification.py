@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from flexcal.calibration import ErrorStatistics, Verification
-from flexcal.data import PoseSet
-from flexcal.model import RobotModel
+from flexcal.calibration import Verification
 from flexcal.report.checks import FEW_POSES, check_claimed_uncertainty, check_flanks
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
-from flexcal.report.figures.residual_order import residual_order
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
 from flexcal.report.first_screen import rung, three_facts
-from flexcal.report.notation import millimetres, statistics_cells
-from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Verdict, worst
-from flexcal.report.palette import ELASTIC, NOMINAL
+from flexcal.report.measured_points import NOMINAL, ArmPoses, MeasuredPoints
+from flexcal.report.notation import millimetres, sentences, statistics_cells
+from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Text, Verdict, worst
+from flexcal.report.palette import ELASTIC
+from flexcal.report.palette import NOMINAL as GREY
 from flexcal.report.render import write_page
+from flexcal.report.sections.geometry import arm_figure
 from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.residuals import residual_blocks
 
 _TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Verified on fresh poses"),
@@ -34,20 +33,24 @@ _TRUST: dict[Status, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class VerificationStudy:
-    """A calibrated robot on measured poses that its calibration never saw.
+    """A calibrated robot on measured poses that its calibration never saw, as the folder has it.
 
-    `before` (N, 3) m are the errors of the uncalibrated, rigid robot at the same poses after a rigid registration, None where there are
-    too few poses for one. `provenance` holds input files with their hashes, `results` the document of results.json.
+    `results` is the document of results.json; `arms` is the calibrated robot at the `points`, which have no nominal errors where there
+    are too few for a registration.
     """
 
-    model: RobotModel
-    poses: PoseSet
-    verification: Verification
-    before: np.ndarray | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    results: Mapping[str, Any] = field(default_factory=dict)
-    command: str = ""
+    results: Mapping[str, Any]
+    points: MeasuredPoints
+    arms: ArmPoses
+
+    @property
+    def verification(self) -> Verification:
+        """Prediction, errors and what the parameters' covariance says of them."""
+        points = self.points
+        if points.parameter_rms is None:
+            raise ValueError("points of a verification have the distances that the covariance predicts")
+        position = points.poses.position - points.calibrated
+        return Verification(position, points.calibrated, points.parameter_rms, points.ambiguous)
 
 
 def write_verification_report(path: str | Path, study: VerificationStudy) -> None:
@@ -57,43 +60,58 @@ def write_verification_report(path: str | Path, study: VerificationStudy) -> Non
 
 def verification_page(study: VerificationStudy) -> Page:
     """The page before it becomes HTML."""
+    results = study.results
     return Page(
-        title=f"{study.model.name}: verification report",
-        subtitle=f"Accuracy of the calibrated robot at {len(study.poses)} measured points that the fit never saw",
+        title=f"{results['robot']}: verification report",
+        subtitle=f"Accuracy of the calibrated robot at {len(study.points.poses)} measured points"
+        + ("" if results["fitted"] else " that the fit never saw"),
         verdict=_verdict(study),
         sections=(
             _errors_section(study),
-            provenance_section(study.command, None, study.seconds, study.provenance),
+            _residuals_section(study),
+            provenance_section(results["command"], None, {}, results["provenance"]),
         ),
-        document=study.results,
+        document=results,
     )
 
 
 def _verdict(study: VerificationStudy) -> Verdict:
-    after = study.verification.all
-    before = None if study.before is None else ErrorStatistics.of(study.before)
-    checks = [_check_enough(after.poses), _check_predicted(study)]
-    if study.model.backlash_joints:
-        checks.append(check_flanks(study.verification))
+    result, poses, fitted = study.verification, study.points.poses, study.results["fitted"]
+    after = result.all
+    before = study.points.statistics(NOMINAL) if study.points.nominal is not None else None
+    checks = [
+        _check_fresh(fitted),
+        _check_enough(after.poses),
+        check_claimed_uncertainty(result, poses.sigma, noise_given=poses.sigma_given),
+    ]
+    if study.results["backlash"]:
+        checks.append(check_flanks(result))
     status = worst(checks)
     answer, headline = _TRUST[status]
     rungs = [] if before is None else [rung("as delivered", before, "nominal")]
+    noun = "points" if fitted else "fresh points"
     return Verdict(
         status,
         headline,
-        f"At nine of ten of {after.poses} fresh points the calibrated model is within {millimetres(after.p90)} mm of what the instrument "
+        f"At nine of ten of {after.poses} {noun} the calibrated model is within {millimetres(after.p90)} mm of what the instrument "
         f"reads, and within {millimetres(after.max)} mm at all of them. The instrument's own noise is part of these numbers.",
         three_facts(before, after, checks, answer, "points"),
         (*rungs, rung("calibrated", after, "elastic")),
-        f"Error of the robot at {after.poses} fresh points, against the instrument",
+        f"Error of the robot at {after.poses} {noun}, against the instrument",
         tuple(checks),
     )
 
 
-def _check_predicted(study: VerificationStudy) -> Check:
-    return check_claimed_uncertainty(
-        study.verification, study.poses.sigma, noise_given=study.poses.sigma_given
-    )
+def _check_fresh(fitted: Sequence[str]) -> Check:
+    question = "Did the calibration never see these points?"
+    if fitted:
+        which = " and ".join(fitted)
+        return Check(
+            question,
+            f"It was fitted to {which}, so this says little about other poses; verify on poses that it never saw.",
+            "care",
+        )
+    return Check(question, "None of the files is one that it was fitted to.", "good")
 
 
 def _check_enough(poses: int) -> Check:
@@ -111,13 +129,14 @@ def _errors_section(study: VerificationStudy) -> Section:
     result = study.verification
     series = [ErrorSeries("calibrated", ELASTIC, result.errors)]
     rows = [("calibrated", str(result.all.poses), *statistics_cells(result.all))]
-    if study.before is not None:
-        series.insert(0, ErrorSeries("as delivered", NOMINAL, study.before))
-        before = ErrorStatistics.of(study.before)
+    if study.points.nominal is not None:
+        series.insert(0, ErrorSeries("as delivered", GREY, study.points.nominal))
+        before = study.points.statistics(NOMINAL)
         rows.insert(0, ("as delivered, after registration", str(before.poses), *statistics_cells(before)))
     if result.ambiguous.any():
         certain = result.unambiguous
         rows.append(("… where the backlash flank is certain", str(certain.poses), *statistics_cells(certain)))
+    poses, remarks = study.points.poses, study.results["remarks"]
     blocks: list[Block] = [
         Table(
             "table-accuracy",
@@ -125,10 +144,12 @@ def _errors_section(study: VerificationStudy) -> Section:
             ("model", "points", "mean / mm", "90 % within / mm", "worst / mm"),
             tuple(rows),
         ),
+        *([Text((), "Remarks", sentences(remarks))] if remarks else []),
+        arm_figure(study.arms, len(poses)),
         FigureBlock(
             "figure-errors",
             "Error at every point",
-            verification_errors(study.poses, series, result, None),
+            verification_errors(poses, series, result, None),
             "Distance between measured and predicted point, on a logarithmic scale.",
             f"Errors of {result.all.poses} points, up to {millimetres(result.all.max)} mm.",
         ),
@@ -140,24 +161,29 @@ def _errors_section(study: VerificationStudy) -> Section:
             f"Cumulative distribution; 90 % of points are within {millimetres(result.all.p90)} mm.",
         ),
     ]
-    if study.poses.sigma_given:
+    if poses.sigma_given:
         blocks.append(
             FigureBlock(
                 "figure-predicted",
                 "Predicted against observed errors",
-                predicted_quantiles(result, study.poses.sigma),
+                predicted_quantiles(result, poses.sigma),
                 "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed "
                 "line: the prediction was right. Above it: the robot is worse than promised. Below: better.",
                 "Sorted observed errors against predicted quantiles.",
             )
         )
-    blocks.append(
-        FigureBlock(
-            "figure-order",
-            "Errors in the order of measuring",
-            residual_order(result.errors),
-            "A drift points to warm-up or to an instrument that moved since the calibration.",
-            "Error components in measuring order.",
-        )
+    return Section(
+        "errors",
+        "Errors at the measured points" if study.results["fitted"] else "Errors at fresh points",
+        "",
+        tuple(blocks),
     )
-    return Section("errors", "Errors at fresh poses", "", tuple(blocks))
+
+
+def _residuals_section(study: VerificationStudy) -> Section:
+    return Section(
+        "residuals",
+        "What the errors go with",
+        "Errors that grow with a joint, with time or towards one side of the working volume tell what the model lacks.",
+        residual_blocks(study.results["joints"], study.points.poses, study.points.calibrated),
+    )

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.calibration import (
     Calibration,
+    Drift,
     ErrorStatistics,
     TermSelection,
     calibrate,
@@ -26,10 +27,13 @@ from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
-from flexcal.report.calibration import CalibrationStudy, write_calibration_report
+from flexcal.report.figures.arm_poses import arms_at
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, MeasuredPoints
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.point_files import write_arm, write_points
+from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import identifiability_block, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -40,30 +44,49 @@ AUTO = "auto"
 class RobotCalibration:
     """What `calibrate_robot` found.
 
-    `nominal` are the errors before, after a rigid registration; `rigid` is the fit without elasticity and further terms,
-    `selected` the one that is stored in the file `estimates`; `selection` is None where the terms were given.
+    `before` (N, 3) m are the errors of the uncalibrated robot after a rigid registration; `rigid` is the fit without elasticity and further
+    terms, `selected` the one that is stored in the file `estimates`; `selection` is None where the terms were given. `command` is the
+    command line, where there was one.
     """
 
-    nominal: ErrorStatistics
+    before: np.ndarray
     rigid: Calibration
     selection: TermSelection | None
     selected: Calibration
     estimate: Estimate
     estimates: Path
+    command: str = ""
+
+    @property
+    def points(self) -> MeasuredPoints:
+        """The points of the fit with the errors of every model, the rigid one where it is not the selected."""
+        fit = self.selected
+        errors = {NOMINAL: self.before, RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
+        if self.rigid is fit:
+            del errors[RIGID]
+        return MeasuredPoints(fit.poses, errors, fit.ambiguous)
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
         selected, table = self.selected, self.selection.table if self.selection else ()
+        found, drift = selected.identifiability, Drift.of(selected)
+        spectrum = {
+            "kept": list(found.kept_names),
+            "singular_values": found.singular_values,
+            "diagonal": found.diagonal,
+        }
         return {
+            "robot": selected.model.name,
+            "joints": {joint.name: joint.kind for joint in selected.model.joints},
             "identifiability": identifiability_block(self.rigid.identifiability)
-            | {"selected": identifiability_block(selected.identifiability)},
+            | {"selected": identifiability_block(found) | spectrum},
             "terms": list(selected.terms),
             "term_selection": [
                 {"terms": list(terms), "order_mm": order / MILLIMETRE, "workspace_mm": workspace / MILLIMETRE}
                 for terms, order, workspace in table
             ],
             "calibration": {
-                "nominal": self.nominal.in_millimetres(),
+                "nominal": ErrorStatistics.of(self.before).in_millimetres(),
                 "rigid": self.rigid.errors.in_millimetres(),
                 "selected": selected.errors.in_millimetres(),
             },
@@ -74,6 +97,7 @@ class RobotCalibration:
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),
             },
+            "drift": {"distance_mm": drift.distance / MILLIMETRE, "certain": drift.certain},
             "outliers": [
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)
@@ -81,6 +105,7 @@ class RobotCalibration:
             "remarks": list(calibration_remarks(selected)),
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
+            "command": self.command,
         }
 
 
@@ -93,14 +118,15 @@ def calibrate_robot(
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     out: Path | None = None,
+    command: str = "",
     progress: Progress = silent,
 ) -> RobotCalibration:
     """Calibrate the robot of a robot.yaml on files of measured poses, and store the estimate as its block `calibration`.
 
     The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
     (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. Where the files give no sigma, the
-    scatter about the fit stands for it. With `out`, estimates, results.json and report.html go to that folder and nothing beside robot.yaml
-    changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
+    scatter about the fit stands for it. With `out`, estimates, results.json, points.csv, arm.npz and report.html go to that folder, and
+    nothing beside robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
     progress("reading", 0.0)
     require_distinct(files)
@@ -149,14 +175,15 @@ def calibrate_robot(
     estimate = replace(selected.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
     before = nominal_errors(model, poses)
-    result = RobotCalibration(ErrorStatistics.of(before), rigid, selection, selected, estimate, target)
+    result = RobotCalibration(before, rigid, selection, selected, estimate, target, command)
     store_block(source, target, blocks, "calibration", estimate)
     if out is not None:
-        document = result.document()
-        write_results(out, document)
         progress("report", 0.0)
-        study = CalibrationStudy(model, before, rigid, selected, selection, origin, results=document)
-        write_calibration_report(out / "report.html", study)
+        write_results(out, result.document())
+        write_points(out, result.points)
+        shown = {name: result.points.errors[name] for name in (CALIBRATED, NOMINAL)}
+        write_arm(out, arms_at(selected.model, selected.poses, shown))
+        report_folder(out)
         progress("report", 1.0)
     return result
 

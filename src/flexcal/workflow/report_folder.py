@@ -8,16 +8,23 @@ import numpy as np
 import polars as pl
 
 from flexcal.data import read_estimates
+from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
+from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.report.stored import StoredStudy, write_stored_report
+from flexcal.report.verification import VerificationStudy, write_verification_report
+from flexcal.units import MILLIMETRE
 from flexcal.workflow.experiment_files import read_responses
+from flexcal.workflow.point_files import read_arm, read_points
 from flexcal.workflow.results import RESULTS, read_results
 
 REPORT = "report.html"
 _REPORTED = ("calibration", "verification", "stage1")
 _DYNAMICS = "base_parameters"
-"""What results.json of `identify dynamics` holds, and no other."""
+_CALIBRATION = "term_selection"
+_VERIFICATION = "rms_mm"
+"""What results.json of `identify dynamics`, `calibrate` and `verify` holds, and no other."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -43,6 +50,18 @@ def report_folder(folder: Path) -> Path:
         found = estimates["dynamics"]
         dynamics = DynamicsStudy(folder.resolve().name, results, found, provenance=found.provenance)
         write_dynamics_report(folder / REPORT, dynamics)
+        return folder / REPORT
+    if _VERIFICATION in results:
+        points = read_points(folder, sigma=DEFAULT_SIGMA)
+        verification = VerificationStudy(results, points, read_arm(folder))
+        write_verification_report(folder / REPORT, verification)
+        return folder / REPORT
+    if _CALIBRATION in results:
+        if "calibration" not in estimates:
+            raise InputError(f"{path} holds no calibration; run calibrate again.")
+        points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
+        calibration = CalibrationStudy(results, estimates["calibration"], points, read_arm(folder))
+        write_calibration_report(folder / REPORT, calibration)
         return folder / REPORT
     study = StoredStudy(
         name=folder.resolve().name,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,27 +12,41 @@ import numpy as np
 from flexcal.calibration import ErrorStatistics, Verification, require_points, verify
 from flexcal.data import PoseSet, provenance, read_poses, sha256_of
 from flexcal.errors import FlexcalError
-from flexcal.report.verification import VerificationStudy, write_verification_report
+from flexcal.model import RobotModel
+from flexcal.report.figures.arm_poses import arms_at
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
 from flexcal.workflow.calibrated_robot import calibrated_robot
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.pose_remarks import unused_columns
+from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import write_results
 
 
 @dataclass(frozen=True, eq=False)
 class RobotVerification:
-    """Errors of the calibrated robot at `poses`, and `nominal`: those of the uncalibrated one after a rigid registration.
+    """Errors of the calibrated robot `model` at `poses`, and `before` (N, 3) m: those of the uncalibrated one after a rigid registration.
 
-    `nominal` is None with fewer than four poses, which a registration fits too well to say anything; `fitted` are the files among them
-    that the calibration was made from.
+    `before` is None with fewer than four poses, which a registration fits too well to say anything; `fitted` are the files among them
+    that the calibration was made from, `provenance` all files with their hashes, `command` the command line, where there was one.
     """
 
+    model: RobotModel
     poses: PoseSet
     result: Verification
-    nominal: ErrorStatistics | None
+    before: np.ndarray | None
     fitted: tuple[str, ...]
+    provenance: Mapping[str, str]
+    command: str = ""
+
+    @property
+    def points(self) -> MeasuredPoints:
+        """The points with the errors before and after."""
+        errors = {} if self.before is None else {NOMINAL: self.before}
+        errors |= {CALIBRATED: self.result.errors}
+        return MeasuredPoints(self.poses, errors, self.result.ambiguous, self.result.parameter_rms)
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -54,9 +68,12 @@ class RobotVerification:
         result = self.result
         measured = result.all.in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
-        if self.nominal is not None:
-            blocks["nominal"] = self.nominal.in_millimetres()
+        if self.before is not None:
+            blocks["nominal"] = ErrorStatistics.of(self.before).in_millimetres()
         return {
+            "robot": self.model.name,
+            "joints": {joint.name: joint.kind for joint in self.model.joints},
+            "backlash": list(self.model.backlash_joints),
             "verification": blocks,
             "rms_mm": {
                 "parameters": _rms(result.expected_rms()),
@@ -64,18 +81,26 @@ class RobotVerification:
                 "measured": _rms(np.linalg.norm(result.errors, axis=1)),
             },
             "ambiguous_poses": int(result.ambiguous.sum()),
+            "fitted": list(self.fitted),
             "remarks": list(self.remarks),
+            "provenance": dict(self.provenance),
+            "command": self.command,
         }
 
 
 def verify_robot(
-    robot: Path, files: Sequence[Path], *, estimates: Path | None = None, out: Path | None = None
+    robot: Path,
+    files: Sequence[Path],
+    *,
+    estimates: Path | None = None,
+    out: Path | None = None,
+    command: str = "",
 ) -> RobotVerification:
     """Predict the points of `files` with the calibrated robot and compare.
 
-    `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json and
-    report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no calibration pose was
-    measured, or a file does not fit.
+    `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json, points.csv,
+    arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no
+    calibration pose was measured, or a file does not fit.
     """
     require_distinct(files)
     calibrated = calibrated_robot(robot, estimates, "verify")
@@ -88,16 +113,15 @@ def verify_robot(
                 f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
             )
     before = nominal_errors(bare, poses) if _registrable(poses) else None
-    nominal = None if before is None else ErrorStatistics.of(before)
     known = blocks["calibration"].provenance.values()
     fitted = tuple(file.name for file in files if sha256_of(file) in known)
-    result = RobotVerification(poses, verify(model, poses), nominal, fitted)
+    origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
+    result = RobotVerification(model, poses, verify(model, poses), before, fitted, origin, command)
     if out is not None:
-        document = result.document()
-        write_results(out, document)
-        origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
-        study = VerificationStudy(model, poses, result.result, before, origin, results=document)
-        write_verification_report(out / "report.html", study)
+        write_results(out, result.document())
+        write_points(out, result.points)
+        write_arm(out, arms_at(model, poses, result.points.errors))
+        report_folder(out)
     return result
 
 

@@ -1,4 +1,4 @@
-"""Fig. 10: the arm in its calibration poses, in three dimensions, with the errors drawn as exaggerated arrows."""
+"""The arm at its measured points, in three dimensions, with the errors drawn as exaggerated arrows (Fig. 10 of the paper)."""
 
 from __future__ import annotations
 
@@ -10,50 +10,69 @@ import plotly.graph_objects as go
 
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
+from flexcal.model.names import STATION
+from flexcal.model.rotations import vector_rotation
 from flexcal.report.figures.canvas import canvas, single
+from flexcal.report.measured_points import CALIBRATED, ArmPoses
 from flexcal.report.palette import ELASTIC, GRID, INK, NOMINAL, QUIET, RIGID
+from flexcal.units import MILLIMETRE
 
 _EXAMPLES = 3
 """Poses drawn boldly, as in the paper's figure."""
 
+_MOST_ARMS = 60
+_MOST_ARROWS = 1500
+_HEAD = 0.35
+"""Length of an arrow's head over that of the arrow."""
 
-def arm_poses(
-    model: RobotModel, poses: PoseSet, arrows: Mapping[str, tuple[np.ndarray, float, bool]]
-) -> go.Figure:
+
+def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray]) -> ArmPoses:
+    """The arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; of many arms and arrows some, evenly chosen."""
+    rows = _evenly(len(poses), _MOST_ARROWS)
+    corners = skeletons(model, poses.subset(rows))
+    turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
+    return ArmPoses(corners[_evenly(len(rows), _MOST_ARMS)], poses.pose[rows], corners[:, -1], turned)
+
+
+def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> go.Figure:
     """Skeletons of the arm, and at each measured point an error vector.
 
-    `arrows` maps a label to (vectors (N, 3) m, exaggeration, calibrated); traces of each carry `meta = {"arrows": label}`, by which the
-    page chooses. Everything is drawn in the robot's base frame.
+    `labels` are the words for the models of `arms.errors`, `factors` how many times longer than they are their arrows are drawn. The
+    traces of a model carry `meta = {"arrows": label, "exaggeration": factor}`, by which the page chooses and stretches them. Everything is
+    drawn in the robot's base frame.
     """
-    corners = skeletons(model, poses)
     figure = canvas(620)
-    figure.add_trace(polyline(corners, "all poses", NOMINAL, 2.5, opacity=0.45))
-    chosen = corners[:: max(1, len(corners) // _EXAMPLES)][:_EXAMPLES]
+    figure.add_trace(polyline(arms.corners, "the arm", NOMINAL, 2.5, opacity=0.45))
+    chosen = arms.corners[:: max(1, len(arms.corners) // _EXAMPLES)][:_EXAMPLES]
     examples = polyline(chosen, f"{len(chosen)} of the poses", INK, 9.0)
     examples.update(mode="lines+markers", marker={"size": 4, "color": INK})
     figure.add_trace(examples)
-    tips = corners[:, -1]
+    tips = arms.tip
     figure.add_trace(
         go.Scatter3d(
             x=single(tips[:, 0]), y=single(tips[:, 1]), z=single(tips[:, 2]),
-            mode="markers", marker={"size": 3, "color": NOMINAL}, name="measured point",
-            text=[f"pose {k}" for k in poses.pose], hovertemplate="%{text}<extra></extra>",
+            mode="markers", marker={"size": 2.5, "color": NOMINAL}, name="measured point",
+            text=[f"pose {k}" for k in arms.pose], hovertemplate="%{text}<extra></extra>",
         )
     )  # fmt: skip
-    for number, (label, (vectors, factor, calibrated)) in enumerate(arrows.items()):
-        colour = ELASTIC if calibrated else RIGID
-        ends = tips + factor * vectors
-        shown = number == 0
-        shafts = polyline(np.stack([tips, ends], axis=1), "error", colour, 6.0)
-        shafts.update(meta={"arrows": label}, visible=shown)
-        sizes = np.linalg.norm(vectors, axis=1) * 1e3
-        heads = go.Scatter3d(
-            x=single(ends[:, 0]), y=single(ends[:, 1]), z=single(ends[:, 2]),
-            mode="markers", marker={"size": 4, "color": colour}, showlegend=False, meta={"arrows": label}, visible=shown,
-            text=[f"pose {k}: {size:.3f} mm" for k, size in zip(poses.pose, sizes, strict=True)],
-            hovertemplate="%{text}<extra></extra>",
+    for number, (model, label) in enumerate(labels.items()):
+        vectors, factor = arms.errors[model], factors[model]
+        colour = ELASTIC if model == CALIBRATED else RIGID
+        chosen = {"meta": {"arrows": label, "exaggeration": factor}, "visible": number == 0}
+        drawn = factor * vectors
+        ends = tips + drawn
+        figure.add_trace(polyline(np.stack([tips, ends], axis=1), "error", colour, 5.0).update(chosen))
+        sizes = np.linalg.norm(vectors, axis=1) / MILLIMETRE
+        figure.add_trace(
+            go.Cone(
+                x=single(ends[:, 0]), y=single(ends[:, 1]), z=single(ends[:, 2]),
+                u=single(drawn[:, 0]), v=single(drawn[:, 1]), w=single(drawn[:, 2]),
+                anchor="tip", sizemode="raw", sizeref=_HEAD, showscale=False, colorscale=[[0, colour], [1, colour]],
+                lighting={"ambient": 0.9, "diffuse": 0.3},
+                text=[f"pose {k}: {size:.3f} mm" for k, size in zip(arms.pose, sizes, strict=True)],
+                hovertemplate="%{text}<extra></extra>", **chosen,
+            )
         )  # fmt: skip
-        figure.add_traces([shafts, heads])
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
     return figure
 
@@ -111,3 +130,17 @@ def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity:
         opacity=opacity,
         hoverinfo="skip",
     )
+
+
+def in_base(model: RobotModel, poses: PoseSet, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (N, 3) of the instrument's frame turned into the robot's base frame."""
+    turned = np.empty_like(vectors)
+    for station in poses.stations:
+        angles = np.array([model.value(f"station.{station}.{key}") for key in STATION[3:]])
+        own = poses.station == station
+        turned[own] = vectors[own] @ vector_rotation(angles)
+    return turned
+
+
+def _evenly(total: int, most: int) -> np.ndarray:
+    return np.unique(np.linspace(0, total - 1, min(total, most)).astype(int))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.data import PoseSet
-from flexcal.model import RobotModel
 from flexcal.report.figures.canvas import panels, single
 from flexcal.report.palette import ELASTIC, INK
 from flexcal.units import DEGREE, MILLIMETRE
@@ -15,14 +16,17 @@ _BINS = 12
 _COLUMNS = 3
 
 
-def residual_joints(model: RobotModel, poses: PoseSet, residuals: np.ndarray) -> go.Figure:
-    """Distance (mm) of residuals (N, 3) m against each joint (degrees, or mm where prismatic), and its mean in twelve bins."""
-    rows = -(-model.n // _COLUMNS)
-    figure = panels(rows, _COLUMNS, 230 * rows + 70, list(model.joint_names), row_gap=0.3 / rows)
+def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.ndarray) -> go.Figure:
+    """Distance (mm) of residuals (N, 3) m against each joint (degrees, or mm where prismatic), and its mean in twelve bins.
+
+    `joints` are kinds (revolute, prismatic) by name.
+    """
+    rows = -(-len(joints) // _COLUMNS)
+    figure = panels(rows, _COLUMNS, 230 * rows + 70, list(joints), row_gap=0.3 / rows)
     distance = np.linalg.norm(residuals, axis=1) / MILLIMETRE
-    for i, joint in enumerate(model.joints):
+    for i, kind in enumerate(joints.values()):
         row, column = i // _COLUMNS + 1, i % _COLUMNS + 1
-        revolute = joint.kind == "revolute"
+        revolute = kind == "revolute"
         q = poses.q[:, i] / (DEGREE if revolute else MILLIMETRE)
         figure.add_trace(
             go.Scatter(

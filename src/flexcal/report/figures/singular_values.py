@@ -5,26 +5,25 @@ from __future__ import annotations
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.estimation import Identifiability
 from flexcal.report.figures.canvas import canvas, decades, single
 from flexcal.report.palette import AXIS, ELASTIC, NOMINAL, QUIET
 
 _SMALLEST = 1e-17
 
 
-def singular_values(found: Identifiability) -> go.Figure:
-    """Singular values and |diagonal of R| of the scaled Jacobian, relative to the largest, on a log scale; the rank marked."""
+def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: float) -> go.Figure:
+    """Singular `values` and |`diagonal` of R| (p,) of the scaled Jacobian, relative to the largest; `rank` and `gap` marked."""
     figure = canvas(400)
-    number = np.arange(1, len(found.names) + 1)
-    for name, values, symbol in (
-        ("diagonal of R (pivoted QR)", found.diagonal, "circle"),
-        ("singular values", found.singular_values, "line-ew-open"),
+    number = np.arange(1, len(values) + 1)
+    for name, sizes, symbol in (
+        ("diagonal of R (pivoted QR)", diagonal, "circle"),
+        ("singular values", values, "line-ew-open"),
     ):
-        kept = number <= found.rank
+        kept = number <= rank
         figure.add_trace(
             go.Scatter(
                 x=single(number),
-                y=single(np.maximum(values, _SMALLEST)),
+                y=single(np.maximum(sizes, _SMALLEST)),
                 mode="markers",
                 marker={
                     "color": [ELASTIC if k else NOMINAL for k in kept],
@@ -39,11 +38,11 @@ def singular_values(found: Identifiability) -> go.Figure:
                 hovertemplate="%{x}: %{y:.1e}",
             )
         )
-    if found.rank < len(found.names):
-        figure.add_vline(x=found.rank + 0.5, line={"color": AXIS, "width": 1.5, "dash": "dash"})
-        gap = f"a gap of {found.gap:.0f} decades" if np.isfinite(found.gap) else "nothing below"
+    if rank < len(values):
+        figure.add_vline(x=rank + 0.5, line={"color": AXIS, "width": 1.5, "dash": "dash"})
+        below = f"a gap of {gap:.0f} decades" if np.isfinite(gap) else "nothing below"
         figure.add_annotation(
-            x=found.rank + 0.5, y=0.98, yref="paper", text=f"rank {found.rank}, {gap}", showarrow=False,
+            x=rank + 0.5, y=0.98, yref="paper", text=f"rank {rank}, {below}", showarrow=False,
             xanchor="right", xshift=-6, yanchor="top", font={"color": QUIET, "size": 12}, yshift=-150,
         )  # fmt: skip
     figure.update_yaxes({"type": "log", "title": {"text": "relative to the largest"}} | decades(-18, 0, 3))

@@ -2,20 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+
 import plotly.graph_objects as go
 
-from flexcal.calibration import TermSelection
 from flexcal.report.figures.canvas import canvas, single
 from flexcal.report.palette import ELASTIC, NOMINAL, PAGE
 from flexcal.units import MILLIMETRE
 
 
-def term_scores(selection: TermSelection) -> go.Figure:
+@dataclass(frozen=True)
+class TermStep:
+    """Mean errors (m) on poses left out, by measuring order and by place, with these terms."""
+
+    terms: tuple[str, ...]
+    order: float
+    place: float
+
+
+def term_scores(steps: Sequence[TermStep]) -> go.Figure:
     """Mean error (mm) on left-out poses by set of terms, for folds contiguous in measuring order and in the workspace."""
-    labels = step_labels(selection)
+    labels = step_labels(steps)
     figure = canvas(120 + 46 * len(labels))
-    in_order = [order / MILLIMETRE for _, order, _ in selection.table]
-    in_place = [place / MILLIMETRE for _, _, place in selection.table]
+    in_order = [step.order / MILLIMETRE for step in steps]
+    in_place = [step.place / MILLIMETRE for step in steps]
     for name, values, colour in (
         ("left out by place in the workspace", in_place, ELASTIC),
         ("left out by measuring order", in_order, NOMINAL),
@@ -33,9 +44,7 @@ def term_scores(selection: TermSelection) -> go.Figure:
     return figure
 
 
-def step_labels(selection: TermSelection) -> list[str]:
-    """A label for each row of the selection's table: the terms it starts with, then what each step adds."""
-    labels = []
-    for number, (terms, *_) in enumerate(selection.table):
-        labels.append(" + ".join(terms) if number == 0 else f"+ {terms[-1].replace('_', ' ')}")
-    return labels
+def step_labels(steps: Sequence[TermStep]) -> list[str]:
+    """A label for each step of a selection: the terms it starts with, then what each adds."""
+    first, *later = steps
+    return [" + ".join(first.terms), *(f"+ {step.terms[-1].replace('_', ' ')}" for step in later)]

@@ -5,25 +5,29 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.calibration import Calibration
-from flexcal.report.figures.arm_poses import arm_poses
+from flexcal.data import PoseSet
+from flexcal.report.figures.arm_poses import arm_poses, arms_at
 from flexcal.report.figures.calibration_errors import calibration_errors
 from flexcal.report.figures.error_components import error_components
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, ArmPoses
 from flexcal.report.notation import millimetres
-from flexcal.report.page import FigureBlock, Section, Selector
-from flexcal.report.sections.identifiability import identifiability_blocks
+from flexcal.report.page import FigureBlock, Section, Selector, Slider
+from flexcal.report.sections.identifiability import Determined, identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.study import TwoStageStudy
 
 _ARROW_LENGTH = 0.25
 """Length (m) at which the largest error is drawn, about."""
 
-_MOST_POSES = 60
+_FACTORS = tuple(float(m * 10**k) for k in range(5) for m in (1, 2, 5))
+_ARROWS = {CALIBRATED: "after calibration", NOMINAL: "as delivered"}
 
 
 def geometry_section(study: TwoStageStudy) -> Section:
     """Figs. 10-12, identifiability and the parameters."""
     fit = study.calibration
     before = study.nominal_at_calibration.errors
+    arms = arms_at(fit.model, fit.poses, {CALIBRATED: fit.residuals, NOMINAL: before})
     return Section(
         "stage2",
         "Stage 2: geometry",
@@ -31,48 +35,47 @@ def geometry_section(study: TwoStageStudy) -> Section:
         "what remains is geometry: axes that are not quite parallel, links that are not quite as long as drawn, zero positions of the "
         "encoders, and play in the gears.",
         (
-            pose_figure(fit, before, "Figure 10"),
-            error_figure(fit, before, "Figure 11"),
+            arm_figure(arms, len(fit.poses), "Figure 10"),
+            error_figure(fit.poses, before, fit.residuals, "Figure 11"),
             component_figure(fit),
-            *identifiability_blocks(fit.identifiability, study.paper),
+            *identifiability_blocks(Determined.of(fit.identifiability), study.paper),
             parameter_table(fit.estimate, fit.identifiability.kept_names, study.truth),
         ),
     )
 
 
-def pose_figure(fit: Calibration, before: np.ndarray, number: str = "") -> FigureBlock:
-    """Fig. 10; of many poses only some, evenly chosen, are drawn."""
-    total = len(fit.poses)
-    rows = np.unique(np.linspace(0, total - 1, min(total, _MOST_POSES)).astype(int))
-    arrows = {}
-    for words, errors, calibrated in (
-        ("after calibration", fit.residuals, True),
-        ("as delivered", before, False),
-    ):
-        factor = exaggeration(errors)
-        arrows[f"{words}, × {factor:g}"] = (in_base(fit, errors)[rows], factor, calibrated)
+def arm_figure(arms: ArmPoses, total: int, number: str = "") -> FigureBlock:
+    """Fig. 10; `total` points were measured, and `arms` shows some or all of them."""
+    labels = {model: words for model, words in _ARROWS.items() if model in arms.errors}
+    factors = {model: exaggeration(arms.errors[model]) for model in labels}
+    some = "" if len(arms.pose) == total else f"{len(arms.pose)} of the {total} points, evenly chosen. "
+    drawn = f"in {len(arms.corners)} poses" if len(arms.corners) < len(arms.pose) else "in every pose"
+    largest = ", ".join(
+        f"{millimetres(float(np.linalg.norm(arms.errors[model], axis=1).max()))} mm {words}"
+        for model, words in labels.items()
+    )
     return FigureBlock(
         "figure-10",
-        title(number, f"the {total} calibration poses"),
-        arm_poses(fit.model, fit.poses.subset(rows), arrows),
-        ("" if len(rows) == total else f"{len(rows)} of the {total} poses, evenly chosen. ")
-        + "The arm as lines from joint to joint; drag to turn it. Arrows show which way and how far the measured point is from the "
-        "predicted one, exaggerated as the choice above says.",
-        f"Three-dimensional line drawing of the arm in {len(rows)} poses with exaggerated error arrows.",
-        (Selector("Error arrows", "arrows", tuple(arrows)),),
+        title(number, f"the arm, and which way the {total} measured points are off"),
+        arm_poses(arms, labels, factors),
+        f"{some}The arm as lines from joint to joint, {drawn}; drag to turn it. Arrows show which way and how far a measured point is "
+        f"from the predicted one, exaggerated as chosen above; the longest is {largest}.",
+        f"Three-dimensional line drawing of the arm {drawn} with exaggerated error arrows; the longest is {largest}.",
+        (Selector("Error arrows", "arrows", tuple(labels.values())),),
+        Slider("Exaggeration", "arrows", _FACTORS, {labels[model]: factors[model] for model in labels}),
     )
 
 
-def error_figure(fit: Calibration, before: np.ndarray, number: str = "") -> FigureBlock:
+def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray, number: str = "") -> FigureBlock:
     """Fig. 11."""
     return FigureBlock(
         "figure-11",
         title(number, "error at the calibration poses, before and after"),
-        calibration_errors(fit.poses, before, fit.residuals),
+        calibration_errors(poses, before, after),
         "Distance between measured and predicted point. The scale is logarithmic: one step of the grid is about a factor of two. These "
         "poses were used for the fit, so this is not yet the accuracy to expect elsewhere.",
-        f"Error of each of {len(fit.poses)} poses as delivered, up to {millimetres(float(np.linalg.norm(before, axis=1).max()))} mm, and "
-        f"calibrated, up to {millimetres(fit.errors.max)} mm.",
+        f"Error of each of {len(poses)} poses as delivered, up to {millimetres(float(np.linalg.norm(before, axis=1).max()))} mm, and "
+        f"calibrated, up to {millimetres(float(np.linalg.norm(after, axis=1).max()))} mm.",
     )
 
 
@@ -96,21 +99,7 @@ def title(number: str, words: str) -> str:
     return f"{number}: {words}" if number else words[0].upper() + words[1:]
 
 
-def in_base(fit: Calibration, errors: np.ndarray) -> np.ndarray:
-    """Error vectors (N, 3) of the instrument's frame turned into the robot's base frame."""
-    from flexcal.model.names import STATION
-    from flexcal.model.rotations import vector_rotation
-
-    turned = np.empty_like(errors)
-    for station in fit.poses.stations:
-        angles = np.array([fit.model.value(f"station.{station}.{key}") for key in STATION[3:]])
-        own = fit.poses.station == station
-        turned[own] = errors[own] @ vector_rotation(angles)
-    return turned
-
-
 def exaggeration(errors: np.ndarray) -> float:
-    """A round factor 1, 2 or 5 × 10^k by which the largest error becomes about a quarter of a metre long."""
+    """The factor of the slider by which the largest of `errors` (N, 3) m becomes about a quarter of a metre long."""
     wanted = _ARROW_LENGTH / max(float(np.linalg.norm(errors, axis=1).max(initial=0.0)), 1e-9)
-    decade = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(m * decade for m in (1, 2, 5) if m * decade <= wanted * 1.001))
+    return max((factor for factor in _FACTORS if factor <= wanted * 1.001), default=_FACTORS[0])

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -12,16 +14,71 @@ from flexcal.report.page import Block, FigureBlock, Table, Text
 from flexcal.report.publication import Publication
 
 _MOST = 4
+_WEAK = 3
+_SHOWN = 0.2
+"""Members of a combination below this share of its largest are not named."""
 
 _NOTHING = 1e-9
 """Amounts (SI) below this are rounding errors of a column that is zero."""
 
 
-def identifiability_blocks(found: Identifiability, paper: Publication | None) -> tuple[Block, ...]:
+@dataclass(frozen=True, eq=False)
+class Determined:
+    """Which of so many `parameters` are determined.
+
+    `singular_values` and `diagonal` (of R) are relative to the largest; `gap` in decades; `weak` names the weakest directions that are
+    kept, each with its singular value.
+    """
+
+    parameters: int
+    rank: int
+    gap: float
+    singular_values: np.ndarray
+    diagonal: np.ndarray
+    dropped: tuple[Dropped, ...]
+    weak: tuple[tuple[str, float], ...]
+
+    @classmethod
+    def of(cls, found: Identifiability) -> Determined:
+        """From an analysis."""
+        weak = range(found.rank - 1, max(-1, found.rank - 1 - _WEAK), -1)
+        named = tuple(
+            (
+                name_direction(found.directions[i], found.names, threshold=_SHOWN),
+                float(found.singular_values[i]),
+            )
+            for i in weak
+        )
+        return cls(
+            len(found.names),
+            found.rank,
+            found.gap,
+            found.singular_values,
+            found.diagonal,
+            found.dropped,
+            named,
+        )
+
+    @classmethod
+    def stored(cls, block: Mapping[str, Any]) -> Determined:
+        """From the block of results.json."""
+        dropped = tuple(
+            Dropped(item["name"], tuple((by["name"], by["coefficient"]) for by in item["absorbed_by"]))
+            for item in block["dropped"]
+        )
+        weak = tuple(
+            (item["direction"], item["relative_singular_value"]) for item in block["weak_directions"]
+        )
+        gap = np.inf if block["gap_decades"] is None else block["gap_decades"]
+        values, diagonal = (np.array(block[key]) for key in ("singular_values", "diagonal"))
+        return cls(block["parameters"], block["rank"], gap, values, diagonal, dropped, weak)
+
+
+def identifiability_blocks(found: Determined, paper: Publication | None) -> tuple[Block, ...]:
     """The gap, the dropped parameters and the weakest directions that were kept."""
-    dropped = len(found.names) - found.rank
+    dropped = found.parameters - found.rank
     words = (
-        f"Of {len(found.names)} geometric parameters, the measured points determine {found.rank} combinations. The other {dropped} would "
+        f"Of {found.parameters} geometric parameters, the measured points determine {found.rank} combinations. The other {dropped} would "
         "move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, cannot be told apart. "
         "They stay at their nominal values, and the kept ones absorb what they would have been; predictions lose nothing by it."
     )
@@ -36,11 +93,11 @@ def identifiability_blocks(found: Identifiability, paper: Publication | None) ->
         FigureBlock(
             "figure-rank",
             "The gap between determined and undetermined",
-            singular_values(found),
+            singular_values(found.singular_values, found.diagonal, found.rank, found.gap),
             "Each mark is one direction in the space of parameters, by how far it moves the measured points, relative to the strongest. "
             "Blue directions are determined; grey ones are rounding errors of the computer. The wider the gap between them, the less the "
             "choice depends on a threshold.",
-            f"Singular values and the diagonal of R of {len(found.names)} parameters; {found.rank} are kept, {dropped} are smaller by "
+            f"Singular values and the diagonal of R of {found.parameters} parameters; {found.rank} are kept, {dropped} are smaller by "
             f"{found.gap:.0f} decades.",
         ),
     ]
@@ -74,16 +131,11 @@ def _amount(coefficient: float) -> str:
     return "" if text == "1" else "−" if text == "−1" else f"{text} × "
 
 
-def _weak_table(found: Identifiability) -> Table:
-    weakest = np.arange(found.rank - 1, max(-1, found.rank - 4), -1)
-    rows = tuple(
-        (name_direction(found.directions[i], found.names, threshold=0.5), f"{found.singular_values[i]:.1e}")
-        for i in weakest
-    )
+def _weak_table(found: Determined) -> Table:
     return Table(
         "table-weak",
         "The weakest combinations that were kept",
         ("combination", "strength, relative to the strongest"),
-        rows,
+        tuple((name, f"{value:.1e}") for name, value in found.weak),
         "These have the widest intervals; more or better spread poses strengthen them.",
     )

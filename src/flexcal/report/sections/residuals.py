@@ -1,12 +1,14 @@
-"""What the fit leaves, against everything that might explain it."""
+"""What a model leaves, against everything that might explain it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 
-from flexcal.calibration import Calibration
+from flexcal.data import PoseSet
 from flexcal.report.figures.residual_joints import residual_joints
-from flexcal.report.figures.residual_order import residual_order
+from flexcal.report.figures.residual_trend import residual_trend
 from flexcal.report.figures.residual_workspace import residual_workspace
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Block, FigureBlock, Section, Table
@@ -14,52 +16,83 @@ from flexcal.report.page import Block, FigureBlock, Section, Table
 _MOST = 12
 
 
-def residuals_section(fit: Calibration) -> Section:
-    """Residuals in order, by joint and in space, and the outliers."""
-    distance = np.linalg.norm(fit.residuals, axis=1)
+def residuals_section(
+    joints: Mapping[str, str], poses: PoseSet, residuals: np.ndarray, outliers: Sequence[int]
+) -> Section:
+    """Residuals (N, 3) m of a fit, and the rows of its `outliers`; `joints` are kinds by name."""
+    blocks = residual_blocks(joints, poses, residuals)
+    if outliers:
+        blocks = (*blocks, _outlier_table(poses, residuals, outliers))
+    return Section(
+        "residuals",
+        "What the fit leaves",
+        "If the model is complete, nothing of what is left depends on when or where it was measured.",
+        blocks,
+    )
+
+
+def residual_blocks(joints: Mapping[str, str], poses: PoseSet, residuals: np.ndarray) -> tuple[Block, ...]:
+    """Residuals (N, 3) m in the order of measuring, against time and temperature where they are known, by joint and in space."""
+    distance = np.linalg.norm(residuals, axis=1)
     worst = int(distance.argmax())
     blocks: list[Block] = [
         FigureBlock(
             "figure-order",
             "Residuals in the order of measuring",
-            residual_order(fit.residuals),
+            residual_trend(np.arange(1.0, len(poses) + 1), residuals, "measurement, in order"),
             "A drift of the running mean points to warm-up or a moving instrument, a step to a bump. Scatter about zero is what remains "
             "when the model is right.",
-            f"Residuals of {len(fit.poses)} points by coordinate in measuring order, with a running mean.",
-        ),
+            f"Residuals of {len(poses)} points by coordinate in measuring order, with a running mean.",
+        )
+    ]
+    for quantity, label, words in _CONDITIONS:
+        values = getattr(poses, quantity)
+        if values is not None and np.ptp(values) > 0:
+            blocks.append(
+                FigureBlock(
+                    f"figure-{quantity}",
+                    f"Residuals against {quantity}",
+                    residual_trend(values, residuals, label),
+                    words,
+                    f"Residuals of {len(poses)} points by coordinate against {quantity}, with a running mean.",
+                )
+            )
+    blocks += [
         FigureBlock(
             "figure-joints",
             "Residuals against every joint",
-            residual_joints(fit.model, fit.poses, fit.residuals),
+            residual_joints(joints, poses, residuals),
             "A wave over one joint is an error of its transmission; growth towards one end is sag that the model misses.",
             "Error against the position of each joint, with means in bins.",
         ),
         FigureBlock(
             "figure-workspace",
             "Residuals in the working volume",
-            residual_workspace(fit.poses, fit.residuals),
+            residual_workspace(poses, residuals),
             "Each measured point in the instrument's frame, coloured by its error; drag to turn. Neighbours of one colour mean that the "
             "model misses something that depends on where the robot is.",
             f"Points in space coloured by error; the largest, {millimetres(float(distance[worst]))} mm, is at pose "
-            f"{int(fit.poses.pose[worst])}.",
+            f"{int(poses.pose[worst])}.",
         ),
     ]
-    if fit.estimate.outliers:
-        blocks.append(_outlier_table(fit))
-    return Section(
-        "residuals",
-        "What the fit leaves",
-        "If the model is complete, nothing of what is left depends on when or where it was measured.",
-        tuple(blocks),
-    )
+    return tuple(blocks)
 
 
-def _outlier_table(fit: Calibration) -> Table:
-    distance = np.linalg.norm(fit.residuals, axis=1)
-    rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
+_CONDITIONS = (
+    (
+        "temperature",
+        "temperature, as in the file",
+        "No term of the model depends on the temperature. A slope here is what warming does to arm and instrument; measure warm, or "
+        "calibrate again at the temperature of work.",
+    ),
+)
+
+
+def _outlier_table(poses: PoseSet, residuals: np.ndarray, outliers: Sequence[int]) -> Table:
+    distance = np.linalg.norm(residuals, axis=1)
+    rows = sorted(outliers, key=lambda row: -distance[row])
     cells = tuple(
-        (str(int(fit.poses.pose[i])), str(fit.poses.target[i]), millimetres(float(distance[i])))
-        for i in rows[:_MOST]
+        (str(int(poses.pose[i])), str(poses.target[i]), millimetres(float(distance[i]))) for i in rows[:_MOST]
     )
     more = len(rows) - len(cells)
     return Table(

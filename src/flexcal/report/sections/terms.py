@@ -2,18 +2,19 @@
 
 from __future__ import annotations
 
-from flexcal.calibration import TermSelection
-from flexcal.report.figures.term_scores import step_labels, term_scores
+from collections.abc import Sequence
+
+from flexcal.report.figures.term_scores import TermStep, step_labels, term_scores
 from flexcal.report.page import FigureBlock, Section, Table
 from flexcal.units import MILLIMETRE
 
 
-def terms_section(selection: TermSelection) -> Section:
-    """The steps of the selection, as a table and a figure."""
+def terms_section(steps: Sequence[TermStep], chosen: Sequence[str]) -> Section:
+    """The steps of the selection that ended with the `chosen` terms, as a table and a figure."""
     rows = []
-    for label, (terms, order, workspace) in zip(step_labels(selection), selection.table, strict=True):
-        kept = "yes" if set(terms) <= set(selection.terms) else "no, not clear enough"
-        rows.append((label, f"{order / MILLIMETRE:.4f}", f"{workspace / MILLIMETRE:.4f}", kept))
+    for label, step in zip(step_labels(steps), steps, strict=True):
+        kept = "yes" if set(step.terms) <= set(chosen) else "no, not clear enough"
+        rows.append((label, f"{step.order / MILLIMETRE:.4f}", f"{step.place / MILLIMETRE:.4f}", kept))
     return Section(
         "terms",
         "Which terms the data support",
@@ -31,7 +32,7 @@ def terms_section(selection: TermSelection) -> Section:
             FigureBlock(
                 "figure-terms",
                 "What each term gains",
-                term_scores(selection),
+                term_scores(steps),
                 "Shorter bars are better. The last step is the best of those that were tried next; it is kept only where both bars are "
                 "shorter by more than one standard error.",
                 "Bars of the numbers in the table above.",

@@ -30,8 +30,38 @@
     return figure.data.map(function (trace) {
       const meta = trace.meta || {};
       const visible = Object.entries(figure.selected).every(([key, option]) => !(key in meta) || meta[key] === option);
-      return Object.assign({}, trace, { visible: visible });
+      const drawn = Object.assign({}, trace, { visible: visible });
+      return visible && meta.exaggeration ? stretched(drawn, figure.factors[meta[figure.stretched_by]] / meta.exaggeration) : drawn;
     });
+  }
+
+  // Arrows as long as the slider says: lines are tip, end, gap; cones stand at the end and carry their arrow.
+  function stretched(trace, ratio) {
+    const changed = {};
+    for (const [place, along] of [["x", "u"], ["y", "v"], ["z", "w"]]) {
+      const from = numbers(trace[place]);
+      if (along in trace) {
+        const arrow = numbers(trace[along]);
+        changed[place] = from.map((end, k) => end + (ratio - 1) * arrow[k]);
+        changed[along] = arrow.map((part) => ratio * part);
+      } else {
+        changed[place] = from.map((value, k) => (k % 3 === 1 ? from[k - 1] + ratio * (value - from[k - 1]) : value));
+      }
+    }
+    return Object.assign(trace, changed);
+  }
+
+  function numbers(array) {
+    return new Float32Array(Uint8Array.from(atob(array.bdata), (letter) => letter.charCodeAt(0)).buffer);
+  }
+
+  function showFactor(slider) {
+    const figure = figures.get(slider.dataset.figure);
+    const factors = slider.dataset.factors.split(" ").map(Number);
+    const factor = figure.factors[figure.selected[figure.stretched_by]];
+    slider.value = factors.indexOf(factor);
+    slider.setAttribute("aria-valuetext", factor + " times");
+    slider.parentElement.querySelector("output").value = "× " + factor;
   }
 
   function draw(id) {
@@ -98,7 +128,17 @@
     for (const choice of document.querySelectorAll("select[data-figure]")) {
       choice.addEventListener("change", function () {
         figures.get(choice.dataset.figure).selected[choice.dataset.key] = choice.value;
+        for (const slider of document.querySelectorAll(`input[data-figure="${choice.dataset.figure}"]`)) showFactor(slider);
         draw(choice.dataset.figure);
+      });
+    }
+    for (const slider of document.querySelectorAll("input[data-figure]")) {
+      showFactor(slider);
+      slider.addEventListener("input", function () {
+        const figure = figures.get(slider.dataset.figure);
+        figure.factors[figure.selected[figure.stretched_by]] = Number(slider.dataset.factors.split(" ")[slider.value]);
+        showFactor(slider);
+        draw(slider.dataset.figure);
       });
     }
     scheme.addEventListener("change", drawAll);

@@ -1,0 +1,26 @@
+"""The command line of this run, for those who want to repeat it."""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Sequence
+from contextvars import ContextVar
+from pathlib import Path
+
+_GIVEN: ContextVar[str] = ContextVar("command_line", default="")
+
+
+def keep_command_line(arguments: Sequence[str]) -> None:
+    """Note the arguments after `flexcal`."""
+    _GIVEN.set(shlex.join(["flexcal", *(_from_here(text) for text in arguments)]))
+
+
+def command_line() -> str:
+    """The command line, paths in or under the current folder relative to it."""
+    return _GIVEN.get()
+
+
+def _from_here(argument: str) -> str:
+    path = Path(argument)
+    here = Path.cwd()
+    return str(path.relative_to(here)) if path.is_absolute() and path.is_relative_to(here) else argument

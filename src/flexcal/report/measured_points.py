@@ -1,0 +1,56 @@
+"""Measured points, and how far each is from where the models of a robot have it: what the reports on measured positions draw."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration import ErrorStatistics
+from flexcal.data import PoseSet
+
+NOMINAL, RIGID, CALIBRATED = "nominal", "rigid", "calibrated"
+"""The models: as delivered after a rigid registration, fitted without further terms, and as it is used."""
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPoints:
+    """N points in measuring order.
+
+    `errors` (N, 3) m by model are measured minus predicted, in the instrument's frame; `ambiguous` (N,) poses at which the flank of a
+    backlash is not certain; `parameter_rms` (N,) m the distance that the parameters' covariance predicts, None where it was not asked for.
+    """
+
+    poses: PoseSet
+    errors: Mapping[str, np.ndarray]
+    ambiguous: np.ndarray
+    parameter_rms: np.ndarray | None = None
+
+    @property
+    def calibrated(self) -> np.ndarray:
+        """Errors (N, 3) m of the model that is used."""
+        return self.errors[CALIBRATED]
+
+    @property
+    def nominal(self) -> np.ndarray | None:
+        """Errors (N, 3) m as delivered; None where the points do not allow a registration."""
+        return self.errors.get(NOMINAL)
+
+    def statistics(self, model: str) -> ErrorStatistics:
+        """Of one model's errors."""
+        return ErrorStatistics.of(self.errors[model])
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPoses:
+    """The arm at measured points, in the robot's base frame, m.
+
+    `corners` (K, joints + 2, 3) from the base through every joint to the point, of some of the poses; `pose` (N,) numbers, `tip` (N, 3)
+    points and `errors` (N, 3) by model of all.
+    """
+
+    corners: np.ndarray
+    pose: np.ndarray
+    tip: np.ndarray
+    errors: Mapping[str, np.ndarray]

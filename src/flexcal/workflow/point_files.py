@@ -1,0 +1,109 @@
+"""What calibrate and verify leave of single points: points.csv, and arm.npz for the drawing of the arm."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from flexcal.atomic import atomic_path
+from flexcal.data import PoseSet
+from flexcal.errors import InputError
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, ArmPoses, MeasuredPoints
+
+POINTS, ARM = "points.csv", "arm.npz"
+_MODELS = (NOMINAL, RIGID, CALIBRATED)
+_TEXTS = ("target", "station")
+
+
+def write_points(folder: Path, points: MeasuredPoints) -> None:
+    """Leave `points` as points.csv in `folder`, atomically; rad and m."""
+    poses = points.poses
+    columns: dict[str, np.ndarray] = {"pose": poses.pose, "target": poses.target, "station": poses.station}
+    columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
+    columns |= _vectors("", poses.position)
+    if poses.sigma_given:
+        columns |= _vectors("sigma_", poses.sigma)
+    for name in ("payload", "temperature"):
+        values = getattr(poses, name)
+        if values is not None:
+            columns[name] = values
+    for model, errors in points.errors.items():
+        columns |= _vectors(f"{model}_d", errors)
+    if points.parameter_rms is not None:
+        columns["parameter_rms"] = points.parameter_rms
+    columns["ambiguous"] = points.ambiguous
+    with atomic_path(folder / POINTS) as temporary:
+        pl.DataFrame(columns).write_csv(temporary)
+
+
+def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
+    """The points that `write_points` left; `sigma` (m) is that of each coordinate where the file gives none.
+
+    Raises `InputError` where the file is not there or not such a one.
+    """
+    path = folder / POINTS
+    try:
+        table = pl.read_csv(path, schema_overrides=dict.fromkeys(_TEXTS, pl.String))
+        joints = [name for name in table.columns if name[0] == "q" and name[1:].isdigit()]
+
+        def vectors(prefix: str) -> np.ndarray:
+            return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()
+
+        def column(name: str) -> np.ndarray | None:
+            return table[name].cast(pl.Float64).to_numpy() if name in table.columns else None
+
+        given = "sigma_x" in table.columns
+        poses = PoseSet(
+            q=table.select(joints).cast(pl.Float64).to_numpy(),
+            position=vectors(""),
+            sigma=vectors("sigma_") if given else np.full((len(table), 3), sigma),
+            torque=None,
+            payload=column("payload"),
+            target=table["target"].to_numpy(),
+            station=table["station"].to_numpy(),
+            temperature=column("temperature"),
+            pose=table["pose"].to_numpy(),
+            sigma_given=given,
+        )
+        errors = {model: vectors(f"{model}_d") for model in _MODELS if f"{model}_dx" in table.columns}
+        ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
+        if CALIBRATED not in errors or not joints:
+            raise InputError(f"{path} lacks columns; run the verb that leaves it again.")
+        return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"))
+    except (pl.exceptions.PolarsError, OSError) as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def write_arm(folder: Path, arms: ArmPoses) -> None:
+    """Leave `arms` as arm.npz in `folder`, atomically."""
+    arrays = {"corners": arms.corners, "pose": arms.pose, "tip": arms.tip}
+    arrays |= {f"errors_{model}": errors for model, errors in arms.errors.items()}
+    with atomic_path(folder / ARM) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def read_arm(folder: Path) -> ArmPoses:
+    """What `write_arm` left; raises `InputError` where the file is not there or not such a one."""
+    path = folder / ARM
+    try:
+        with np.load(path) as file:
+            errors = {model: file[f"errors_{model}"] for model in _MODELS if f"errors_{model}" in file}
+            return ArmPoses(file["corners"], file["pose"], file["tip"], errors)
+    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def _vectors(prefix: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
+
+
+def _unreadable(path: Path, problem: Exception) -> InputError:
+    reason = (
+        problem.strerror
+        if isinstance(problem, OSError) and problem.strerror
+        else " ".join(str(problem).split())
+    )
+    return InputError(f"{path} cannot be read ({reason}); run the verb that leaves it again.")
