@@ -2,94 +2,125 @@
 
 from __future__ import annotations
 
+import json
+import shutil
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from outline import Outline
+from scipy.spatial.transform import Rotation
 
-from flexcal.calibration import TermSelection, calibrate, predict, register, verify
-from flexcal.data import PoseSet, read_poses
-from flexcal.model import RobotModel
-from flexcal.report import (
-    CalibrationStudy,
-    VerificationStudy,
-    write_calibration_report,
-    write_verification_report,
-)
+from flexcal.errors import InputError
+from flexcal.report import CalibrationStudy, write_calibration_report
+from flexcal.report.calibration import calibration_page
+from flexcal.report.measured_points import CALIBRATED
 from flexcal.report.notation import millimetres
+from flexcal.workflow.calibrate_robot import RobotCalibration, calibrate_robot
+from flexcal.workflow.point_files import read_arm, read_points
+from flexcal.workflow.report_folder import calibration_study, report_folder
+from flexcal.workflow.verify_robot import verify_robot
+
+COMMAND = "flexcal calibrate robot.yaml grid.csv --out fit"
 
 
 @pytest.fixture(scope="module")
-def grid(ur5: RobotModel, examples: Path) -> PoseSet:
-    poses = read_poses([examples / "ur5_tracker" / "grid.csv"], ur5)
-    return poses.subset(np.arange(0, len(poses), 9))
+def folder(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The UR5 with 112 of its poses, some of them with a temperature that rises."""
+    folder = tmp_path_factory.mktemp("ur5") / "ur5"
+    shutil.copytree(examples / "ur5_tracker", folder)
+    header, *rows = (folder / "grid.csv").read_text("utf-8").splitlines()
+    warm = [f"{row},{20 + 0.01 * k:.2f}" for k, row in enumerate(rows[::9])]
+    (folder / "some.csv").write_text("\n".join([f"{header},temperature", *warm]) + "\n", "utf-8")
+    return folder
 
 
 @pytest.fixture(scope="module")
-def calibrated(ur5: RobotModel, grid: PoseSet) -> CalibrationStudy:
-    rigid = calibrate(ur5, grid, terms=("kinematic",), elastic=False)
-    selected = calibrate(ur5, grid, terms=("kinematic", "gravity_compliance"), elastic=False)
-    table = (
-        (("kinematic",), 1.1e-4, 1.2e-4),
-        (("kinematic", "gravity_compliance"), 1.0e-4, 1.05e-4),
-        (("kinematic", "gravity_compliance", "transmission_1"), 1.0e-4, 1.06e-4),
-    )
-    return CalibrationStudy(
-        nominal=ur5,
-        before=errors_before(ur5, grid),
-        rigid=rigid,
-        selected=selected,
-        selection=TermSelection(selected.terms, ur5, table),
-        provenance={"grid.csv": "sha256 12ab"},
-        command="flexcal calibrate robot.yaml grid.csv",
-    )
+def fit(folder: Path) -> RobotCalibration:
+    terms = ("kinematic", "gravity_compliance")
+    files = folder / "robot.yaml", [folder / "some.csv"]
+    return calibrate_robot(*files, terms=terms, out=folder / "fit", command=COMMAND)
 
 
-def errors_before(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    placed = register(model, poses, predict(model, poses, elastic=False).position)
-    return poses.position - predict(placed, poses, elastic=False).position
+@pytest.fixture
+def study(fit: RobotCalibration, folder: Path) -> CalibrationStudy:
+    chosen = {"terms": list(fit.selected.terms), "order_mm": 0.1, "workspace_mm": 0.105}
+    tried = [
+        {"terms": ["kinematic"], "order_mm": 0.11, "workspace_mm": 0.12},
+        chosen,
+        {"terms": [*fit.selected.terms, "transmission_1"], "order_mm": 0.1, "workspace_mm": 0.106},
+    ]
+    stored = calibration_study(folder / "fit")
+    return replace(stored, results={**stored.results, "term_selection": tried})
 
 
-def test_calibration_report_is_complete(calibrated: CalibrationStudy, tmp_path: Path) -> None:
-    write_calibration_report(tmp_path / "report.html", calibrated)
+def test_calibration_report_is_complete(
+    study: CalibrationStudy, fit: RobotCalibration, tmp_path: Path
+) -> None:
+    write_calibration_report(tmp_path / "report.html", study)
     outline = Outline((tmp_path / "report.html").read_text("utf-8"))
     assert outline.unbalanced == []
-    assert set(outline.figures()) >= {
+    assert set(outline.figures()) == {
+        "figure-10",
+        "figure-11",
         "figure-terms",
         "figure-order",
+        "figure-temperature",
         "figure-joints",
         "figure-workspace",
         "figure-rank",
     }
-    assert millimetres(calibrated.selected.errors.p90) in outline.words
+    assert millimetres(fit.selected.errors.p90) in outline.words
     assert "+ gravity compliance" in outline.words and "no, not clear enough" in outline.words
-    assert "sha256 12ab" in outline.words
+    assert fit.estimate.provenance["input.some.csv"] in outline.words and COMMAND in outline.words
     assert "The files state no measurement noise" in outline.words
-    kept = calibrated.selected.identifiability.kept_names
-    assert all(name in outline.words for name in kept)
+    assert all(name in outline.words for name in fit.selected.identifiability.kept_names)
 
 
-def test_without_a_selection_fresh_poses_are_asked_for(calibrated: CalibrationStudy, tmp_path: Path) -> None:
-    write_calibration_report(tmp_path / "report.html", replace(calibrated, selection=None))
-    outline = Outline((tmp_path / "report.html").read_text("utf-8"))
-    assert "figure-terms" not in outline.figures()
-    assert "nothing was left out" in outline.words
+def test_the_page_of_the_folder_is_that_of_the_verb(fit: RobotCalibration, folder: Path) -> None:
+    page = (folder / "fit" / "report.html").read_bytes()
+    report_folder(folder / "fit")
+    assert (folder / "fit" / "report.html").read_bytes() == page
 
 
-def test_outliers_are_listed(calibrated: CalibrationStudy, tmp_path: Path) -> None:
-    fit = calibrated.selected
-    flagged = replace(fit, estimate=replace(fit.estimate, outliers=(3, 7)))
-    write_calibration_report(tmp_path / "report.html", replace(calibrated, selected=flagged))
+def test_stored_points_are_those_of_the_fit(fit: RobotCalibration, folder: Path) -> None:
+    points = read_points(folder / "fit", sigma=1e-4)
+    np.testing.assert_array_equal(points.calibrated, fit.selected.residuals)
+    np.testing.assert_array_equal(points.poses.q, fit.selected.poses.q)
+    np.testing.assert_array_equal(points.poses.temperature, fit.selected.poses.temperature)
+    assert not points.poses.sigma_given and points.poses.target.tolist() == fit.selected.poses.target.tolist()
+
+
+def test_arrows_are_turned_into_the_frame_of_the_arm(fit: RobotCalibration, folder: Path) -> None:
+    """By the rotation that lays the measured points over the arm's tips."""
+    arms, measured = read_arm(folder / "fit"), fit.selected.poses.position
+    turn, _ = Rotation.align_vectors(arms.tip - arms.tip.mean(axis=0), measured - measured.mean(axis=0))
+    np.testing.assert_allclose(
+        arms.errors[CALIBRATED],
+        turn.apply(fit.selected.residuals),
+        atol=1e-6 + 2e-3 * fit.selected.errors.max,
+    )
+    np.testing.assert_allclose(
+        arms.corners[:, -1], arms.tip[np.isin(arms.tip, arms.corners[:, -1]).all(axis=1)]
+    )
+
+
+def test_without_a_selection_fresh_poses_are_asked_for(study: CalibrationStudy) -> None:
+    page = calibration_page(replace(study, results={**study.results, "term_selection": []}))
+    assert "figure-terms" not in {block.id for block in page.figures}
+    assert "nothing was left out" in page.verdict.checks[0].answer
+
+
+def test_outliers_are_listed(study: CalibrationStudy, tmp_path: Path) -> None:
+    flagged = replace(study, estimate=replace(study.estimate, outliers=(3, 7)))
+    write_calibration_report(tmp_path / "report.html", flagged)
     words = Outline((tmp_path / "report.html").read_text("utf-8")).words
     assert "2 outliers that the robust loss set aside" in words
 
 
-def test_nothing_to_see_is_not_blamed_on_a_kept_parameter(
-    calibrated: CalibrationStudy, tmp_path: Path
-) -> None:
-    write_calibration_report(tmp_path / "report.html", calibrated)
+def test_nothing_to_see_is_not_blamed_on_a_kept_parameter(study: CalibrationStudy, tmp_path: Path) -> None:
+    write_calibration_report(tmp_path / "report.html", study)
     words = Outline((tmp_path / "report.html").read_text("utf-8")).words
     assert (
         "e−1"
@@ -97,24 +128,56 @@ def test_nothing_to_see_is_not_blamed_on_a_kept_parameter(
     )
 
 
-def test_verification_report_is_complete(
-    calibrated: CalibrationStudy, ur5: RobotModel, examples: Path, tmp_path: Path
-) -> None:
-    poses = read_poses([examples / "ur5_tracker" / "random.csv"], ur5)
-    study = VerificationStudy(
-        model=calibrated.selected.model,
-        poses=poses,
-        verification=verify(calibrated.selected.model, poses, elastic=False),
-        before=errors_before(ur5, poses),
-    )
-    write_verification_report(tmp_path / "report.html", study)
-    outline = Outline((tmp_path / "report.html").read_text("utf-8"))
+def test_verification_report_is_complete(fit: RobotCalibration, folder: Path) -> None:
+    files = folder / "robot.yaml", [folder / "random.csv"]
+    found = verify_robot(*files, estimates=folder / "fit", out=folder / "check")
+    page = (folder / "check" / "report.html").read_text("utf-8")
+    outline = Outline(page)
     assert outline.unbalanced == []
+    assert {"figure-10", "figure-joints", "figure-order"} < set(outline.figures())
     assert "figure-predicted" not in outline.figures()
-    assert millimetres(study.verification.all.max) in outline.words
-    write_verification_report(
-        tmp_path / "report.html", replace(study, before=None, poses=replace(poses, sigma_given=True))
-    )
-    outline = Outline((tmp_path / "report.html").read_text("utf-8"))
+    assert millimetres(found.result.all.max) in outline.words
+    report_folder(folder / "check")
+    assert (folder / "check" / "report.html").read_text("utf-8") == page
+
+
+def test_three_points_with_sigma_are_predicted_but_not_registered(
+    fit: RobotCalibration, folder: Path
+) -> None:
+    header, *rows = (folder / "random.csv").read_text("utf-8").splitlines()
+    few = [f"{header},sigma", *(f"{row},5e-5" for row in rows[:3])]
+    (folder / "few.csv").write_text("\n".join(few) + "\n", "utf-8")
+    verify_robot(folder / "robot.yaml", [folder / "few.csv"], estimates=folder / "fit", out=folder / "few")
+    outline = Outline((folder / "few" / "report.html").read_text("utf-8"))
     assert "figure-predicted" in outline.figures()
     assert "Too few poses to tell" in outline.words
+
+
+def test_poses_of_the_fit_are_not_called_fresh(fit: RobotCalibration, folder: Path) -> None:
+    verify_robot(folder / "robot.yaml", [folder / "some.csv"], estimates=folder / "fit", out=folder / "same")
+    words = Outline((folder / "same" / "report.html").read_text("utf-8")).words
+    assert (
+        "It was fitted to some.csv" in words and "never saw it" not in words and "fresh points" not in words
+    )
+
+
+@pytest.mark.parametrize("name", ["points.csv", "arm.npz", "estimates.yaml", "results.json"])
+def test_a_spoilt_folder_is_refused_in_one_sentence(
+    fit: RobotCalibration, folder: Path, tmp_path: Path, name: str
+) -> None:
+    shutil.copytree(folder / "fit", tmp_path / "fit")
+    (tmp_path / "fit" / name).write_text("pose\n1\n", "utf-8")
+    with pytest.raises(InputError, match=name):
+        report_folder(tmp_path / "fit")
+    (tmp_path / "fit" / name).unlink()
+    with pytest.raises(InputError):
+        report_folder(tmp_path / "fit")
+
+
+def test_results_without_a_number_are_refused(fit: RobotCalibration, folder: Path, tmp_path: Path) -> None:
+    shutil.copytree(folder / "fit", tmp_path / "fit")
+    results = json.loads((tmp_path / "fit" / "results.json").read_text("utf-8"))
+    del results["drift"]
+    (tmp_path / "fit" / "results.json").write_text(json.dumps(results), "utf-8")
+    with pytest.raises(InputError, match="drift"):
+        report_folder(tmp_path / "fit")

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration import predict
+from flexcal.calibration import Calibration, Drift, predict
 from flexcal.report import TwoStageStudy
 from flexcal.report.checks import (
     CHANCE,
@@ -69,10 +69,15 @@ def test_chi2_is_judged(study: TwoStageStudy) -> None:
 
 def test_a_drift_is_flagged(study: TwoStageStudy) -> None:
     fit = study.calibration
-    assert check_drift(fit).status == "good"
+
+    def judged(calibration: Calibration) -> str:
+        drift = Drift.of(calibration)
+        return check_drift(drift.distance, certain=drift.certain).status
+
+    assert judged(fit) == "good"
     share = np.linspace(-0.5, 0.5, len(fit.poses))
     wandered = fit.residuals + share[:, None] * np.array([1e-4, 0.0, 0.0])
-    assert check_drift(replace(fit, residuals=wandered)).status == "care"
+    assert judged(replace(fit, residuals=wandered)) == "care"
 
 
 def test_a_blurred_gap_is_flagged(study: TwoStageStudy) -> None:

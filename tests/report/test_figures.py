@@ -105,7 +105,8 @@ def test_published_errors_are_named_in_the_legend(study: TwoStageStudy) -> None:
 
 
 def test_rank_is_marked_where_it_is(study: TwoStageStudy) -> None:
-    figure = singular_values(study.calibration.identifiability)
+    found = study.calibration.identifiability
+    figure = singular_values(found.singular_values, found.diagonal, found.rank, found.gap)
     assert "rank 29" in figure.layout.annotations[0].text
     assert figure.layout.shapes[0].x0 == 29.5
 
@@ -115,5 +116,5 @@ def test_ticks_keep_their_size() -> None:
 
 
 def test_arrows_are_round_and_short() -> None:
-    assert exaggeration(np.array([[1e-4, 0.0, 0.0]])) == 2000
-    assert exaggeration(np.array([[0.0, 5e-3, 0.0]])) == 50
+    assert exaggeration(np.array([[1e-4, 0.0, 0.0]]), 0.25) == 2000
+    assert exaggeration(np.array([[0.0, 5e-3, 0.0]]), 0.25) == 50

@@ -71,7 +71,7 @@ def test_headings_do_not_skip_a_level(outline: Outline) -> None:
 def test_every_figure_and_table_says_what_it_is(outline: Outline) -> None:
     plots = [a for a in outline.all("div") if "plot" in str(a.get("class", "")).split()]
     assert {a["id"] for a in plots} == set(outline.figures())
-    assert all(a["role"] == "img" and len(str(a["aria-label"])) > 30 for a in plots)
+    assert all(a["role"] == "group" and len(str(a["aria-label"])) > 30 for a in plots)
     assert all(a.get("aria-labelledby") for a in outline.all("table"))
     assert all(a.get("scope") for a in outline.all("th"))
     for number in ("5", "7", "10", "11", "12", "13"):

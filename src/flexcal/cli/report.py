@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json
+from flexcal.cli.options import Json, MaybePath
 from flexcal.errors import InputError
 
 
@@ -17,10 +17,13 @@ from flexcal.errors import InputError
 class Report:
     """Write report.html of a folder that demo, identify dynamics or stiffness, calibrate or verify left with --out, from stored numbers.
 
-    Figures that need the fit itself are not in it; the verb that made the folder writes them all.
+    Of calibrate and verify it is the page that they wrote. Of the others, figures that need the fit itself are not in it; the verb that
+    made the folder writes them all.
     """
 
     folder: Annotated[Positional[Path], arg(metavar="DIR", help="folder with results.json")]
+    compare: Annotated[MaybePath, arg(metavar="OTHER", help_behavior_hint="(default: none)")] = None
+    """Another folder of calibrate, verify or demo; then DIR/comparison.html says which of the two is more accurate, and what changed."""
     json: Json = False
 
     @property
@@ -28,13 +31,38 @@ class Report:
         """The file that is written; raises `InputError` where DIR is a file."""
         if self.folder.is_file():
             raise InputError(f"{self.folder} is no folder; give the folder that holds results.json.")
-        return self.folder / "report.html"
+        return self.folder / ("report.html" if self.compare is None else "comparison.html")
 
     def run(self) -> None:
         """Write the report, and say where it is."""
+        console = Console(self.json)
+        if self.compare is not None:
+            self._compare(console, self.compare)
+            return
         from flexcal.workflow.report_folder import report_folder
 
-        console = Console(self.json)
         written = report_folder(self.folder)
         console.say(f"wrote {written}, from the numbers stored beside it")
         console.finish({"report": written}, f"open {written}")
+
+    def _compare(self, console: Console, other: Path) -> None:
+        from flexcal.workflow.compare_folders import compare_folders
+
+        document = compare_folders(self.folder, other)
+        first, second = document["runs"]
+        difference = document["difference_mm"]
+        real = "significant" if difference["significant"] else "not significant"
+        console.say(
+            f"mean error of {second} minus that of {first}: {difference['mean']:+.3f} mm, 95 % interval {difference['low']:+.3f} to "
+            f"{difference['high']:+.3f} mm: {real}"
+        )
+        for block, found in document["parameters"].items():
+            console.say(
+                f"{block}: {len(found['changed'])} of {found['compared']} parameters changed by more than their joint uncertainty"
+            )
+        if document["parameters"] and document["shared"]:
+            console.say(
+                f"the runs share {', '.join(document['shared'])}: their parameters are not independent"
+            )
+        console.say(f"wrote {self.out}")
+        console.finish({"report": self.out} | document, f"open {self.out}")

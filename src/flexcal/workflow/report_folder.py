@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import polars as pl
@@ -18,17 +19,16 @@ from flexcal.units import MILLIMETRE
 from flexcal.workflow.experiment_files import read_responses
 from flexcal.workflow.point_files import read_arm, read_points
 from flexcal.workflow.results import RESULTS, read_results
+from flexcal.workflow.stored_block import ESTIMATES
 
 REPORT = "report.html"
 _REPORTED = ("calibration", "verification", "stage1")
-_DYNAMICS = "base_parameters"
-_CALIBRATION = "term_selection"
-_VERIFICATION = "rms_mm"
+_DYNAMICS, _CALIBRATION, _VERIFICATION = "base_parameters", "term_selection", "rms_mm"
 """What results.json of `identify dynamics`, `calibrate` and `verify` holds, and no other."""
 
 
 def report_folder(folder: Path) -> Path:
-    """Write report.html of a folder from its results.json and, where they are there, estimates, responses and verification.csv.
+    """Write report.html of a folder from what a verb left in it: results.json and, as they are there, estimates, points or responses.
 
     Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
     """
@@ -37,41 +37,56 @@ def report_folder(folder: Path) -> Path:
             f"{folder} holds no {RESULTS}; give the folder that demo, identify dynamics or stiffness, calibrate or verify left "
             "with --out."
         )
-    results = read_results(folder)
+    results, path = read_results(folder), folder / REPORT
     if not any(key in results for key in (*_REPORTED, _DYNAMICS)):
         raise InputError(
             f"{folder / RESULTS} holds no calibration, verification, stiffness or dynamics; give the folder of one of these."
         )
-    path, measured = folder / "estimates.yaml", sorted(folder.glob("response_pose_*.npz"))
+    try:
+        if _DYNAMICS in results:
+            write_dynamics_report(path, _dynamics_study(folder, results))
+        elif _VERIFICATION in results:
+            points = read_points(folder, sigma=DEFAULT_SIGMA)
+            write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
+        elif _CALIBRATION in results:
+            write_calibration_report(path, calibration_study(folder))
+        else:
+            write_stored_report(path, _stored_study(folder, results))
+    except KeyError as problem:
+        raise InputError(
+            f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had left it; run the verb that leaves it again."
+        ) from problem
+    return path
+
+
+def calibration_study(folder: Path) -> CalibrationStudy:
+    """What `calibrate` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    results, path = read_results(folder), folder / ESTIMATES
+    estimates = read_estimates(path)
+    if "calibration" not in estimates:
+        raise InputError(f"{path} holds no calibration; run calibrate again.")
+    points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
+    return CalibrationStudy(results, estimates["calibration"], points, read_arm(folder))
+
+
+def _dynamics_study(folder: Path, results: dict[str, Any]) -> DynamicsStudy:
+    path = folder / ESTIMATES
     estimates = read_estimates(path) if path.is_file() else {}
-    if _DYNAMICS in results:
-        if "dynamics" not in estimates:
-            raise InputError(f"{path} holds no dynamics; run identify dynamics again.")
-        found = estimates["dynamics"]
-        dynamics = DynamicsStudy(folder.resolve().name, results, found, provenance=found.provenance)
-        write_dynamics_report(folder / REPORT, dynamics)
-        return folder / REPORT
-    if _VERIFICATION in results:
-        points = read_points(folder, sigma=DEFAULT_SIGMA)
-        verification = VerificationStudy(results, points, read_arm(folder))
-        write_verification_report(folder / REPORT, verification)
-        return folder / REPORT
-    if _CALIBRATION in results:
-        if "calibration" not in estimates:
-            raise InputError(f"{path} holds no calibration; run calibrate again.")
-        points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
-        calibration = CalibrationStudy(results, estimates["calibration"], points, read_arm(folder))
-        write_calibration_report(folder / REPORT, calibration)
-        return folder / REPORT
-    study = StoredStudy(
+    if "dynamics" not in estimates:
+        raise InputError(f"{path} holds no dynamics; run identify dynamics again.")
+    found = estimates["dynamics"]
+    return DynamicsStudy(folder.resolve().name, results, found, provenance=found.provenance)
+
+
+def _stored_study(folder: Path, results: dict[str, Any]) -> StoredStudy:
+    path = folder / ESTIMATES
+    return StoredStudy(
         name=folder.resolve().name,
         results=results,
-        estimates=estimates,
-        responses=read_responses(measured)[1],
+        estimates=read_estimates(path) if path.is_file() else {},
+        responses=read_responses(sorted(folder.glob("response_pose_*.npz")))[1],
         errors=_verification_errors(folder / "verification.csv"),
     )
-    write_stored_report(folder / REPORT, study)
-    return folder / REPORT
 
 
 def _verification_errors(path: Path) -> dict[str, np.ndarray]:

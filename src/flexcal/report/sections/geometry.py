@@ -17,7 +17,10 @@ from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.study import TwoStageStudy
 
 _ARROW_LENGTH = 0.25
-"""Length (m) at which the largest error is drawn, about."""
+"""Length (m) at which the largest error is drawn, about, where points are few."""
+
+_OVER_SPACING = 2.5
+"""The same over the distance between neighbouring points, where they are many."""
 
 _FACTORS = tuple(float(m * 10**k) for k in range(5) for m in (1, 2, 5))
 _ARROWS = {CALIBRATED: "after calibration", NOMINAL: "as delivered"}
@@ -47,7 +50,8 @@ def geometry_section(study: TwoStageStudy) -> Section:
 def arm_figure(arms: ArmPoses, total: int, number: str = "") -> FigureBlock:
     """Fig. 10; `total` points were measured, and `arms` shows some or all of them."""
     labels = {model: words for model, words in _ARROWS.items() if model in arms.errors}
-    factors = {model: exaggeration(arms.errors[model]) for model in labels}
+    length = min(_ARROW_LENGTH, _OVER_SPACING * _spacing(arms.tip))
+    factors = {model: exaggeration(arms.errors[model], length) for model in labels}
     some = "" if len(arms.pose) == total else f"{len(arms.pose)} of the {total} points, evenly chosen. "
     drawn = f"in {len(arms.corners)} poses" if len(arms.corners) < len(arms.pose) else "in every pose"
     largest = ", ".join(
@@ -99,7 +103,12 @@ def title(number: str, words: str) -> str:
     return f"{number}: {words}" if number else words[0].upper() + words[1:]
 
 
-def exaggeration(errors: np.ndarray) -> float:
-    """The factor of the slider by which the largest of `errors` (N, 3) m becomes about a quarter of a metre long."""
-    wanted = _ARROW_LENGTH / max(float(np.linalg.norm(errors, axis=1).max(initial=0.0)), 1e-9)
+def exaggeration(errors: np.ndarray, length: float) -> float:
+    """The factor of the slider by which the largest of `errors` (N, 3) m becomes about `length` (m) long."""
+    wanted = length / max(float(np.linalg.norm(errors, axis=1).max(initial=0.0)), 1e-9)
     return max((factor for factor in _FACTORS if factor <= wanted * 1.001), default=_FACTORS[0])
+
+
+def _spacing(points: np.ndarray) -> float:
+    """Distance between neighbours if `points` (N, 3) filled the box about them evenly."""
+    return float(np.prod(np.maximum(np.ptp(points, axis=0), 0.05)) / len(points)) ** (1 / 3)

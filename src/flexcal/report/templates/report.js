@@ -91,6 +91,8 @@
       modeBarButtons: layout.scene ? spaceButtons : flatButtons,
     }));
     return drawn.then(function () {
+      // the words about the figure say what a listener needs; ticks read out one by one do not
+      for (const picture of place.querySelectorAll(".svg-container svg, .svg-container canvas")) picture.setAttribute("aria-hidden", "true");
       makeRoom(place, layout);
     });
   }

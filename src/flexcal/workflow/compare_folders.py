@@ -1,0 +1,126 @@
+"""Two folders of the same verb, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path, PurePath
+from typing import Any
+
+import polars as pl
+
+from flexcal.calibration import ErrorStatistics
+from flexcal.data import read_estimates
+from flexcal.data.pose_set import DEFAULT_SIGMA
+from flexcal.errors import InputError
+from flexcal.report.measured_points import NOMINAL
+from flexcal.report.runs import Comparison, Run
+from flexcal.report.two_runs import write_comparison
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.point_files import read_points
+from flexcal.workflow.results import RESULTS, read_results
+
+COMPARISON = "comparison.html"
+_DECLARED = (".yaml", ".yml", ".urdf", ".xml")
+"""Inputs that say what the robot is, and measure nothing."""
+
+
+def compare_folders(first: Path, second: Path) -> dict[str, Any]:
+    """Write comparison.html into the folder `first`, and return its numbers.
+
+    Raises `InputError` where one holds no calibration, verification or demo, they are of different kinds or robots, or both are the same.
+    """
+    if first.resolve() == second.resolve():
+        raise InputError(f"{first} and {second} are the same folder; give two.")
+    names = _names(first, second)
+    one, two = _run(first, names[0]), _run(second, names[1])
+    if one.kind != two.kind:
+        raise InputError(f"{first} is a {one.kind}, {second} a {two.kind}; compare two of the same kind.")
+    if one.robot != two.robot or one.q.shape[1] != two.q.shape[1]:
+        raise InputError(
+            f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot."
+        )
+    found = Comparison(one, two)
+    write_comparison(first / COMPARISON, found)
+    return found.document()
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """The folders' names, with as much of the path as tells them apart."""
+    parts = [path.resolve().parts for path in (first, second)]
+    for depth in range(1, max(len(p) for p in parts) + 1):
+        one, two = ("/".join(p[-depth:]) for p in parts)
+        if one != two:
+            return one, two
+    raise InputError(f"{first} and {second} are the same folder; give two.")
+
+
+def _run(folder: Path, name: str) -> Run:
+    if not (folder / RESULTS).is_file():
+        raise InputError(
+            f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo left with --out."
+        )
+    results = read_results(folder)
+    path = folder / "estimates.yaml"
+    estimates = read_estimates(path) if path.is_file() else {}
+    origin: dict[str, str] = {"command": results.get("command", "")}
+    if "rms_mm" in results or "term_selection" in results:
+        points = read_points(folder, sigma=DEFAULT_SIGMA)
+        verified = "rms_mm" in results
+        found = results["provenance"] if verified else _provenance(estimates)
+        return Run(
+            name=name,
+            kind="verification" if verified else "calibration",
+            robot=results["robot"],
+            q=points.poses.q,
+            points=points.poses.position,
+            errors=points.calibrated,
+            fresh=verified and not results["fitted"],
+            before=points.statistics(NOMINAL) if points.nominal is not None else None,
+            estimates=estimates,
+            data=_data(found),
+            origin=origin | found,
+        )
+    if "plan" in results and (folder / "verification.csv").is_file():
+        found = _provenance(estimates)
+        q, truth, errors = _two_stage(folder / "verification.csv")
+        before = results["verification"]["nominal"]
+        sizes = [before[key] * MILLIMETRE for key in ("mean_mm", "p90_mm", "max_mm")]
+        statistics = ErrorStatistics(before["poses"], *sizes)
+        robot = PurePath(results["export"]["urdf"]).name
+        return Run(
+            name, "demo", robot, q, truth, errors, True, statistics, estimates, _data(found), origin | found
+        )
+    raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
+
+
+def _two_stage(path: Path) -> tuple[Any, Any, Any]:
+    """Joint positions (N, n), true points and errors of the elastic model (N, 3), m."""
+    try:
+        table = pl.read_csv(path)
+        q = table.select([name for name in table.columns if name[0] == "q"]).to_numpy()
+        truth = table.select("x", "y", "z").to_numpy()
+        return q, truth, truth - table.select("elastic_x", "elastic_y", "elastic_z").to_numpy()
+    except (pl.exceptions.PolarsError, TypeError) as problem:
+        raise InputError(
+            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
+        ) from problem
+
+
+def _provenance(estimates: Mapping[Any, Any]) -> dict[str, str]:
+    """What all blocks say of their origin; of the same key in several blocks, each under the block's name."""
+    found: dict[str, str] = {}
+    for block, estimate in estimates.items():
+        for key, value in estimate.provenance.items():
+            shown = key if found.get(key, value) == value else f"{key} ({block})"
+            found[shown] = value
+    return found
+
+
+def _data(origin: Mapping[str, str]) -> dict[str, str]:
+    """Digests of measurements and of blocks that were used, by name."""
+    return {
+        key.partition(".")[2]: value
+        for key, value in origin.items()
+        if key.startswith("block.")
+        or (key.startswith("input.") and not key.split(" (")[0].endswith(_DECLARED))
+    }
