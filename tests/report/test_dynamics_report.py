@@ -45,7 +45,7 @@ def outline(folder: Path) -> Outline:
 @pytest.fixture(scope="module")
 def study(folder: Path) -> DynamicsStudy:
     results = json.loads((folder / "results.json").read_text())
-    return DynamicsStudy("tx40", results, read_estimates(folder / "estimates.yaml")["dynamics"])
+    return DynamicsStudy(results, read_estimates(folder / "estimates.yaml")["dynamics"], ())
 
 
 def with_results(study: DynamicsStudy, **changes: Any) -> DynamicsStudy:
@@ -156,12 +156,6 @@ def test_the_friction_that_was_taken_is_marked() -> None:
     assert table.strong == (2,) and table.rows[2] == ("b (2)", "3.000")
 
 
-def test_the_folder_gives_the_same_numbers_again(folder: Path, outline: Outline) -> None:
-    before = outline.words
-    kept = (folder / "report.html").read_bytes()
-    again = Outline(report_folder(folder).read_text("utf-8"))
-    (folder / "report.html").write_bytes(kept)
-    assert set(again.figures()) == {"figure-correlation"} and again.unbalanced == []
-    start, end = "All 61 base parameters", "The pairs that are hardest"
-    assert again.words[again.words.index(start) : again.words.index(end)].split("How the errors")[0] in before
-    assert "the last 30 % of every recording" in again.words
+def test_the_folder_gives_the_same_page_again(folder: Path) -> None:
+    before = (folder / "report.html").read_bytes()
+    assert report_folder(folder).read_bytes() == before

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json, MaybePath, require_at_least
 
@@ -45,7 +46,13 @@ class Demo:
         robot = example_robot("tx90l") if self.robot is None else self.robot
         with console.progress() as progress:
             run_two_stage(
-                robot, self.out, seed=self.seed, plan=self.plan, truth=self.truth, progress=progress
+                robot,
+                self.out,
+                seed=self.seed,
+                plan=self.plan,
+                truth=self.truth,
+                command=command_line(),
+                progress=progress,
             )
         document = read_results(self.out)
         for kind in ("stiffness", "damping"):

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
@@ -86,6 +87,7 @@ class IdentifyDynamics:
                 flexible=self.flexible,
                 learn_residual=self.learn_residual,
                 out=self.out,
+                command=command_line(),
                 jobs=self.jobs,
                 progress=progress,
             )

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 
@@ -44,7 +45,9 @@ class IdentifyGains:
         require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_gains(self.robot, self.logs, out=self.out, jobs=self.jobs, progress=progress)
+            found = identify_gains(
+                self.robot, self.logs, out=self.out, command=command_line(), jobs=self.jobs, progress=progress
+            )
         document = found.document()
         console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
         console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere
 from flexcal.cli.options import Json, MaybePath, Robot, require_robot
@@ -37,7 +38,9 @@ class IdentifyInertials:
         require_robot(self.robot, self.folder)
         console = Console(self.json)
         with console.progress() as progress:
-            found = identify_robot_inertials(self.robot, self.folder, out=self.out, progress=progress)
+            found = identify_robot_inertials(
+                self.robot, self.folder, out=self.out, command=command_line(), progress=progress
+            )
         document = found.document()
         units = {item.name: item.unit for item in found.estimate.parameters}
         console.show(quantity_table("links and drives", document["parameters"], units))

@@ -7,6 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
@@ -59,6 +60,7 @@ class IdentifyStiffness:
                 search=self.search,
                 seed=self.seed,
                 out=self.out,
+                command=command_line(),
                 progress=progress,
             )
         document = found.document()

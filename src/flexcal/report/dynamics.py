@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path, PurePath
 from typing import Any
 
@@ -34,17 +34,14 @@ _TRUST: dict[Status, tuple[str, str]] = {
 
 @dataclass(frozen=True, eq=False)
 class DynamicsStudy:
-    """Identified dynamics of the robot `name`.
+    """Identified dynamics, as the folder has them.
 
-    `results` is the document of results.json, `estimate` what estimates.yaml holds. `predictions`, one a recording, are missing where only
-    the folder is left. `provenance` holds input files with their hashes.
+    `results` is the document of results.json, `estimate` what estimates.yaml holds; `predictions` are one a recording.
     """
 
-    name: str
     results: Mapping[str, Any]
     estimate: Estimate
-    predictions: Sequence[TorquePrediction] = ()
-    provenance: Mapping[str, str] = field(default_factory=dict)
+    predictions: Sequence[TorquePrediction]
 
     @property
     def held_out(self) -> str:
@@ -64,7 +61,7 @@ def dynamics_page(study: DynamicsStudy) -> Page:
     """The page before it becomes HTML."""
     results = study.results
     return Page(
-        title=f"{study.name}: dynamics report",
+        title=f"{results['robot']}: dynamics report",
         subtitle=f"Inertias and friction from {results['equations']} equations of torque; {results['masked_rows']} rows at standstill "
         f"left out · {len(results['friction_terms'])} friction terms",
         verdict=dynamics_verdict(study),
@@ -77,7 +74,9 @@ def dynamics_page(study: DynamicsStudy) -> Page:
                 if (learned := results.get("learned_residual"))
                 else []
             ),
-            provenance_section("", None, {"identification": results["seconds"]}, study.provenance),
+            provenance_section(
+                results["command"], None, {"identification": results["seconds"]}, results["provenance"]
+            ),
         ],
         document=results,
     )

@@ -25,6 +25,7 @@ from flexcal.report.checks import (
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.verification_errors import ErrorSeries
 from flexcal.report.first_screen import rung, three_facts
+from flexcal.report.measured_points import NOMINAL, ArmPoses, MeasuredPoints
 from flexcal.report.notation import millimetres, statistics_cells
 from flexcal.report.page import (
     Check,
@@ -40,9 +41,11 @@ from flexcal.report.page import (
 )
 from flexcal.report.palette import ELASTIC, RIGID
 from flexcal.report.render import write_page
+from flexcal.report.sections.geometry import arm_figure, error_figure
 from flexcal.report.sections.identifiability import dropped_table
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.springs import spring_table, unseen_springs
 from flexcal.report.sections.stiffness import response_block
 from flexcal.report.two_stage import TRUST
@@ -64,7 +67,7 @@ class StoredStudy:
     """What lies in the folder `name`.
 
     `results` is the document of results.json, `estimates` the blocks of estimates.yaml, `responses` the frequency responses by pose,
-    `errors` (N, 3) m those of verification.csv by model (elastic, rigid).
+    `errors` (N, 3) m those of verification.csv by model (elastic, rigid); `points` and `arms` those that the geometry was fitted to.
     """
 
     name: str
@@ -72,6 +75,8 @@ class StoredStudy:
     estimates: Mapping[Block, Estimate] = field(default_factory=dict)
     responses: Sequence[FrequencyResponse] = ()
     errors: Mapping[str, np.ndarray] = field(default_factory=dict)
+    points: MeasuredPoints | None = None
+    arms: ArmPoses | None = None
 
     def statistics(self, block: str) -> dict[str, ErrorStatistics]:
         """Errors of `verification` or `calibration` by model, in the order of the report."""
@@ -110,7 +115,9 @@ def write_stored_report(path: str | Path, study: StoredStudy) -> None:
 def stored_page(study: StoredStudy) -> Page:
     """The page before it becomes HTML."""
     sections = [
-        section for section in (_errors(study), _stiffness(study), _geometry(study)) if section.blocks
+        section
+        for section in (_errors(study), _stiffness(study), *_points(study), _geometry(study))
+        if section.blocks
     ]
     origin = {
         f"{block}: {key}": value
@@ -221,6 +228,20 @@ def _stiffness(study: StoredStudy) -> Section:
     if study.responses:
         blocks.append(response_block(study.responses[0], f"Pose {study.responses[0].pose + 1}"))
     return Section("stage1", "Springs and dampers", "", tuple(blocks))
+
+
+def _points(study: StoredStudy) -> tuple[Section, ...]:
+    points, arms = study.points, study.arms
+    if points is None or arms is None:
+        return ()
+    blocks = (
+        arm_figure(arms, len(points.poses)),
+        error_figure(points.poses, points.errors[NOMINAL], points.calibrated),
+    )
+    return (
+        Section("points", "The measured points of the fit", "", blocks),
+        residuals_section(study.results["joints"], points.poses, points.calibrated, ()),
+    )
 
 
 def _geometry(study: StoredStudy) -> Section:

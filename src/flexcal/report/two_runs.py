@@ -54,17 +54,21 @@ def comparison_verdict(found: Comparison) -> Verdict:
     size = millimetres(abs(difference.value))
     low, high = sorted(abs(bound) for bound in (difference.low, difference.high))
     if difference.significant:
-        headline = f"{better.name} is more accurate than {worse.name} by {size} mm"
+        headline = f"{better.name} is more accurate than {worse.name} by {size} mm on average"
         sentence = (
             f"That is the difference of the mean errors. It is significant: its 95 % interval is {millimetres(low)} to "
             f"{millimetres(high)} mm."
         )
     else:
-        headline = f"{better.name} is {size} mm more accurate than {worse.name}, which is not significant"
+        headline = (
+            f"{better.name} is {size} mm more accurate on average than {worse.name}, which is not significant"
+        )
         sentence = (
             f"The 95 % interval of the difference, {_signed(difference.low)} to {_signed(difference.high)} mm ({second.name} minus "
             f"{first.name}), includes zero: other points may say the opposite."
         )
+    if better.after.p90 > worse.after.p90:
+        sentence += f" Yet nine of ten points are closer in {worse.name}."
     facts = (
         *(
             Fact(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path, PurePath
+from pathlib import Path
 from typing import Any
 
 import polars as pl
@@ -86,9 +86,18 @@ def _run(folder: Path, name: str) -> Run:
         before = results["verification"]["nominal"]
         sizes = [before[key] * MILLIMETRE for key in ("mean_mm", "p90_mm", "max_mm")]
         statistics = ErrorStatistics(before["poses"], *sizes)
-        robot = PurePath(results["export"]["urdf"]).name
         return Run(
-            name, "demo", robot, q, truth, errors, True, statistics, estimates, _data(found), origin | found
+            name=name,
+            kind="demo",
+            robot=results["robot"],
+            q=q,
+            points=truth,
+            errors=errors,
+            fresh=True,
+            before=statistics,
+            estimates=estimates,
+            data=_data(found),
+            origin=origin | found,
         )
     raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
 

@@ -28,6 +28,7 @@ from flexcal.workflow.divided_logs import DividedLogs
 from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
+from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.results import write_results
 from flexcal.workflow.robot_dynamics import RobotDynamics
 from flexcal.workflow.stored_block import ESTIMATES, store_block
@@ -44,6 +45,7 @@ def identify_robot_dynamics(
     flexible: bool = False,
     learn_residual: bool = False,
     out: Path | None = None,
+    command: str = "",
     jobs: int = 1,
     progress: Progress = silent,
 ) -> RobotDynamics:
@@ -52,13 +54,13 @@ def identify_robot_dynamics(
     Logs are read in blocks, in so many `jobs` (processes) at once, and filtered into temporary files, which take 96 bytes a sample of
     six joints, and 48 for their arm sides. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what
     the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks.
-    With `out`, estimates, results.json and report.html go to that folder. Raises `FlexcalError` where the logs do not fit the robot, for a
-    log with a payload, and for one that is given twice; nothing is written then. A cut-off or decimation that robot.yaml lacks is
-    proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side, and estimates the
-    drives' springs; friction terms are chosen before that, as if the robot were rigid. All estimators but `wls`, `ols` and `sdp`, and
-    learning, go through the logs again, in this process alone. `learn_residual` learns what the estimate misses of the torques, writes
-    it beside the estimates as learned_residual.npz where cross-validation finds it worth anything, and changes nothing else; raises
-    `FlexcalError` without scikit-learn, and `InputError` for a `flexible` robot.
+    With `out`, estimates, results.json, predictions.npz and report.html go to that folder. Raises `FlexcalError` where the logs do not
+    fit the robot, for a log with a payload, and for one that is given twice; nothing is written then. A cut-off or decimation that
+    robot.yaml lacks is proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side,
+    and estimates the drives' springs; friction terms are chosen before that, as if the robot were rigid. All estimators but `wls`, `ols`
+    and `sdp`, and learning, go through the logs again, in this process alone. `learn_residual` learns what the estimate misses of the
+    torques, writes it beside the estimates as learned_residual.npz where cross-validation finds it worth anything, and changes nothing
+    else; raises `FlexcalError` without scikit-learn, and `InputError` for a `flexible` robot.
     """
     if learn_residual:
         _require_rigid_and_learnable(flexible)
@@ -115,20 +117,18 @@ def identify_robot_dynamics(
             learned=learned,
             seconds=time.perf_counter() - begun,
             estimates=source if out is None else out / ESTIMATES,
+            provenance=provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks)),
+            command=command,
         )
         store_block(source, result.estimates, blocks, "dynamics", estimate)
         if learned is not None:
             learned.store(result.estimates)
         if out is not None:
-            from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
+            from flexcal.workflow.report_folder import report_folder
 
-            document = result.document()
-            write_results(out, document)
-            predictions = divided.predictions(observation, estimate)
-            files = [robot, bare.urdf, *logs, *validate]
-            origin = provenance(files, options, used, tuple(blocks))
-            study = DynamicsStudy(model.name, document, estimate, predictions, origin)
-            write_dynamics_report(out / "report.html", study)
+            write_results(out, result.document())
+            write_predictions(out, divided.predictions(observation, estimate))
+            report_folder(out)
         return result
 
 

@@ -38,6 +38,7 @@ class IdentifiedGains:
     factors: Estimate
     declared: np.ndarray
     payloads: tuple[float, ...]
+    command: str = ""
 
     @property
     def gains(self) -> list[float]:
@@ -54,6 +55,7 @@ class IdentifiedGains:
             "declared_gains": list(self.declared),
             "gains": self.gains,
             "payloads_kg": list(self.payloads),
+            "command": self.command,
         }
 
 
@@ -62,6 +64,7 @@ def identify_gains(
     logs: Sequence[Path],
     *,
     out: Path | None = None,
+    command: str = "",
     jobs: int = 1,
     progress: Progress = silent,
 ) -> IdentifiedGains:
@@ -84,7 +87,7 @@ def identify_gains(
             parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
         )
     data = RegressionData.of(observation, BaseParameters.of(observation), systems)
-    result = IdentifiedGains(drive_gains(data, payloads), declared, tuple(payloads))
+    result = IdentifiedGains(drive_gains(data, payloads), declared, tuple(payloads), command)
     if out is not None:
         write_results(out, result.document())
     return result

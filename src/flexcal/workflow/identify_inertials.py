@@ -23,7 +23,7 @@ _SENSELESS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class RobotInertials:
-    """The robot before, the estimate, what the torques of either miss (shares of their norm), and where the estimate was written."""
+    """The robot before, the estimate, what the torques of either miss (shares of their norm), its file, and the command line."""
 
     nominal: RobotModel
     estimate: Estimate
@@ -31,6 +31,7 @@ class RobotInertials:
     nominal_error: float
     error: float
     estimates: Path
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -39,11 +40,12 @@ class RobotInertials:
             "error_percent": {"nominal": 100 * self.nominal_error, "train": 100 * self.error},
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
+            "command": self.command,
         }
 
 
 def identify_robot_inertials(
-    robot: Path, folder: Path, *, out: Path | None = None, progress: Progress = silent
+    robot: Path, folder: Path, *, out: Path | None = None, command: str = "", progress: Progress = silent
 ) -> RobotInertials:
     """Fit link inertials, rotors and friction of a robot.yaml to the trajectories in `folder`, and store the block `dynamics`.
 
@@ -74,7 +76,7 @@ def identify_robot_inertials(
     source = nominal.path.parent / nominal.config.estimates
     target = source if out is None else out / ESTIMATES
     before = trajectory_error(nominal, plan, recordings)
-    found = RobotInertials(nominal, estimate, len(plan), before, error, target)
+    found = RobotInertials(nominal, estimate, len(plan), before, error, target, command)
     others = read_estimates(source, without="dynamics") if source.exists() else {}
     store_block(source, target, others, "dynamics", estimate)
     if out is not None:

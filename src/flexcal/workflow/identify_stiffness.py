@@ -46,12 +46,13 @@ _GEOMETRIC = (*GEOMETRY, "backlash")
 
 @dataclass(frozen=True, eq=False)
 class RobotStiffness:
-    """The result of stage 1, whether it knew the reference motion, and the file that its estimate was written to."""
+    """The result of stage 1, whether it knew the reference motion, the file that its estimate was written to, and the command line."""
 
     result: StiffnessResult
     reference_known: bool
     estimate: Estimate
     estimates: Path
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -68,6 +69,7 @@ class RobotStiffness:
             },
             "parameters": quantities(estimate),
             "estimates": self.estimates,
+            "command": self.command,
         }
 
 
@@ -91,6 +93,7 @@ def identify_robot_stiffness(
     search: SearchName = "multi-start",
     seed: int = 0,
     out: Path | None = None,
+    command: str = "",
     progress: Progress = silent,
 ) -> RobotStiffness:
     """Fit the springs of a robot.yaml to frequency responses (files, or folders of them), and store the block `stiffness`.
@@ -127,7 +130,7 @@ def identify_robot_stiffness(
     )
     estimate = replace(result.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
-    found = RobotStiffness(result, plan is not None, estimate, target)
+    found = RobotStiffness(result, plan is not None, estimate, target, command)
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
         write_results(out, found.document())

@@ -92,7 +92,7 @@ def read_arm(folder: Path) -> ArmPoses:
         with np.load(path) as file:
             errors = {model: file[f"errors_{model}"] for model in _MODELS if f"errors_{model}" in file}
             return ArmPoses(file["corners"], file["pose"], file["tip"], errors)
-    except (OSError, KeyError, ValueError, zipfile.BadZipFile) as problem:
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         raise _unreadable(path, problem) from problem
 
 

@@ -17,7 +17,8 @@ from flexcal.report.stored import StoredStudy, write_stored_report
 from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.experiment_files import read_responses
-from flexcal.workflow.point_files import read_arm, read_points
+from flexcal.workflow.point_files import POINTS, read_arm, read_points
+from flexcal.workflow.prediction_files import read_predictions
 from flexcal.workflow.results import RESULTS, read_results
 from flexcal.workflow.stored_block import ESTIMATES
 
@@ -74,18 +75,20 @@ def _dynamics_study(folder: Path, results: dict[str, Any]) -> DynamicsStudy:
     estimates = read_estimates(path) if path.is_file() else {}
     if "dynamics" not in estimates:
         raise InputError(f"{path} holds no dynamics; run identify dynamics again.")
-    found = estimates["dynamics"]
-    return DynamicsStudy(folder.resolve().name, results, found, provenance=found.provenance)
+    return DynamicsStudy(results, estimates["dynamics"], read_predictions(folder))
 
 
 def _stored_study(folder: Path, results: dict[str, Any]) -> StoredStudy:
     path = folder / ESTIMATES
+    measured = (folder / POINTS).is_file()
     return StoredStudy(
         name=folder.resolve().name,
         results=results,
         estimates=read_estimates(path) if path.is_file() else {},
         responses=read_responses(sorted(folder.glob("response_pose_*.npz")))[1],
         errors=_verification_errors(folder / "verification.csv"),
+        points=read_points(folder, sigma=DEFAULT_SIGMA) if measured else None,
+        arms=read_arm(folder) if measured else None,
     )
 
 

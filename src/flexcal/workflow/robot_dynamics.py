@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,8 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
-    whose motors have equations of their own. `learned` is what was learned beside the estimate, None where nobody asked for it.
+    whose motors have equations of their own. `learned` is what was learned beside the estimate, None where nobody asked for it;
+    `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     estimate: Estimate
@@ -38,6 +40,8 @@ class RobotDynamics:
     learned: LearnedDynamics | None
     seconds: float
     estimates: Path
+    provenance: Mapping[str, str]
+    command: str = ""
 
     @property
     def bodiless(self) -> tuple[str, ...]:
@@ -58,6 +62,7 @@ class RobotDynamics:
         if self.motors:
             percent["per_motor"] = dict(zip(self.motors, 100 * each[len(joints) :], strict=True))
         return {
+            "robot": self.train.observation.model.name,
             "structural_rank": self.structural_rank,
             "rank": self.estimate.rank,
             "equations": sum(s.triangle.rows for s in self.train.subsystems),
@@ -84,6 +89,8 @@ class RobotDynamics:
             "learned_residual": None if self.learned is None else self.learned.document(self.estimates),
             "seconds": self.seconds,
             "estimates": self.estimates,
+            "provenance": dict(self.provenance),
+            "command": self.command,
         }
 
     def _essential_parameters(self) -> dict[str, Any]:

@@ -21,11 +21,14 @@ from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.figures.arm_poses import arms_at
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
 from flexcal.report.publication import TX90L_PAPER
 from flexcal.report.study import CadAlone, TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.frequency_plans import frequency_plan
+from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
 from flexcal.workflow.two_stage_results import two_stage_document, write_verification
@@ -61,6 +64,7 @@ def run_two_stage(
     truth: Path | None = None,
     inertias_known: bool = False,
     report: bool = True,
+    command: str = "",
     progress: Progress = silent,
 ) -> TwoStageStudy:
     """Run the two-stage calibration on the virtual cell and leave every intermediate file, results.json and report.html in `out`.
@@ -174,8 +178,7 @@ def run_two_stage(
             paper=TX90L_PAPER if nominal.name == "tx90l" else None,
             seconds=watch.seconds,
             seed=seed,
-            command=f"flexcal demo --seed {seed} --plan {plan}"
-            + ("" if truth is None else f" --truth {truth.name}"),
+            command=command,
         )
         progress("verification", 1.0)
     if dynamics is not None:
@@ -188,6 +191,9 @@ def run_two_stage(
     with watch.stage("report"):
         progress("report", 0.0)
         write_verification(out / "verification.csv", study)
+        errors = {NOMINAL: study.nominal_at_calibration.errors, CALIBRATED: calibration.residuals}
+        write_points(out, MeasuredPoints(measured, errors, calibration.ambiguous))
+        write_arm(out, arms_at(calibration.model, measured, errors))
         if report:
             write_two_stage_report(out / "report.html", study)
         progress("report", 1.0)

@@ -52,6 +52,8 @@ def two_stage_document(study: TwoStageStudy, exported: Exported) -> dict[str, An
         | (exported.loss.error.in_millimetres() if exported.loss.error else {}),
         "seconds": dict(study.seconds) | {"total": sum(study.seconds.values())},
         "seed": study.seed,
+        "robot": study.nominal.name,
+        "joints": {joint.name: joint.kind for joint in study.nominal.joints},
         "plan": study.plan.name,
         "command": study.command,
     }

@@ -30,7 +30,10 @@ def provenance_section(
     if command:
         blocks.append(
             Text(
-                ("The same command with the same program gives the same numbers; only the durations differ.",)
+                (
+                    "The command counts from the folder where it was given. With the same files (sha256sum tells) and the same program it "
+                    "gives the same numbers; only the durations differ.",
+                )
             )
         )
     return Section("provenance", "Provenance", "", tuple(blocks))
