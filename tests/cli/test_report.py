@@ -62,3 +62,48 @@ def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Pat
     assert "no calibration" in refused(run, tmp_path, "report", tmp_path / "measured")
     (tmp_path / "measured" / "results.json").write_text("{")
     assert "cannot be read" in refused(run, tmp_path, "report", tmp_path / "measured")
+
+
+def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) -> None:
+    folder = calibrated.parent
+    again = ("calibrate", folder / "robot.yaml", folder / "random.csv", "--terms", "kinematic", "--out")
+    assert run(*again, folder / "again").status == 0
+    page = run("report", calibrated, "--compare", folder / "again")
+    assert page.status == 0 and "not significant" in page.out and "random.csv" in page.out
+    assert "comparison" in (calibrated / "comparison.html").read_text("utf-8")
+    document = run("report", calibrated, "--compare", folder / "again", "--json").document
+    assert document["runs"] == ["out", "again"] and document["difference_mm"]["mean"] == 0
+    assert document["parameters"]["calibration"]["changed"] == [] and document["shared"] == ["random.csv"]
+    assert "same folder" in refused(run, tmp_path, "report", calibrated, "--compare", calibrated)
+    assert "no results.json" in refused(run, tmp_path, "report", calibrated, "--compare", folder / "none")
+    check = (
+        "verify",
+        folder / "robot.yaml",
+        folder / "random.csv",
+        "--estimates",
+        calibrated,
+        "--out",
+        folder / "check",
+    )
+    assert run(*check).status == 0
+    assert "two of the same kind" in refused(
+        run, tmp_path, "report", calibrated, "--compare", folder / "check"
+    )
+
+
+def test_the_command_is_kept_as_given(run, calibrated: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = calibrated.parent
+    monkeypatch.chdir(folder)
+    arguments = (
+        "verify",
+        folder / "robot.yaml",
+        "random.csv",
+        "--estimates",
+        "out",
+        "--out",
+        "a b",
+        "--json",
+    )
+    command = "flexcal verify robot.yaml random.csv --estimates out --out 'a b' --json"
+    assert run(*arguments).document["command"] == command
+    assert command in (folder / "a b" / "report.html").read_text("utf-8").replace("&#39;", "'")
