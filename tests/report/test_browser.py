@@ -1,10 +1,13 @@
-"""The report in a real browser: every figure is drawn, nothing overflows a telephone's screen, nothing is asked of a network."""
+"""The report in a real browser: every figure is drawn, nothing overflows a telephone's screen, and axe finds no barrier."""
 
 from __future__ import annotations
 
+import html
+import json
 import re
 import shutil
 import subprocess
+from importlib.resources import files
 from pathlib import Path
 
 import pytest
@@ -18,7 +21,7 @@ pytestmark = pytest.mark.skipif(
 FRAME = """<!DOCTYPE html><html><body><iframe src="report.html" style="width:{width}px;height:900px;border:0"></iframe>
 <script>
 const frame = document.querySelector("iframe");
-const look = setInterval(function () {{
+const look = setInterval(async function () {{
   const page = frame.contentDocument.documentElement;
   if (page.dataset.figures !== "drawn") return;
   clearInterval(look);
@@ -35,6 +38,21 @@ const look = setInterval(function () {{
   choice.dispatchEvent(new Event("change"));
   const shown = frame.contentDocument.getElementById("figure-7").data.filter(t => t.visible).map(t => t.meta.pose);
   document.body.dataset.pose = [...new Set(shown)].join();
+  const slider = frame.contentDocument.querySelector('input[data-figure="figure-10"]');
+  const cones = () => frame.contentDocument.getElementById("figure-10").data.find(t => t.type === "cone" && t.visible);
+  const longest = () => Math.max(...["u", "v", "w"].flatMap(k => [...cones()[k]]).map(Math.abs));
+  const before = longest();
+  slider.value = Number(slider.value) + 3;
+  slider.dispatchEvent(new Event("input"));
+  document.body.dataset.stretched = longest() / before;
+  document.body.dataset.said = slider.getAttribute("aria-valuetext");
+  for (const folded of frame.contentDocument.querySelectorAll("details")) folded.open = true;
+  frame.contentWindow.eval(await (await fetch("axe.js")).text());
+  const found = await frame.contentWindow.axe.run(frame.contentDocument, {{ resultTypes: ["violations"] }});
+  document.body.dataset.violations = JSON.stringify(
+    found.violations.map(v => [v.id, v.impact, v.nodes.map(n => n.target.join(" ")).slice(0, 3)]));
+  document.body.dataset.dark = frame.contentWindow.matchMedia("(prefers-color-scheme: dark)").matches;
+  document.body.dataset.rules = found.passes.length;
 }}, 100);
 </script></body></html>"""
 
@@ -50,15 +68,25 @@ def browse(page: Path, profile: Path, *flags: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, timeout=240, check=True).stdout
 
 
-@pytest.mark.parametrize("width", [390, 1400])
-def test_figures_are_drawn_and_fit(report: Path, tmp_path: Path, width: int) -> None:
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1400, "dark")])
+def test_figures_are_drawn_and_fit_and_nobody_is_shut_out(
+    report: Path, tmp_path: Path, width: int, scheme: str
+) -> None:
+    axe = pytest.importorskip("axe_core_python")
+    (tmp_path / "axe.js").write_bytes(files(axe).joinpath("axe.min.js").read_bytes())
     (tmp_path / "report.html").write_bytes(report.read_bytes())
     (tmp_path / "frame.html").write_text(FRAME.format(width=width), "utf-8")
-    dom = browse(tmp_path / "frame.html", tmp_path / "profile", "--window-size=1600,1000")
-    found = dict(re.findall(r'data-(width|drawn|wide|pose|covered)="([^"]*)"', dom[dom.index("<body") :]))
+    preferred = f"--blink-settings=preferredColorScheme={0 if scheme == 'dark' else 1}"
+    dom = browse(tmp_path / "frame.html", tmp_path / "profile", "--window-size=1600,1000", preferred)
+    body = dom[dom.index("<body") : dom.index(">", dom.index("<body"))]
+    found = {key: html.unescape(value) for key, value in re.findall(r'data-(\w+)="([^"]*)"', body)}
     figures = len(Outline(report.read_text("utf-8")).figures())
     assert int(found["drawn"]) == figures
     assert int(found["width"]) <= width
     assert int(found["wide"]) == 0
     assert found["covered"] == ""
     assert found["pose"] == "Pose 2"
+    assert float(found["stretched"]) == pytest.approx(10, rel=1e-5) and found["said"].endswith("0 times")
+    assert found["dark"] == str(scheme == "dark").lower() and int(found["rules"]) > 20
+    barriers = [v for v in json.loads(found["violations"]) if v[1] in ("serious", "critical")]
+    assert barriers == []

@@ -19,6 +19,7 @@
 
   function recoloured(value) {
     if (typeof value === "string") return dark[value] || value;
+    if (ArrayBuffer.isView(value)) return value;
     if (Array.isArray(value)) return value.map(recoloured);
     if (value && typeof value === "object") {
       return Object.fromEntries(Object.entries(value).map(([key, item]) => [key, key === "bdata" ? item : recoloured(item)]));
