@@ -12,7 +12,7 @@ def provenance_section(
     command: str, seed: int | None, seconds: Mapping[str, float], origin: Mapping[str, str]
 ) -> Section:
     """Program version, seed, inputs with their hashes, the command, and how long each stage took."""
-    rows = [("program", f"flexcal {version('flexcal')}")]
+    rows = [] if "program" in origin else [("program", f"flexcal {version('flexcal')}")]
     rows += [("command", command)] if command else []
     rows += [("seed of all random numbers", str(seed))] if seed is not None else []
     rows += [(name, value) for name, value in origin.items()]
