@@ -37,6 +37,7 @@ def make_poses(rows: int = 5, seed: int = 1, **changes: Any) -> PoseSet:
         "target": np.array(["smr", "ball"] * rows)[:rows],
         "station": np.array(["north", "1", "1"] * rows)[:rows],
         "temperature": rng.uniform(15, 30, rows),
+        "time": 30.0 * np.arange(rows),
         "pose": np.arange(rows),
         "quaternion_wxyz": quaternion / np.linalg.norm(quaternion, axis=1, keepdims=True),
     }
@@ -84,7 +85,7 @@ def test_optional_columns_round_trip(
     if not sigma:
         changes["sigma"] = np.full((rows, 3), 1e-4)
     if not torque:
-        changes |= {"torque": None, "payload": None, "temperature": None}
+        changes |= {"torque": None, "payload": None, "temperature": None, "time": None}
     poses = make_poses(rows, seed, **changes)
     path = tmp_path_factory.getbasetemp() / "any.csv"
     write_poses(path, poses)
@@ -97,7 +98,15 @@ def test_defaults(tmp_path: Path, robot: Any) -> None:
     assert poses.targets == ("smr",)
     assert (poses.sigma == 1e-4).all()
     assert not poses.sigma_given
-    assert poses.torque is poses.payload is poses.temperature is poses.quaternion_wxyz is poses.length is None
+    assert (
+        poses.torque
+        is poses.payload
+        is poses.temperature
+        is poses.time
+        is poses.quaternion_wxyz
+        is poses.length
+        is None
+    )
     assert poses.pose.tolist() == [1, 2, 3]
     sigma = read_poses(file(tmp_path / "s.csv", [line + ",2e-5" for line in GOOD], HEADER + ",sigma"), robot)
     assert sigma.sigma.tolist() == [[2e-5] * 3] * 3

@@ -27,12 +27,12 @@ COMMAND = "flexcal calibrate robot.yaml grid.csv --out fit"
 
 @pytest.fixture(scope="module")
 def folder(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The UR5 with 112 of its poses, some of them with a temperature that rises."""
+    """The UR5 with 112 of its poses, a temperature that rises and the time of each."""
     folder = tmp_path_factory.mktemp("ur5") / "ur5"
     shutil.copytree(examples / "ur5_tracker", folder)
     header, *rows = (folder / "grid.csv").read_text("utf-8").splitlines()
-    warm = [f"{row},{20 + 0.01 * k:.2f}" for k, row in enumerate(rows[::9])]
-    (folder / "some.csv").write_text("\n".join([f"{header},temperature", *warm]) + "\n", "utf-8")
+    warm = [f"{row},{20 + 0.01 * k:.2f},{12.5 * k}" for k, row in enumerate(rows[::9])]
+    (folder / "some.csv").write_text("\n".join([f"{header},temperature,t", *warm]) + "\n", "utf-8")
     return folder
 
 
@@ -67,6 +67,7 @@ def test_calibration_report_is_complete(
         "figure-terms",
         "figure-order",
         "figure-temperature",
+        "figure-time",
         "figure-joints",
         "figure-workspace",
         "figure-rank",
@@ -89,6 +90,7 @@ def test_stored_points_are_those_of_the_fit(fit: RobotCalibration, folder: Path)
     np.testing.assert_array_equal(points.calibrated, fit.selected.residuals)
     np.testing.assert_array_equal(points.poses.q, fit.selected.poses.q)
     np.testing.assert_array_equal(points.poses.temperature, fit.selected.poses.temperature)
+    np.testing.assert_array_equal(points.poses.time, 12.5 * np.arange(112))
     assert not points.poses.sigma_given and points.poses.target.tolist() == fit.selected.poses.target.tolist()
 
 

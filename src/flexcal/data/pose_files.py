@@ -27,7 +27,7 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
 
-_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "tau", "payload", "temperature")
+_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "tau", "payload", "temperature", "t")
 _TEXTS = ("target", "station")
 
 
@@ -99,6 +99,8 @@ def write_poses(path: str | Path, poses: PoseSet) -> None:
         values = getattr(poses, name)
         if values is not None:
             columns[name] = values
+    if poses.time is not None:
+        columns["t"] = poses.time
     write_table(path, columns)
 
 
@@ -129,6 +131,7 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
         target=target,
         station=station,
         temperature=found["temperature"][:, 0] if "temperature" in found else None,
+        time=found["t"][:, 0] if "t" in found else None,
         pose=whole_numbers(table, signals["pose"], found["pose"][:, 0]),
         quaternion_wxyz=unit_quaternions(table, signals["quaternion"], found["quaternion"])
         if "quaternion" in found

@@ -28,6 +28,7 @@ class PoseSet:
     pose: (N,) numbers of the poses; rows of one pose share it.
     quaternion_wxyz: (N, 4) measured orientation, unit norm, where measured.
     length: (N,) m, of a draw-wire.
+    time: (N,) s, when each was measured, where known.
 
     Raises `FlexcalError` where shapes do not fit.
     """
@@ -43,6 +44,7 @@ class PoseSet:
     pose: np.ndarray
     quaternion_wxyz: np.ndarray | None = None
     length: np.ndarray | None = None
+    time: np.ndarray | None = None
     sigma_given: bool = True
 
     def __post_init__(self) -> None:
@@ -60,6 +62,7 @@ class PoseSet:
             "pose": (n_rows,),
             "quaternion_wxyz": (n_rows, 4),
             "length": (n_rows,),
+            "time": (n_rows,),
         }
         for name, shape in shapes.items():
             values = getattr(self, name)
@@ -96,7 +99,7 @@ def concatenate(sets: Sequence[PoseSet]) -> PoseSet:
 
     Where a later set uses a pose number again, its numbers are shifted past the largest so far. Raises `FlexcalError`
     where there is nothing to join, joint counts differ, or only some sets have sigma, torques, payload, temperature,
-    orientation or length.
+    time, orientation or length.
     """
     if not sets:
         raise FlexcalError("there are no poses to join; give at least one set.")

@@ -30,6 +30,8 @@ def write_points(folder: Path, points: MeasuredPoints) -> None:
         values = getattr(poses, name)
         if values is not None:
             columns[name] = values
+    if poses.time is not None:
+        columns["t"] = poses.time
     for model, errors in points.errors.items():
         columns |= _vectors(f"{model}_d", errors)
     if points.parameter_rms is not None:
@@ -65,6 +67,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
             target=table["target"].to_numpy(),
             station=table["station"].to_numpy(),
             temperature=column("temperature"),
+            time=column("t"),
             pose=table["pose"].to_numpy(),
             sigma_given=given,
         )

@@ -14,4 +14,6 @@ def unused_columns(poses: PoseSet) -> tuple[str, ...]:
         )
     if poses.temperature is not None:
         remarks.append("the temperature in the files is not used: no term of the model depends on it")
+    if poses.time is not None:
+        remarks.append("the times in the files are not used: no term of the model depends on them")
     return tuple(remarks)

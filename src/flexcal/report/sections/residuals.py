@@ -80,6 +80,11 @@ def residual_blocks(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
 
 _CONDITIONS = (
     (
+        "time",
+        "time / s",
+        "A slope or a curve that flattens is an arm that warms up or an instrument that settles; breaks show as gaps.",
+    ),
+    (
         "temperature",
         "temperature, as in the file",
         "No term of the model depends on the temperature. A slope here is what warming does to arm and instrument; measure warm, or "
