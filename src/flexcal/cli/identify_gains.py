@@ -32,7 +32,7 @@ class IdentifyGains:
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
-    """Folder for results.json."""
+    """Folder for report.html and results.json."""
     json: Json = False
 
     def run(self) -> None:

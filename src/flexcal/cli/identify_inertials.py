@@ -27,7 +27,7 @@ class IdentifyInertials:
         Positional[Path], arg(metavar="DIR", help="folder with plan.yaml and one joint log per trajectory")
     ]
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 
     def run(self) -> None:

@@ -15,10 +15,10 @@ from flexcal.errors import InputError
 
 @dataclass(frozen=True)
 class Report:
-    """Write report.html of a folder that demo, identify dynamics or stiffness, calibrate or verify left with --out, from stored numbers.
+    """Write report.html of a folder that demo, an identify verb, calibrate or verify left with --out, from stored numbers.
 
-    Of calibrate and verify it is the page that they wrote. Of the others, figures that need the fit itself are not in it; the verb that
-    made the folder writes them all.
+    It is the page that the verb wrote. Only of demo, whose own page shows more of the fits, it is a shorter one, and of identify stiffness,
+    which writes none.
     """
 
     folder: Annotated[Positional[Path], arg(metavar="DIR", help="folder with results.json")]

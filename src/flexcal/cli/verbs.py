@@ -101,7 +101,7 @@ STEPS = (
                 "IdentifyInertials",
                 "recordings of these to masses and friction, with CAD as the prior",
                 "flexcal identify inertials robot.yaml exciting",
-                ("results.json",),
+                ("results.json", "report.html"),
             ),
             Verb(
                 ("identify", "gains"),
@@ -109,7 +109,7 @@ STEPS = (
                 "IdentifyGains",
                 "recordings with and without a payload to drive gains",
                 "flexcal identify gains robot.yaml logs/free.csv logs/loaded.csv",
-                ("results.json",),
+                ("results.json", "report.html"),
             ),
             Verb(
                 ("identify", "dynamics"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.data import provenance
 from flexcal.data.signals import mapped_signals
 from flexcal.dynamics import (
     CLASSIC,
@@ -27,17 +28,23 @@ from flexcal.progress import Progress, silent
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
+from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.treatment import treatment_of
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedGains:
-    """`factors`: what the torques must be multiplied by; `declared` (n,) are the gains of `signals: tau:`, 1 where there are none."""
+    """`factors`: what the torques must be multiplied by; `declared` (n,) are the gains of `signals: tau:`, 1 where there are none.
+
+    `payloads` are kg by log; `provenance` has all files with their hashes, `command` the command line, where there was one.
+    """
 
     factors: Estimate
     declared: np.ndarray
     payloads: tuple[float, ...]
+    robot: str
+    provenance: Mapping[str, str]
     command: str = ""
 
     @property
@@ -51,10 +58,12 @@ class IdentifiedGains:
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         return {
+            "robot": self.robot,
             "parameters": quantities(self.factors),
             "declared_gains": list(self.declared),
             "gains": self.gains,
             "payloads_kg": list(self.payloads),
+            "provenance": dict(self.provenance),
             "command": self.command,
         }
 
@@ -70,9 +79,9 @@ def identify_gains(
 ) -> IdentifiedGains:
     """Drive gains of a robot.yaml from joint logs with and without its payload, whose mass alone is taken as known.
 
-    Friction is the classic one. With `out`, results.json goes to that folder; robot.yaml stays as it is. Raises `FlexcalError` where the
-    logs do not fit the robot, a matrix of `signals:` mixes the torques of several columns, a log does not say whether the payload was
-    held, and as `drive_gains` does.
+    Friction is the classic one. With `out`, results.json and report.html go to that folder; robot.yaml stays as it is. Raises
+    `FlexcalError` where the logs do not fit the robot, a matrix of `signals:` mixes the torques of several columns, a log does not say
+    whether the payload was held, and as `drive_gains` does.
     """
     require_distinct(logs)
     model = RobotModel.from_yaml(robot, estimates=False)
@@ -87,9 +96,13 @@ def identify_gains(
             parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
         )
     data = RegressionData.of(observation, BaseParameters.of(observation), systems)
-    result = IdentifiedGains(drive_gains(data, payloads), declared, tuple(payloads), command)
+    origin = provenance([robot, model.urdf, *logs])
+    result = IdentifiedGains(
+        drive_gains(data, payloads), declared, tuple(payloads), model.name, origin, command
+    )
     if out is not None:
         write_results(out, result.document())
+        report_folder(out)
     return result
 
 

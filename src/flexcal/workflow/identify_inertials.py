@@ -14,6 +14,7 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -36,6 +37,7 @@ class RobotInertials:
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         return {
+            "robot": self.nominal.name,
             "trajectories": self.trajectories,
             "error_percent": {"nominal": 100 * self.nominal_error, "train": 100 * self.error},
             "parameters": quantities(self.estimate),
@@ -50,8 +52,8 @@ def identify_robot_inertials(
     """Fit link inertials, rotors and friction of a robot.yaml to the trajectories in `folder`, and store the block `dynamics`.
 
     `folder` holds the plan and its logs, as 'measure' leaves them. The robot starts from nominal with the tolerances of its `prior:`: the
-    other blocks began from this one, and are kept. With `out`, estimates and results.json go to that folder. Raises `FlexcalError` where
-    the folder does not hold trajectories of this robot; nothing is written then.
+    other blocks began from this one, and are kept. With `out`, estimates, results.json and report.html go to that folder. Raises
+    `FlexcalError` where the folder does not hold trajectories of this robot; nothing is written then.
     """
     nominal = RobotModel.from_yaml(robot, estimates=False)
     cell = FolderCell(folder, nominal)
@@ -81,6 +83,7 @@ def identify_robot_inertials(
     store_block(source, target, others, "dynamics", estimate)
     if out is not None:
         write_results(out, found.document())
+        report_folder(out)
     return found
 
 

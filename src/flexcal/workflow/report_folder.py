@@ -11,8 +11,12 @@ import polars as pl
 from flexcal.data import read_estimates
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
+from flexcal.report.gains import write_gains_report
+from flexcal.report.inertials import InertialsStudy, write_inertials_report
 from flexcal.report.stored import StoredStudy, write_stored_report
 from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
@@ -24,8 +28,9 @@ from flexcal.workflow.stored_block import ESTIMATES
 
 REPORT = "report.html"
 _REPORTED = ("calibration", "verification", "stage1")
-_DYNAMICS, _CALIBRATION, _VERIFICATION = "base_parameters", "term_selection", "rms_mm"
-"""What results.json of `identify dynamics`, `calibrate` and `verify` holds, and no other."""
+_DYNAMICS, _INERTIALS, _GAINS = "base_parameters", "trajectories", "declared_gains"
+_CALIBRATION, _VERIFICATION = "term_selection", "rms_mm"
+"""What results.json of `identify dynamics`, `inertials` and `gains`, of `calibrate` and of `verify` holds, and no other."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -35,17 +40,21 @@ def report_folder(folder: Path) -> Path:
     """
     if not (folder / RESULTS).is_file():
         raise InputError(
-            f"{folder} holds no {RESULTS}; give the folder that demo, identify dynamics or stiffness, calibrate or verify left "
-            "with --out."
+            f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify left with --out."
         )
     results, path = read_results(folder), folder / REPORT
-    if not any(key in results for key in (*_REPORTED, _DYNAMICS)):
+    if not any(key in results for key in (*_REPORTED, _DYNAMICS, _INERTIALS, _GAINS)):
         raise InputError(
             f"{folder / RESULTS} holds no calibration, verification, stiffness or dynamics; give the folder of one of these."
         )
     try:
-        if _DYNAMICS in results:
-            write_dynamics_report(path, _dynamics_study(folder, results))
+        if _INERTIALS in results:
+            write_inertials_report(path, InertialsStudy(results, _block(folder, "dynamics")))
+        elif _GAINS in results:
+            write_gains_report(path, results)
+        elif _DYNAMICS in results:
+            dynamics = DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder))
+            write_dynamics_report(path, dynamics)
         elif _VERIFICATION in results:
             points = read_points(folder, sigma=DEFAULT_SIGMA)
             write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
@@ -62,20 +71,17 @@ def report_folder(folder: Path) -> Path:
 
 def calibration_study(folder: Path) -> CalibrationStudy:
     """What `calibrate` left in a folder; raises `InputError` where a file is not there or cannot be read."""
-    results, path = read_results(folder), folder / ESTIMATES
-    estimates = read_estimates(path)
-    if "calibration" not in estimates:
-        raise InputError(f"{path} holds no calibration; run calibrate again.")
+    results = read_results(folder)
     points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
-    return CalibrationStudy(results, estimates["calibration"], points, read_arm(folder))
+    return CalibrationStudy(results, _block(folder, "calibration"), points, read_arm(folder))
 
 
-def _dynamics_study(folder: Path, results: dict[str, Any]) -> DynamicsStudy:
+def _block(folder: Path, block: Block) -> Estimate:
     path = folder / ESTIMATES
-    estimates = read_estimates(path) if path.is_file() else {}
-    if "dynamics" not in estimates:
-        raise InputError(f"{path} holds no dynamics; run identify dynamics again.")
-    return DynamicsStudy(results, estimates["dynamics"], read_predictions(folder))
+    estimates = read_estimates(path)
+    if block not in estimates:
+        raise InputError(f"{path} holds no {block}; run the verb that leaves it again.")
+    return estimates[block]
 
 
 def _stored_study(folder: Path, results: dict[str, Any]) -> StoredStudy:

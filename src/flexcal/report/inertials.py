@@ -1,0 +1,114 @@
+"""The report of identified inertials (`flexcal identify inertials`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.estimation import Estimate
+from flexcal.report.checks import check_residual
+from flexcal.report.dynamics_checks import LARGE, TOO_LARGE
+from flexcal.report.notation import NOTHING, scaled, significant
+from flexcal.report.page import Check, Fact, Page, Section, Status, Table, Verdict, tally, worst
+from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
+
+_TRUST: dict[Status, tuple[str, str]] = {
+    "good": ("Yes", "Identified, and both stages can begin from it"),
+    "care": ("With care", "Identified; read what is not sure below before relying on it"),
+    "bad": ("No", "Do not rely on these inertials yet"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class InertialsStudy:
+    """Identified inertials, as the folder has them: `results` is the document of results.json, `estimate` the block of estimates.yaml."""
+
+    results: Mapping[str, Any]
+    estimate: Estimate
+
+
+def write_inertials_report(path: str | Path, study: InertialsStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, inertials_page(study))
+
+
+def inertials_page(study: InertialsStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    return Page(
+        title=f"{results['robot']}: inertials report",
+        subtitle=f"Masses, centres of mass, rotors, friction from {results['trajectories']} exciting trajectories, with CAD as the prior",
+        verdict=_verdict(study),
+        sections=(
+            Section("parameters", "Links and drives", _LEAD, (_table(study),)),
+            provenance_section(results["command"], None, {}, study.estimate.provenance),
+        ),
+        document=results,
+    )
+
+
+_LEAD = (
+    "The recordings move every parameter as far as they speak of it; what they do not show keeps value and tolerance of robot.yaml. The "
+    " last column says how much narrower the interval became."
+)
+
+
+def _verdict(study: InertialsStudy) -> Verdict:
+    error = study.results["error_percent"]
+    checks = (_check_error(error), check_residual("Does noise explain what the fit leaves?", study.estimate))
+    status = worst(checks)
+    answer, headline = _TRUST[status]
+    before, after = (f"{significant(error[key], 3)}" for key in ("nominal", "train"))
+    facts = (
+        Fact(
+            "How well were torques predicted?",
+            before,
+            "% missed",
+            "With the values of robot.yaml, up to 5 Hz.",
+        ),
+        Fact(
+            "How well are they predicted?",
+            after,
+            "% missed",
+            "With the identified values, of the same recordings.",
+        ),
+        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+    )
+    sentence = (
+        f"Of the torques of the trajectories up to 5 Hz, the nominal robot misses {before} % of their norm and the identified one "
+        f"{after} %."
+    )
+    return Verdict(status, headline, sentence, facts, (), "", checks)
+
+
+def _check_error(error: Mapping[str, float]) -> Check:
+    question = "Does the identified robot explain the torques?"
+    answer = f"It misses {significant(error['train'], 3)} % of their norm."
+    if error["train"] > TOO_LARGE:
+        return Check(question, f"{answer} That is not this robot, or not its torques.", "bad")
+    if error["train"] > LARGE:
+        return Check(question, f"{answer} That is a lot; look at friction and at the torques' scale.", "care")
+    if error["train"] > error["nominal"]:
+        return Check(question, f"{answer} The nominal values did better.", "care")
+    return Check(question, answer, "good")
+
+
+def _table(study: InertialsStudy) -> Table:
+    rows = []
+    for item in study.estimate.parameters:
+        factor, unit = scaled(item.unit)
+        interval, std = study.estimate.interval(item.name), study.estimate.std(item.name)
+        bounds = NOTHING if interval is None else " to ".join(significant(factor * v, 3) for v in interval)
+        wide = item.value * item.prior_std if item.scale == "log" else item.prior_std
+        narrower = NOTHING if std is None or not 0 < wide < float("inf") else f"{wide / std:.1f} times"
+        rows.append((item.name, unit, significant(factor * item.value, 4), bounds, narrower))
+    return Table(
+        "table-parameters",
+        f"All {len(rows)} parameters",
+        ("parameter", "unit", "estimate", "95 % interval", "narrower than the prior"),
+        tuple(rows),
+        text_columns=(1,),
+    )
