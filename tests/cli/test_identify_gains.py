@@ -10,6 +10,7 @@ from two_links import GAINS, HELD, PAYLOAD, swings, two_links
 
 from flexcal.cli.main import main
 from flexcal.dynamics import CLASSIC, Observation
+from flexcal.report.notation import significant
 
 DECLARED = np.array([50.0, 20.0])
 ROBOT = (
@@ -51,6 +52,12 @@ def test_gains_come_back_and_can_be_pasted(arm: Path, capsys: pytest.CaptureFixt
     assert found["gains"] == pytest.approx(list(DECLARED * GAINS), rel=0.01)
     factor = found["parameters"]["elbow.drive_gain"]
     assert factor["low"] < factor["estimate"] < factor["high"] and factor["identifiable"]
+    page = (arm / "out" / "report.html").read_text("utf-8")
+    assert significant(found["gains"][0], 5) in page
+    assert f"{significant(factor['low'])} to {significant(factor['high'])}" in page
+    assert found["provenance"]["input.loaded.csv"] in page and "All 2." in page
+    assert main(["report", str(arm / "out")]) == 0
+    assert (arm / "out" / "report.html").read_text("utf-8") == page
     robot = (arm / "robot.yaml").read_text()
     gain = line[line.index("gain: [") : line.index("]") + 1]
     (arm / "robot.yaml").write_text(robot.replace("gain: [50, 20]", gain))

@@ -19,6 +19,7 @@ from flexcal.cli.main import main
 from flexcal.data import FourierPaths, TrajectoryPlan, read_estimates, read_plan_of, write_plan
 from flexcal.model import RobotModel
 from flexcal.progress import silent
+from flexcal.report.notation import significant
 from flexcal.workflow import stage_zero
 from flexcal.workflow.design_trajectory import exciting_plan
 from flexcal.yaml_reader import read_yaml
@@ -46,6 +47,20 @@ def identified(recorded: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     assert main([str(a) for a in arguments]) == 0
     assert not (recorded / "estimates.yaml").exists()
     return out
+
+
+def test_the_report_says_what_the_results_say(identified: Path) -> None:
+    page = (identified / "report.html").read_text("utf-8")
+    results = json.loads((identified / "results.json").read_text("utf-8"))
+    estimate = read_estimates(identified / "estimates.yaml")["dynamics"]
+    for key in ("nominal", "train"):
+        assert f"{significant(results['error_percent'][key], 3)}" in page
+    for name in ("link_2.mass", "joint_3.viscous"):
+        low, high = estimate.interval(name) or (0.0, 0.0)
+        assert f"{significant(low, 3)} to {significant(high, 3)}" in page
+    assert results["command"] in page and estimate.provenance["input.tx90l.urdf"] in page
+    assert main(["report", str(identified)]) == 0
+    assert (identified / "report.html").read_text("utf-8") == page
 
 
 def test_what_is_said_leads_on(

@@ -51,4 +51,6 @@ class IdentifyGains:
         document = found.document()
         console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
         console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify dynamics {self.robot} {self.logs[0]}")

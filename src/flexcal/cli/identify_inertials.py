@@ -50,6 +50,7 @@ class IdentifyInertials:
         )
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
             console.say(reading_elsewhere(self.robot, found.estimates))
         springs = f"flexcal design frequency {self.robot} --out frequency.yaml"
         poses = f"flexcal design poses {self.robot} --count 40 --out poses.yaml"

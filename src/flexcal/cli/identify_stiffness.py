@@ -39,7 +39,7 @@ class IdentifyStiffness:
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the search for a start."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for results.json and estimates.yaml (then not beside robot.yaml); 'flexcal report' makes a page of it."""
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 
     def run(self) -> None:
@@ -82,5 +82,6 @@ class IdentifyStiffness:
             )
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
             console.say(reading_elsewhere(self.robot, found.estimates))
         console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

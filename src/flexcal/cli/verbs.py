@@ -154,7 +154,7 @@ STEPS = (
                 "IdentifyStiffness",
                 "frequency responses to stiffness and damping",
                 "flexcal identify stiffness robot.yaml responses",
-                ("results.json",),
+                ("results.json", "report.html"),
             ),
         ),
     ),

@@ -132,7 +132,9 @@ def stored_page(study: StoredStudy) -> Page:
     )
     return Page(
         title=f"{study.name}: report",
-        subtitle="Made from the numbers stored in this folder; figures that need the fit itself come from the command that made it",
+        subtitle="Made from the numbers stored in this folder; figures that need the fit itself come from the command that made it"
+        if "verification" in results
+        else "Stiffness and damping of drives and bearings, from frequency responses",
         verdict=_verdict(study),
         sections=sections,
         document=results,
@@ -198,7 +200,7 @@ def _errors(study: StoredStudy) -> Section:
     blocks: list[Table | FigureBlock | Text] = []
     if rows:
         columns = ("model", "at", "poses", "mean / mm", "90 % within / mm", "worst / mm")
-        blocks.append(Table("table-accuracy", "Accuracy", columns, tuple(rows), text_columns=(1,)))
+        blocks.append(Table("table-accuracy", "Errors of every model", columns, tuple(rows), text_columns=(1,)))
     if study.results.get("remarks"):
         blocks.append(Text((), "Remarks", tuple(study.results["remarks"])))
     if study.errors:

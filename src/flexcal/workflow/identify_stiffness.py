@@ -27,6 +27,7 @@ from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
+from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -99,9 +100,9 @@ def identify_robot_stiffness(
     """Fit the springs of a robot.yaml to frequency responses (files, or folders of them), and store the block `stiffness`.
 
     The robot starts from nominal, the block `dynamics`, and the geometry of the block `calibration`; what that one says of stiffness
-    and inertia came from here and is left out. The reference motion is that of plan.yaml beside the responses. With `out`, estimates
-    and results.json go to that folder. `seed` is that of the search for a start. Raises `FlexcalError` where responses do not fit the
-    robot; nothing is written then.
+    and inertia came from here and is left out. The reference motion is that of plan.yaml beside the responses. With `out`, estimates,
+    results.json and report.html go to that folder. `seed` is that of the search for a start. Raises `FlexcalError` where responses do
+    not fit the robot; nothing is written then.
     """
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
@@ -134,4 +135,5 @@ def identify_robot_stiffness(
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
         write_results(out, found.document())
+        report_folder(out)
     return found
