@@ -58,6 +58,7 @@ def test_gains_come_back_and_can_be_pasted(arm: Path, capsys: pytest.CaptureFixt
     assert found["provenance"]["input.loaded.csv"] in page and "All 2." in page
     assert main(["report", str(arm / "out")]) == 0
     assert (arm / "out" / "report.html").read_text("utf-8") == page
+    capsys.readouterr()
     robot = (arm / "robot.yaml").read_text()
     gain = line[line.index("gain: [") : line.index("]") + 1]
     (arm / "robot.yaml").write_text(robot.replace("gain: [50, 20]", gain))
