@@ -200,7 +200,9 @@ def _errors(study: StoredStudy) -> Section:
     blocks: list[Table | FigureBlock | Text] = []
     if rows:
         columns = ("model", "at", "poses", "mean / mm", "90 % within / mm", "worst / mm")
-        blocks.append(Table("table-accuracy", "Errors of every model", columns, tuple(rows), text_columns=(1,)))
+        blocks.append(
+            Table("table-accuracy", "Errors of every model", columns, tuple(rows), text_columns=(1,))
+        )
     if study.results.get("remarks"):
         blocks.append(Text((), "Remarks", tuple(study.results["remarks"])))
     if study.errors:

@@ -55,6 +55,15 @@ def _names(first: Path, second: Path) -> tuple[str, str]:
 
 
 def _run(folder: Path, name: str) -> Run:
+    try:
+        return _left(folder, name)
+    except KeyError as problem:
+        raise InputError(
+            f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had left it; run the verb that leaves it again."
+        ) from problem
+
+
+def _left(folder: Path, name: str) -> Run:
     if not (folder / RESULTS).is_file():
         raise InputError(
             f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo left with --out."

@@ -73,8 +73,8 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         )
         errors = {model: vectors(f"{model}_d") for model in _MODELS if f"{model}_dx" in table.columns}
         ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
-        if CALIBRATED not in errors or not joints:
-            raise InputError(f"{path} lacks columns; run the verb that leaves it again.")
+        if CALIBRATED not in errors or not joints or not len(table):
+            raise InputError(f"{path} lacks columns or rows; run the verb that leaves it again.")
         return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise _unreadable(path, problem) from problem
