@@ -76,6 +76,14 @@ def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) ->
     assert document["parameters"]["calibration"]["changed"] == [] and document["shared"] == ["random.csv"]
     assert "same folder" in refused(run, tmp_path, "report", calibrated, "--compare", calibrated)
     assert "no results.json" in refused(run, tmp_path, "report", calibrated, "--compare", folder / "none")
+    old = folder / "old"
+    old.mkdir()
+    (old / "results.json").write_text('{"verification": {}, "rms_mm": {}, "provenance": {}}')
+    header, *_ = rows = (calibrated / "points.csv").read_text("utf-8").splitlines()
+    (old / "points.csv").write_text("\n".join(rows) + "\n", "utf-8")
+    assert "lacks 'robot'" in refused(run, tmp_path, "report", calibrated, "--compare", old)
+    (old / "points.csv").write_text(f"{header}\n", "utf-8")
+    assert "lacks columns or rows" in refused(run, tmp_path, "report", old)
     check = (
         "verify",
         folder / "robot.yaml",
