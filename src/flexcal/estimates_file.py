@@ -24,7 +24,7 @@ from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import to_plain, yaml_text
 
-Block = Literal["dynamics", "stiffness", "calibration"]
+Block = Literal["dynamics", "stiffness", "calibration", "payload"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
 """The blocks of the file, in the order in which a robot takes them in."""
 
@@ -87,10 +87,16 @@ class StoredEstimates:
     dynamics: StoredBlock | None = None
     stiffness: StoredBlock | None = None
     calibration: StoredBlock | None = None
+    payload: StoredBlock | None = None
 
     def block(self, name: Block) -> StoredBlock | None:
         """One block, where it is there."""
-        return {"dynamics": self.dynamics, "stiffness": self.stiffness, "calibration": self.calibration}[name]
+        return {
+            "dynamics": self.dynamics,
+            "stiffness": self.stiffness,
+            "calibration": self.calibration,
+            "payload": self.payload,
+        }[name]
 
 
 def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Block, Estimate]:

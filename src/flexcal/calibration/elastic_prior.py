@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.data import PoseSet
 from flexcal.estimation import Parameters
 from flexcal.model import RobotModel
-from flexcal.model.declared import declared, uncertain_inertials
+from flexcal.model.declared import declared, uncertain_inertials, uncertain_payload
 from flexcal.model.names import SPRINGS
 
 
@@ -46,9 +46,8 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
         return []
     names = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
     names += uncertain_inertials(model, [i for i in range(model.n) if _carried(model, i)])
-    held = model.nominal_payload
-    if held is not None and held.mass_std > 0 and (poses.payload is None or poses.payload.any()):
-        names.append("payload.mass")
+    if poses.payload is None or poses.payload.any():
+        names += uncertain_payload(model)
     return names
 
 

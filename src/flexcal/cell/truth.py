@@ -72,7 +72,9 @@ def write_truth(path: str | Path, values: Mapping[str, float]) -> None:
 
 def _block(name: str) -> Block:
     """The identification that finds a parameter."""
-    last = name.rpartition(".")[2]
+    owner, _, last = name.rpartition(".")
+    if owner == "payload":
+        return "payload"
     if last in ("stiffness", "damping"):
         return "stiffness"
     return "calibration" if last in (*GEOMETRY, *STATION, "backlash") else "dynamics"

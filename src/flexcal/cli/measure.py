@@ -59,7 +59,8 @@ class Measure:
             )
         if found.kind == "trajectory":
             console.say(f"wrote {found.recordings} recordings to {self.out}")
-            following = f"flexcal identify inertials {robot} {self.out}"
+            verb = "payload" if found.loaded else "inertials"
+            following = f"flexcal identify {verb} {robot} {self.out}"
         elif found.recordings:
             console.say(f"wrote {found.recordings} recordings of {found.poses} poses to {self.out}")
             following = f"flexcal identify response {robot} {self.out} --out responses"

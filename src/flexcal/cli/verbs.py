@@ -119,6 +119,14 @@ STEPS = (
                 "flexcal identify dynamics robot.yaml exciting.parquet --hold-out last:0.3",
                 ("results.json", "predictions.npz", "report.html", "learned_residual.npz"),
             ),
+            Verb(
+                ("identify", "payload"),
+                "identify_payload",
+                "IdentifyPayload",
+                "recordings with a payload to its mass, centre of mass and inertia",
+                "flexcal identify payload robot.yaml loaded",
+                ("results.json",),
+            ),
         ),
     ),
     Step(

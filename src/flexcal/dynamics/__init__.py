@@ -1,6 +1,7 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
 from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.arm_yield import ArmYield
 from flexcal.dynamics.attenuation import attenuation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.column_errors import column_errors, noisy_logs
@@ -46,12 +47,15 @@ from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motion_bandwidth import MotionBandwidth, motion_bandwidth
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.ols import ordinary_least_squares
+from flexcal.dynamics.payload_equations import PayloadEquations
+from flexcal.dynamics.payload_fit import PayloadFit, identify_payload
 from flexcal.dynamics.power_model import power_least_squares
 from flexcal.dynamics.prior_fit import identify_with_prior
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, Subsystem, batches_each, observe
 from flexcal.dynamics.residual_errors import ResidualErrors, residual_errors
 from flexcal.dynamics.residual_learning import BlockErrors, learn_residual
+from flexcal.dynamics.robot_prior import RobotPrior
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 from flexcal.dynamics.tls import total_least_squares
@@ -65,6 +69,7 @@ __all__ = [
     "FRICTION_TERMS",
     "LEARNED",
     "ArmSide",
+    "ArmYield",
     "AsymmetricCoulomb",
     "BaseParameters",
     "Batch",
@@ -88,11 +93,14 @@ __all__ = [
     "Motion",
     "MotionBandwidth",
     "Observation",
+    "PayloadEquations",
+    "PayloadFit",
     "Play",
     "Presliding",
     "RecordedRows",
     "RegressionData",
     "ResidualErrors",
+    "RobotPrior",
     "RotorInertia",
     "SimulatedExperiment",
     "Stribeck",
@@ -115,6 +123,7 @@ __all__ = [
     "experiment_system",
     "feasible_least_squares",
     "huber_least_squares",
+    "identify_payload",
     "identify_with_prior",
     "instrumental_variables",
     "kalman_filter",

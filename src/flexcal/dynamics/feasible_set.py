@@ -49,14 +49,14 @@ def _links(model: RobotModel) -> Iterator[Cone]:
     for i, link in enumerate(model.inertias):
         members = np.arange(len(INERTIAL) * i, len(INERTIAL) * (i + 1))
         if link.mass > 0:
-            yield Cone(members, PSEUDO_INERTIA, pseudo_inertia(_extended(link)), _LINK_FLOOR, 2.0 * std)
+            yield Cone(members, PSEUDO_INERTIA, pseudo_inertia(extended(link)), _LINK_FLOOR, 2.0 * std)
             yield _scalar(members[0], link.mass, 1.0 - _MASS_BOUND * std, math.inf)
             yield _scalar(members[0], link.mass, -1.0 - _MASS_BOUND * std, math.inf, sign=-1.0)
         else:
             yield Cone(members, PSEUDO_INERTIA, pseudo_inertia(_guessed(model, i)), _LINK_FLOOR, 2.0)
 
 
-def _extended(link: Inertia) -> Inertia:
+def extended(link: Inertia) -> Inertia:
     """The link with no principal extent below that of a ball of steel of its mass."""
     least = link.mass / 5.0 * (3.0 * link.mass / (4.0 * np.pi * _STEEL)) ** (2.0 / 3.0)
     sizes, axes = np.linalg.eigh(0.5 * np.trace(link.inertia) * np.eye(3) - link.inertia)

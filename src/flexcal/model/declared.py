@@ -37,6 +37,16 @@ def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
     return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.mass[i] > 0 for key in keys]
 
 
+def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
+    """What is uncertain of the payload: its mass as robot.yaml's `mass_std` says, or what was identified of mass and centre of mass."""
+    held = model.nominal_payload
+    if held is None:
+        return ()
+    names = ("payload.mass", "payload.com_x", "payload.com_y", "payload.com_z")
+    found = tuple(name for name in names if model.posterior.determines(name))
+    return found or (("payload.mass",) if held.mass_std > 0 else ())
+
+
 def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
     """Stiffness and damping of every spring, almost free, and the rotor inertias of the elastic joints with robot.yaml's prior.
 
@@ -65,7 +75,7 @@ def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
         moved += [i] if at >= 0 else []
     items = [declared(model, name) for name in uncertain_inertials(model, moved)]
     held = model.payload
-    if loaded and held is not None and held.mass > 0 and held.mass_std > 0:
+    if loaded and held is not None and held.mass > 0 and uncertain_payload(model):
         items.append(declared(model, "payload.mass"))
     return items
 
@@ -86,7 +96,7 @@ def _std(model: RobotModel, name: str, key: str) -> float:
     if name == "payload.mass":
         held = model.nominal_payload
         assert held is not None
-        return held.mass_std / held.mass
+        return held.mass_std / held.mass if held.mass_std > 0 else float("inf")
     if key in GEOMETRY:
         return LENGTH_TOLERANCE if key.startswith("length") else ANGLE_TOLERANCE
     return {

@@ -40,9 +40,10 @@ def gravity_torque_std(
     held = model.payload
     if held is not None and held.mass > 0:
         own = regressor[:, :, held.joint]
-        names.append("payload.mass")
+        names += ["payload.mass", "payload.com_x", "payload.com_y", "payload.com_z"]
         rows.append((masses / held.mass)[:, None] * (own[:, :, 0] + own[:, :, 1:] @ held.com_in_link))
-        declared.append(held.mass_std)
+        rows += [masses[:, None] * (own[:, :, 1:] @ held.rotation[:, c]) for c in range(3)]
+        declared += [held.mass_std, 0.0, 0.0, 0.0]
     covariance = np.diag(np.square(declared))
     known = [i for i, name in enumerate(names) if model.posterior.determines(name)]
     parameters = model.posterior.parameters.subset([names[i] for i in known])

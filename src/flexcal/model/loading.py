@@ -106,6 +106,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         inertia=np.array([y.inertia for y in description.inertias]),
         payload_mass=np.array([payload.mass if payload else 0.0]),
         payload_com=np.array(payload.com if payload else np.zeros(3)),
+        payload_inertia=payload.moments if payload else np.zeros(6),
     )
 
 

@@ -11,6 +11,7 @@ GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y"
 SPRINGS = ("bearing_x", "bearing_y", "drive")
 FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_up")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
+MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
 
 _UNITS = {
@@ -47,7 +48,7 @@ def spring_names(model: RobotModel) -> tuple[str, ...]:
 def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
 
-    Inertia entries (`<link>.Ixx`…, at the joint frame) and first moments (`<link>.mc_x`…) are not here: they depend on mass and
+    Inertia entries of links (`<link>.Ixx`…, at the joint frame) and first moments (`<link>.mc_x`…) are not here: they depend on mass and
     centre of mass too.
     """
     table: dict[str, tuple[str, tuple[int, ...]]] = {}
@@ -87,4 +88,6 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
         table["payload.mass"] = ("payload_mass", (0,))
         for k, key in enumerate("xyz"):
             table[f"payload.com_{key}"] = ("payload_com", (k,))
+        for k, key in enumerate(MOMENTS):
+            table[f"payload.{key}"] = ("payload_inertia", (k,))
     return table

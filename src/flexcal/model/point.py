@@ -43,6 +43,11 @@ class Payload:
         return Inertia(mass, self.com_in_link, self.rotation @ (share * self.inertia) @ self.rotation.T)
 
     @property
+    def moments(self) -> np.ndarray:
+        """Ixx, Ixy, Ixz, Iyy, Iyz, Izz (6,) of `inertia`."""
+        return self.inertia[np.triu_indices(3)]
+
+    @property
     def com_in_link(self) -> np.ndarray:
         """Centre of mass (3,) in the frame of the link that carries the payload, m."""
         return self.translation + self.rotation @ self.com

@@ -32,8 +32,8 @@ class RobotModel:
     """An immutable robot: structure from the URDF, and one array a kind of parameter (n joints, SI units).
 
     Every number that can be identified has a name (FORMATS): `values` reads them all, `with_values` makes a changed robot. Setting a
-    link's mass scales its inertia about the centre of mass with it; setting `com_x`… or the first moment `mc_x`… (mass times centre of
-    mass, after the mass) moves that inertia rigidly.
+    link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first moment `mc_x`…
+    (mass times centre of mass, after the mass) moves that inertia rigidly.
     """
 
     config: RobotConfig
@@ -69,6 +69,7 @@ class RobotModel:
     inertia: np.ndarray
     payload_mass: np.ndarray
     payload_com: np.ndarray
+    payload_inertia: np.ndarray
     posterior: Posterior = NOTHING_ESTIMATED
 
     @classmethod
@@ -141,13 +142,14 @@ class RobotModel:
 
     @property
     def payload(self) -> Payload | None:
-        """The declared payload with its current mass and centre of mass, and the inertia of that mass."""
+        """The declared payload with its current mass, centre of mass and inertia."""
         held = self.nominal_payload
         if held is None:
             return None
-        mass = float(self.payload_mass[0])
-        share = mass / held.mass if held.mass > 0 else 1.0
-        return replace(held, mass=mass, com=self.payload_com, inertia=share * held.inertia)
+        inertia = np.empty((3, 3))
+        for value, (row, column) in zip(self.payload_inertia, _MOMENTS.values(), strict=True):
+            inertia[row, column] = inertia[column, row] = value
+        return replace(held, mass=float(self.payload_mass[0]), com=self.payload_com, inertia=inertia)
 
     @cached_property
     def reach(self) -> float:
@@ -227,6 +229,8 @@ class RobotModel:
                 own(field)[index] = value
                 if field == "mass" and self.mass[index] > 0:
                     own("inertia")[index] = self.inertia[index] * (value / self.mass[index])
+                elif field == "payload_mass" and self.payload_mass[0] > 0:
+                    own("payload_inertia")[:] = self.payload_inertia * (value / self.payload_mass[0])
             else:
                 self.value(name)
                 link, _, key = name.rpartition(".")

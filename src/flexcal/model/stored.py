@@ -7,12 +7,17 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
+from flexcal.model.held_payload import holding
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.robot_model import RobotModel
 
+PAYLOAD_FRAME = "frame"
+"""Of the provenance of the block `payload`: the URDF frame that its values are in."""
 NUISANCE = re.compile(
     r".*\.(pose_[0-9]+|half_gap|arm_inertia|arm_viscous|arm_coulomb|drive\.torque_offset|drive\.gap_torque)"
 )
@@ -27,10 +32,13 @@ def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = No
 def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
     """`model` with the estimates of `blocks`, which come from the file `path`.
 
-    A joint whose backlash was estimated counts as declared to have backlash. Raises `InputError` for a name that the robot does not
-    have: the file is then of another robot, or robot.yaml has changed since; and for an elastic robot where `dynamics` has links that no
-    body can be, as linear least squares may: they give the right torques at the joints, and wrong ones everywhere else.
+    A joint whose backlash was estimated counts as declared to have backlash, and a payload that was identified as declared in its frame.
+    Raises `InputError` for a name that the robot does not have: the file is then of another robot, or robot.yaml has changed since; where
+    robot.yaml declares the payload in another frame; and for an elastic robot where `dynamics` has links that no body can be, as linear
+    least squares may: they give the right torques at the joints, and wrong ones everywhere else.
     """
+    if "payload" in blocks:
+        model = _with_payload(model, blocks["payload"], path)
     for block, estimate in blocks.items():
         unknown = [
             n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
@@ -43,6 +51,21 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
         model = _with_backlash_joints(model.with_estimate(estimate), estimate)
         if block == "dynamics" and model.elastic:
             _check_bodies(model, estimate, path)
+    return model
+
+
+def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotModel:
+    """With the identified payload's frame, whose values come with its block."""
+    frame, declared = estimate.provenance.get(PAYLOAD_FRAME, ""), model.nominal_payload
+    if declared is None:
+        values = estimate.values
+        com = np.array([values[f"payload.com_{key}"] for key in "xyz"])
+        return holding(model, frame, values["payload.mass"], com, np.zeros((3, 3)))
+    if declared.frame != frame:
+        raise InputError(
+            f"{path}: the payload was identified in the frame '{frame}', but {model.path} declares it in '{declared.frame}'; run "
+            "'flexcal identify payload' again, or correct the frame."
+        )
     return model
 
 

@@ -33,13 +33,15 @@ VIRTUAL = "virtual"
 
 @dataclass(frozen=True)
 class Measurement:
-    """What lies in `folder`: joint logs of an experiment, or measured poses, by a plan of this kind and name."""
+    """What lies in `folder`: joint logs of an experiment, or measured poses, by a plan of this kind and name, `loaded` where it holds the
+    payload."""
 
     folder: Path
     kind: str
     plan: str
     poses: int
     recordings: int
+    loaded: bool
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -85,12 +87,13 @@ def measure(
     else:
         source = FolderCell(cell, model)
     if isinstance(plan, PosePlan):
-        result = Measurement(out, plan.kind, plan.name, _measure_poses(source, plan, out, progress), 0)
+        result = Measurement(out, plan.kind, plan.name, _measure_poses(source, plan, out, progress), 0, False)
     else:
         total = len(list(labels(plan)))
         write_recordings(out, plan, _counted(source.record(plan), total, progress))
         poses = len(plan.poses) if isinstance(plan, MultisinePlan) else 0
-        result = Measurement(out, plan.kind, plan.name, poses, total)
+        loaded = plan.payload != 0 and model.payload is not None
+        result = Measurement(out, plan.kind, plan.name, poses, total, loaded)
     if drawn:
         write_truth(out / "truth.yaml", drawn)
     write_results(out, result.document())

@@ -1,0 +1,85 @@
+"""`flexcal identify payload`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.next_step import reading_elsewhere
+from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
+
+if TYPE_CHECKING:
+    from flexcal.workflow.identify_payload import RobotPayload
+
+
+@dataclass(frozen=True)
+class IdentifyPayload:
+    """Find mass, centre of mass and inertia of what the robot holds, from recordings of it in motion.
+
+    The robot's own dynamics are those of its estimates ('identify dynamics', or 'identify inertials'), or of --free recordings. Friction is
+    found anew. Writes the block `payload` of estimates.yaml beside robot.yaml, with which 'compensate', 'predict', 'calibrate', 'verify'
+    and 'export' reckon from then on. The torques must be in N m: where they are currents times gains, the mass is as much off as the gains.
+    """
+
+    robot: Robot
+    logs: Annotated[
+        Positional[Paths],
+        arg(
+            metavar="LOGS...",
+            help="joint logs (CSV or Parquet) with the payload, or the folder of 'measure'",
+            help_behavior_hint="",
+        ),
+    ]
+    free: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
+    """The same without the payload; those that the estimates were made from are in them already."""
+    frame: Annotated[
+        str,
+        arg(metavar="FRAME", help_behavior_hint="(default: as robot.yaml declares it, else the last link)"),
+    ] = ""
+    """URDF frame that the values are in."""
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Logs that are read at once, each in a process of its own."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the payload."""
+        from flexcal.cli.tables import quantity_table
+        from flexcal.workflow.identify_payload import identify_robot_payload
+
+        require_robot(self.robot, *self.logs)
+        require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_payload(
+                self.robot,
+                self.logs,
+                free=self.free,
+                frame=self.frame,
+                out=self.out,
+                jobs=self.jobs,
+                progress=progress,
+            )
+        document = found.document()
+        units = {item.name: item.unit for item in found.fit.estimate.parameters}
+        title = f"payload in the frame {found.frame}, inertia about its centre of mass"
+        console.show(quantity_table(title, document["parameters"], units))
+        console.say(f"torques missed by {document['error_percent']:.2f} % of their norm")
+        for remark in document["remarks"]:
+            console.say(remark)
+        console.say(f"the same as a line of robot.yaml, if you want to keep it there: {found.declaration}")
+        console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(reading_elsewhere(self.robot, found.estimates))
+        console.finish(document, self._next(found))
+
+    def _next(self, found: RobotPayload) -> str:
+        where = "" if self.out is None else f" --estimates {self.out}"
+        if "calibration" in found.blocks:
+            return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
+        return f"flexcal design poses {self.robot} --count 40 --out poses.yaml"

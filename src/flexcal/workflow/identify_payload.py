@@ -1,0 +1,234 @@
+"""Recordings of a robot that holds something to its mass, centre of mass and inertia, and estimates.yaml."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from flexcal.data import provenance, read_estimates, sha256_of
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    CLASSIC,
+    ArmYield,
+    BaseParameters,
+    JointLog,
+    Observation,
+    PayloadEquations,
+    PayloadFit,
+    RegressionData,
+    RobotPrior,
+    Window,
+    batches_each,
+    identify_payload,
+    log_blocks,
+)
+from flexcal.errors import InputError
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+from flexcal.model.held_payload import holding, last_frame
+from flexcal.model.stored import PAYLOAD_FRAME, with_blocks
+from flexcal.progress import Progress, silent
+from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
+from flexcal.workflow.log_torques import require_joint_torques
+from flexcal.workflow.payload_remarks import payload_remarks
+from flexcal.workflow.recorded_logs import recorded_logs
+from flexcal.workflow.results import quantities, write_results
+from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.treatment import Treatment, treatment_of
+
+_PASSES = 3
+"""Fits of an elastic robot, each with the springs loaded by the payload of the one before."""
+_ROWS_HZ = 6.0
+"""Rows a second of an elastic robot, at most: its springs yield as `ArmYield` has it only well below the first resonance."""
+_SENSELESS = 0.5
+"""Share of the torques that no robot misses whose torques they are."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotPayload:
+    """The `fit`, the `model` with it, the robot's other `blocks`, and where the estimate was written."""
+
+    declared: RobotModel
+    model: RobotModel
+    frame: str
+    fit: PayloadFit
+    blocks: Mapping[Block, Estimate]
+    treatment: Treatment
+    estimates: Path
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json; `declaration` is the line of robot.yaml that says the same."""
+        return {
+            "frame": self.frame,
+            "parameters": quantities(self.fit.estimate),
+            "declaration": self.declaration,
+            "error_percent": 100 * self.fit.error,
+            "signals": {
+                "cutoff_hz": self.treatment.cutoff_hz,
+                "decimation": self.treatment.decimation.factor,
+                "proposed": list(self.treatment.proposed),
+            },
+            "remarks": list(payload_remarks(self.fit, self.declared, self.blocks)),
+            "estimates": self.estimates,
+        }
+
+    @property
+    def declaration(self) -> str:
+        """`payload:` of robot.yaml with what was found."""
+        found = self.fit.estimate
+        values = found.values
+        com = ", ".join(f"{values[f'payload.com_{key}']:.5g}" for key in "xyz")
+        text = f"frame: {self.frame}, mass: {values['payload.mass']:.5g}, com: [{com}], mass_std: {found.std('payload.mass'):.2g}"
+        if found.identifiable[found.parameters.index("payload.Ixx")]:
+            held = self.model.payload
+            assert held is not None
+            rows = ", ".join(f"[{', '.join(f'{entry:.4g}' for entry in row)}]" for row in held.inertia)
+            text += f", inertia: [{rows}]"
+        return f"payload: {{{text}}}"
+
+
+def identify_robot_payload(
+    robot: Path,
+    logs: Sequence[Path],
+    *,
+    free: Sequence[Path] = (),
+    frame: str = "",
+    out: Path | None = None,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> RobotPayload:
+    """Find what the robot of a robot.yaml holds in `logs`, and store the block `payload`.
+
+    `logs` and `free` are files, or folders of trajectories as 'measure' leaves them.
+    Of the robot itself its estimates tell, all blocks but that of the payload, or the logs `free` without payload, or both together. The
+    values are in the frame that robot.yaml declares for the payload, else in the URDF frame `frame`, else in that of the last link. With
+    `out`, estimates and results.json go to that folder. Raises `FlexcalError` where neither tells of the robot's dynamics, a log does not
+    fit the robot, says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and
+    as `identify_payload` does; nothing is written then.
+    """
+    logs, free = recorded_logs(logs), recorded_logs(free)
+    require_distinct(logs, free)
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    bare, frame = _held(nominal, frame)
+    source = bare.path.parent / bare.config.estimates
+    blocks = read_estimates(source, without="payload") if source.exists() else {}
+    if "dynamics" not in blocks and not free:
+        raise InputError(
+            f"{source} has no block 'dynamics', so the payload cannot be told from the robot; run 'flexcal identify dynamics {robot} "
+            "LOGS…' on recordings without payload first, or give such recordings with --free."
+        )
+    _require_news(free, blocks)
+    model = with_blocks(bare, blocks, source)
+    every = [*logs, *free]
+    treatment = _slow(treatment_of(model, every), model, every)
+    with TemporaryDirectory(prefix="flexcal_") as folder:
+        read = read_logs(every, model, treatment, Path(folder), jobs=jobs)
+        loaded = [True] * len(logs) + [False] * len(free)
+        _require_payloads(read, loaded)
+        require_joint_torques(read, model)
+        for number in range(_PASSES if model.elastic else 1):
+            progress("payload", number / _PASSES)
+            fit = _fit(model, read, loaded, blocks.get("dynamics"), treatment, jobs)
+            model = model.with_values(fit.estimate.values)
+        progress("payload", 1.0)
+    if fit.error > _SENSELESS:
+        raise InputError(
+            f"{logs[0]}: the fit misses {100 * fit.error:.0f} % of the torques, so they are not those of this robot's joints in N m; check "
+            "robot.yaml, and signs, units and gear ratios under `signals:`."
+        )
+    origin = provenance(
+        [robot, bare.urdf, *every],
+        {"loaded": len(logs), "free": len(free)},
+        source if blocks else None,
+        tuple(blocks),
+    )
+    estimate = replace(fit.estimate, provenance=origin | {PAYLOAD_FRAME: frame})
+    target = source if out is None else out / ESTIMATES
+    result = RobotPayload(nominal, model, frame, replace(fit, estimate=estimate), blocks, treatment, target)
+    store_block(source, target, blocks, "payload", estimate)
+    if out is not None:
+        write_results(out, result.document())
+    return result
+
+
+def _held(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
+    """The robot with a payload in its frame, and that frame."""
+    declared = model.nominal_payload
+    if declared is None:
+        place = frame or last_frame(model)
+        return holding(model, place, 1.0, np.zeros(3), np.zeros((3, 3))), place
+    if frame not in ("", declared.frame):
+        raise InputError(
+            f"--frame is '{frame}', but {model.path} declares the payload in '{declared.frame}'; leave --frame out, or correct robot.yaml."
+        )
+    return model, declared.frame
+
+
+def _slow(treatment: Treatment, model: RobotModel, logs: Sequence[Path]) -> Treatment:
+    """With rows no closer than springs allow."""
+    if not model.elastic:
+        return treatment
+    rate = min(1.0 / next(log_blocks(log, model)).time_step for log in logs)
+    slowest = Decimation.near(rate / _ROWS_HZ)
+    return (
+        treatment if treatment.decimation.factor >= slowest.factor else replace(treatment, decimation=slowest)
+    )
+
+
+def _require_news(free: Sequence[Path], blocks: Mapping[Block, Estimate]) -> None:
+    """Raises `InputError` for a log that the block `dynamics` was made from: it would count twice."""
+    if "dynamics" not in blocks:
+        return
+    used = {digest for key, digest in blocks["dynamics"].provenance.items() if key.startswith("input.")}
+    for log in free:
+        if sha256_of(log) in used:
+            raise InputError(
+                f"{log}: the block 'dynamics' was made from this recording, which would count twice; leave --free out, or give another."
+            )
+
+
+def _require_payloads(logs: Sequence[JointLog], loaded: Sequence[bool]) -> None:
+    for log, held in zip(logs, loaded, strict=True):
+        if held and log.payload == 0:
+            raise InputError(
+                f"{log.path}: its column 'payload' says that the robot held nothing; give it with --free, or correct the column."
+            )
+        if not held and log.payload is not None and log.payload > 0:
+            raise InputError(
+                f"{log.path}: recorded with a payload of {log.payload:g} kg, but --free takes recordings without."
+            )
+
+
+def _fit(
+    model: RobotModel,
+    logs: Sequence[JointLog],
+    loaded: Sequence[bool],
+    dynamics: Estimate | None,
+    treatment: Treatment,
+    jobs: int,
+) -> PayloadFit:
+    """With springs that yield under the payload of the `model`."""
+    plain = Observation(model, CLASSIC)
+    base = BaseParameters.of(plain)
+    prior = RobotPrior.of(model, plain, base, dynamics)
+    systems, wide = [], plain
+    for log, held in zip(logs, loaded, strict=True):
+        wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, prior.sources, None if held else 0.0)))
+        systems += log_systems(
+            [LogPart(log, Window())],
+            wide,
+            treatment,
+            batches=batches_each(len(logs)),
+            jobs=1,
+            progress=silent,
+        )
+    assert model.payload is not None
+    data = RegressionData.of(wide, base, systems)
+    return identify_payload(PayloadEquations(data, loaded, model.payload, prior))

@@ -1,0 +1,38 @@
+"""What a user should know of an identified payload beside the numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+from flexcal.dynamics import PayloadFit
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+
+_BODILESS = 29.6
+"""Sum of ten squared normal errors that one in a thousand exceeds."""
+
+
+def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block, Estimate]) -> Iterator[str]:
+    """One sentence each."""
+    found = fit.estimate
+    hidden = [name for name, seen in zip(found.parameters.names, found.identifiable, strict=True) if not seen]
+    if hidden:
+        held = "as robot.yaml declares them" if declared.payload is not None else "at zero"
+        yield f"these recordings do not tell {', '.join(hidden)}, which stay {held}"
+    if fit.rise > _BODILESS:
+        yield (
+            f"no body has what these torques ask for: the nearest one raises the sum of squares by {fit.rise:.3g}; check the drive "
+            "gains, that the robot's own dynamics are of this robot, and the frame"
+        )
+    interval = found.interval("payload.mass")
+    if declared.payload is not None and interval is not None:
+        mass = declared.payload.mass
+        if not interval[0] <= mass <= interval[1]:
+            yield f"robot.yaml declares {mass:g} kg; what was identified counts from now on"
+    for name, block in blocks.items():
+        if "payload.mass" in block.parameters:
+            yield (
+                f"the block '{name}' was found with a payload of {block.values['payload.mass']:.4g} kg; if the robot held this one then, "
+                "make that block again"
+            )
