@@ -1,7 +1,5 @@
 """M, D, K and G: published modes of the bare TX90L, and every derivative against central differences."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from scipy.linalg import eigh

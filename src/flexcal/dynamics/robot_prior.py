@@ -10,7 +10,6 @@ from flexcal.dynamics.arm_yield import error_sources
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.observation import Observation
 from flexcal.estimation import Estimate, Parameters
-from flexcal.model import RobotModel
 from flexcal.model.declared import declared
 from flexcal.model.regressor import INERTIAL
 
@@ -35,15 +34,14 @@ class RobotPrior:
     source_root: np.ndarray
 
     @classmethod
-    def of(
-        cls, model: RobotModel, observation: Observation, base: BaseParameters, found: Estimate | None
-    ) -> RobotPrior:
-        """From the model's posterior, in which `found` is the block `dynamics`; without it the base parameters are free.
+    def of(cls, observation: Observation, base: BaseParameters, found: Estimate | None) -> RobotPrior:
+        """From the posterior of the observed model, in which `found` is the block `dynamics`; without it the base parameters are free.
 
         A base parameter that the recordings of `found` hid is free, with those that took its place; so is friction that was found beside
         terms which are not the classic ones of `observation`, and a drive's parameter that was not found at all. Springs and geometry are
         as the posterior knows them, else as uncertain as declared.
         """
+        model = observation.model
         sources = error_sources(model)
         links = {joint.link for joint in model.joints}
         kept = base.found.kept_names
@@ -57,7 +55,7 @@ class RobotPrior:
         covariance = model.posterior.prior(Parameters(items))[1]
         root = _root(covariance)
         count = len(dynamics)
-        base_root = _jacobian(model, observation, base, owned, dynamics) @ root[:count]
+        base_root = _jacobian(observation, base, owned, dynamics) @ root[:count]
         free = np.eye(len(kept)) if found is None else _free(found, kept)
         values = base.found.regrouping @ observation.values()
         return cls(values, base_root, free, sources, root[count:])
@@ -73,9 +71,10 @@ def _root(covariance: np.ndarray) -> np.ndarray:
 
 
 def _jacobian(
-    model: RobotModel, observation: Observation, base: BaseParameters, owned: list[str], names: list[str]
+    observation: Observation, base: BaseParameters, owned: list[str], names: list[str]
 ) -> np.ndarray:
     """Derivative (r, k) of the base parameters by the named ones of those `owned`, in estimation coordinates; the others stay."""
+    model = observation.model
     own = model.posterior.parameters.subset(owned)
     x = own.coordinates()
     result = np.zeros((base.rank, len(names)))

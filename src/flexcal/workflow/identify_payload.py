@@ -114,7 +114,7 @@ def identify_robot_payload(
     as `identify_payload` does; nothing is written then.
     """
     logs, free = recorded_logs(logs), recorded_logs(free)
-    require_distinct(logs, free)
+    require_distinct([*logs, *free])
     nominal = RobotModel.from_yaml(robot, estimates=False)
     bare, frame = _held(nominal, frame)
     source = bare.path.parent / bare.config.estimates
@@ -217,7 +217,7 @@ def _fit(
     """With springs that yield under the payload of the `model`."""
     plain = Observation(model, CLASSIC)
     base = BaseParameters.of(plain)
-    prior = RobotPrior.of(model, plain, base, dynamics)
+    prior = RobotPrior.of(plain, base, dynamics)
     systems, wide = [], plain
     for log, held in zip(logs, loaded, strict=True):
         wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, prior.sources, None if held else 0.0)))

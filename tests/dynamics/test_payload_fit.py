@@ -1,0 +1,272 @@
+"""A payload from torques: exact without noise, by another engine's torques, with intervals that hold it, and what no motion tells."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import recovery
+from two_links import GAINS, HELD, two_links
+from two_links import swings as swing_of
+
+from flexcal.data.filtering import Decimation
+from flexcal.dynamics import (
+    CLASSIC,
+    ArmYield,
+    BaseParameters,
+    Motion,
+    Observation,
+    PayloadEquations,
+    PayloadFit,
+    RobotPrior,
+    identify_payload,
+    observe,
+    weighted_least_squares,
+)
+from flexcal.dynamics.payload_body import nearest_body, of_body, of_frame, told_moments
+from flexcal.dynamics.payload_equations import in_link
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel, inertial_parameters, torque_regressor
+from flexcal.model.held_payload import holding
+from flexcal.model.periodic_torque import yielding_torque
+from flexcal.model.pseudo_inertia import PSEUDO_INERTIA
+
+BODY = np.array([2.0, 0.05, -0.03, 0.08, 0.02, 0.001, -0.002, 0.03, 0.003, 0.015])
+"""kg, m, kg m² about the centre of mass."""
+LAST = slice(50, 60)
+
+
+@pytest.fixture(scope="module")
+def arm(tx40: RobotModel) -> Observation:
+    return Observation(held_by(tx40), CLASSIC)
+
+
+def held_by(model: RobotModel) -> RobotModel:
+    """With a payload to be found in the frame of the last link."""
+    return holding(model, model.joints[-1].link, 1.0, np.zeros(3), np.zeros((3, 3)))
+
+
+def loaded(arm: Observation, truth: np.ndarray) -> np.ndarray:
+    """The true parameters with the body."""
+    held = arm.model.payload
+    assert held is not None
+    values = truth.copy()
+    values[LAST] += in_link(held) @ of_frame(BODY)
+    return values
+
+
+def found(
+    arm: Observation, motions: list[Motion], carries: list[bool], dynamics: Estimate | None = None
+) -> PayloadFit:
+    base, held = BaseParameters.of(arm), arm.model.payload
+    data = observe(arm, base, motions, Decimation(1))
+    assert held is not None
+    return identify_payload(PayloadEquations(data, carries, held, RobotPrior.of(arm, base, dynamics)))
+
+
+def values(fit: PayloadFit) -> np.ndarray:
+    return np.array(list(fit.estimate.values.values()))
+
+
+def test_without_noise_it_comes_back(
+    arm: Observation, truth: np.ndarray, sines: Callable[[int, float], Motion]
+) -> None:
+    """From ten seconds with it and ten without, of a robot that differs from CAD in everything."""
+    motion = sines(1000, 100.0)
+    pair = [recovery.driven(arm, motion, p) for p in (loaded(arm, truth), truth)]
+    fit = found(arm, pair, [True, False])
+    assert values(fit) == pytest.approx(BODY, abs=1e-6)
+    assert all(fit.estimate.identifiable) and fit.rise == 0.0
+
+
+def test_without_noise_from_identified_dynamics(
+    arm: Observation, base: BaseParameters, truth: np.ndarray, sines: Callable[[int, float], Motion]
+) -> None:
+    """The block of an earlier identification in place of recordings, its regrouped parameters left where CAD has them."""
+    motion = sines(1000, 100.0)
+    data = observe(arm, base, [recovery.driven(arm, motion, truth)], Decimation(1))
+    block = weighted_least_squares(data)
+    known = Observation(arm.model.with_estimate(block), CLASSIC)
+    fit = found(known, [recovery.driven(arm, motion, loaded(arm, truth))], [True], block)
+    assert values(fit) == pytest.approx(BODY, abs=1e-5)
+
+
+def test_the_columns_are_those_of_pinocchio(tx40: RobotModel, motion: Motion) -> None:
+    """Its inverse dynamics with the body on the flange's frame less those without, in a frame that is turned and shifted."""
+    turn = pin.rpy.rpyToMatrix(0.3, -0.5, 0.9)
+    model = held_by(tx40)
+    assert model.payload is not None
+    held = replace(model.payload, rotation=turn, translation=np.array([0.05, -0.02, 0.1]))
+    columns = torque_regressor(tx40, motion.q, motion.dq, motion.ddq)[:, :, LAST] @ in_link(held)
+    engine = pin.buildModelFromUrdf(str(tx40.urdf))
+    heavier = engine.copy()
+    body = pin.Inertia(BODY[0], BODY[1:4], moments_matrix(BODY[4:]))
+    last = heavier.njoints - 1
+    heavier.inertias[last] = heavier.inertias[last] + pin.SE3(turn, held.translation).act(body)
+    data = engine.createData(), heavier.createData()
+    for k in range(len(motion)):
+        state = motion.q[k], motion.dq[k], motion.ddq[k]
+        expected = pin.rnea(heavier, data[1], *state) - pin.rnea(engine, data[0], *state)
+        np.testing.assert_allclose(columns[k] @ of_frame(BODY), expected, atol=1e-10)
+
+
+def moments_matrix(moments: np.ndarray) -> np.ndarray:
+    result = np.zeros((3, 3))
+    result[np.triu_indices(3)] = moments
+    return result + np.triu(result, 1).T
+
+
+def test_a_plane_arm_tells_what_lies_in_its_plane(tmp_path: Path) -> None:
+    """Mass and centre of mass in the plane; the other coordinate and the inertia stay as declared, by name."""
+    robot = holding(two_links(tmp_path), "lower", 1.0, np.array([0.0, 0.07, 0.0]), np.zeros((3, 3)))
+    arm = Observation(robot, CLASSIC)
+    pair = [level(swing_of(arm, held, 7)) for held in (HELD, 0 * HELD)]
+    fit = found(arm, pair, [True, False])
+    hidden = {
+        n
+        for n, seen in zip(fit.estimate.parameters.names, fit.estimate.identifiable, strict=True)
+        if not seen
+    }
+    assert hidden == {f"payload.{k}" for k in ("com_y", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")}
+    assert fit.estimate.values["payload.com_y"] == 0.07
+    expected = HELD[:4] / HELD[0]
+    got = fit.estimate.values
+    assert got["payload.mass"] == pytest.approx(HELD[0], rel=1e-6)
+    assert [got["payload.com_x"], got["payload.com_z"]] == pytest.approx([expected[1], expected[3]], abs=1e-6)
+    assert fit.estimate.std("payload.com_y") is None and fit.estimate.std("payload.com_x") is not None
+
+
+def level(motion: Motion) -> Motion:
+    """The swings with torques that read what they are."""
+    return replace(motion, torque=motion.torque * GAINS)
+
+
+def test_nothing_held_is_refused(tmp_path: Path) -> None:
+    robot = holding(two_links(tmp_path), "lower", 1.0, np.zeros(3), np.zeros((3, 3)))
+    arm = Observation(robot, CLASSIC)
+    rng = np.random.default_rng(0)
+    clean = [level(swing_of(arm, 0 * HELD, seed)) for seed in (7, 8)]
+    pair = [replace(m, torque=m.torque + rng.normal(size=m.torque.shape)) for m in clean]
+    with pytest.raises(FlexcalError, match="the torques show no payload: its mass comes out at"):
+        found(arm, pair, [True, False])
+
+
+def scores(folder: Path, seeds: range) -> np.ndarray:
+    """Errors over half the intervals (seeds, 3) of mass and centre of mass in the plane, the noise coloured: an AR(1) of 0.8."""
+    robot = holding(two_links(folder), "lower", 1.0, np.zeros(3), np.zeros((3, 3)))
+    arm = Observation(robot, CLASSIC)
+    clean = [level(swing_of(arm, held, 7 + k)) for k, held in enumerate((HELD, 0 * HELD))]
+    truth = dict(
+        zip(("mass", "com_x", "com_z"), (HELD[0], HELD[1] / HELD[0], HELD[3] / HELD[0]), strict=True)
+    )
+    result = []
+    for seed in seeds:
+        rng = np.random.default_rng(seed)
+        noisy = []
+        for m in clean:
+            noise = rng.normal(size=m.torque.shape)
+            for k in range(1, len(noise)):
+                noise[k] += 0.8 * noise[k - 1]
+            noisy.append(replace(m, torque=m.torque + noise))
+        estimate = found(arm, noisy, [True, False]).estimate
+        row = []
+        for key, value in truth.items():
+            interval = estimate.interval(f"payload.{key}")
+            assert interval is not None
+            row.append(2 * (value - sum(interval) / 2) / (interval[1] - interval[0]))
+        result.append(row)
+    return np.array(result)
+
+
+def test_intervals_are_of_the_size_of_errors(tmp_path: Path) -> None:
+    """Coarsely, from eight runs; intervals for white noise would be three times too narrow here."""
+    missed = scores(tmp_path, range(8)) * 1.98
+    assert 0.5 < np.sqrt(np.mean(missed**2)) < 1.6
+
+
+@pytest.mark.slow
+def test_intervals_cover(tmp_path: Path) -> None:
+    missed = scores(tmp_path, range(200))
+    print(f"rms {np.sqrt(np.mean(missed**2, axis=0))}, inside {np.mean(np.abs(missed) < 1, axis=0)}")
+    assert 0.92 < np.mean(np.abs(missed) < 1) < 0.985
+
+
+def test_ten_numbers_become_a_body(rng: np.random.Generator) -> None:
+    """The nearest one in the norm of the covariance; numbers that are a body's stay."""
+    inside = of_frame(BODY)
+    root = np.diag(rng.uniform(0.5, 2.0, 10))
+    assert nearest_body(inside, root, np.zeros((10, 0))).rise == 0.0
+    outside = inside.copy()
+    outside[4] = -0.05
+    near = nearest_body(outside, root, np.zeros((10, 0)))
+    assert np.linalg.eigvalsh(np.tensordot(near.parameters, PSEUDO_INERTIA, 1))[0] > 0
+    away = np.linalg.solve(root, near.parameters - outside)
+    assert near.rise == pytest.approx(away @ away, rel=1e-2)
+    others = inside + 1e-3 * rng.normal(size=(200, 10))
+    bodies = [b for b in others if np.linalg.eigvalsh(np.tensordot(b, PSEUDO_INERTIA, 1))[0] > 0]
+    assert bodies and min(np.sum(np.linalg.solve(root, b - outside) ** 2) for b in bodies) >= 0.99 * near.rise
+
+
+def test_body_and_frame_are_each_others_reverse() -> None:
+    np.testing.assert_allclose(of_body(of_frame(BODY)), BODY, atol=1e-15)
+
+
+def test_moments_are_told_together() -> None:
+    narrow = np.full(6, 1e-3)
+    assert told_moments(BODY, narrow).all()
+    wide = narrow.copy()
+    wide[1] = 0.03
+    assert list(told_moments(BODY, wide)) == [True, False, True, True, True, True]
+    wide[0] = 0.05
+    assert not told_moments(BODY, wide).any()
+
+
+def calm(motion: Motion) -> Motion:
+    """A third of the motion, as heavy arms do it."""
+    return replace(motion, q=motion.q / 3, dq=motion.dq / 3, ddq=motion.ddq / 3)
+
+
+def test_the_yield_of_springs(tx90l: RobotModel, sines: Callable[[int, float], Motion]) -> None:
+    """None where they are stiff; else what exact derivatives give along a periodic motion, away from the ends of the recording."""
+    motion = calm(sines(1000, 100.0))
+    stiff = replace(tx90l, stiffness=1e7 * tx90l.stiffness)
+    assert np.abs(ArmYield.of(stiff, motion, ()).shift).max() < 1e-3
+    states = motion.q, motion.dq, motion.ddq
+    found = ArmYield.of(tx90l, motion, ())
+    omega = 2j * np.pi * 0.1 * np.arange(501)[:, None]
+
+    def derivatives(bent: np.ndarray) -> np.ndarray:
+        return np.array(
+            [np.fft.irfft(np.fft.rfft(bent, axis=0) * omega**order, axis=0) for order in range(3)]
+        )
+
+    exact, rigid = (
+        yielding_torque(robot, *states, derivatives, passes=n) for robot, n in ((tx90l, 3), (tx90l, 1))
+    )
+    exact -= rigid
+    inside = (found.time > 1.0) & (found.time < 9.0)
+    there = exact[np.searchsorted(motion.time, found.time[inside] - 1e-6)]
+    missed = np.linalg.norm(found.shift[inside] - there, axis=0)[:3]
+    assert np.all(missed < 0.05 * np.linalg.norm(there, axis=0)[:3])
+    assert np.abs(there).max() > 1.0
+
+
+def test_slopes_by_springs_and_geometry(tx90l: RobotModel, sines: Callable[[int, float], Motion]) -> None:
+    """A stiffer drive and a turned axis, as much as they change the torques."""
+    motion = calm(sines(500, 100.0))
+    sources = ("joint_2.drive.stiffness", "joint_3.offset")
+    found = ArmYield.of(tx90l, motion, sources)
+    stiffer = tx90l.with_values({sources[0]: 1.01 * tx90l.value(sources[0])})
+    change = ArmYield.of(stiffer, motion, ()).shift - found.shift
+    np.testing.assert_allclose(change, np.log(1.01) * found.slopes[:, :, 0], atol=0.02 * np.abs(change).max())
+    turned = tx90l.with_values({sources[1]: 1e-3}), tx90l
+    heavy = inertial_parameters(tx90l)
+    held = tx90l.payload
+    assert held is not None
+    heavy[LAST] += in_link(held) @ of_frame(np.concatenate([[held.mass], held.com, held.moments]))
+    torque = [torque_regressor(robot, motion.q, motion.dq, motion.ddq) @ heavy for robot in turned]
+    some = (torque[0] - torque[1])[np.searchsorted(motion.time, found.time - 1e-6)]
+    np.testing.assert_allclose(some, 1e-3 * found.slopes[:, :, 1], atol=0.05 * np.abs(some).max())
