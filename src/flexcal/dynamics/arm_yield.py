@@ -13,6 +13,7 @@ from flexcal.dynamics.drive_terms import Column, Memory
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.rows import Experiment
 from flexcal.model import RobotModel
+from flexcal.model.declared import uncertain_inertials
 from flexcal.model.names import GEOMETRY, SPRINGS
 from flexcal.model.periodic_torque import yielding_torque
 
@@ -32,17 +33,24 @@ _SMALL = 1e-3
 
 
 def error_sources(model: RobotModel) -> tuple[str, ...]:
-    """Stiffnesses and geometric errors of the joints, which torques depend on."""
+    """Geometric errors of the joints, and of an elastic robot stiffnesses and what weighs on them: masses and centres of mass of links."""
     springs = (f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components))
-    return (*springs, *(f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY))
+    weights = uncertain_inertials(model, range(model.n)) if model.elastic else ()
+    return (*springs, *weights, *(f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY))
+
+
+def error_column(source: str) -> str:
+    """Name of the column of a source of error; links have columns by the source's own name."""
+    return f"{source}.error"
 
 
 @dataclass(frozen=True, eq=False)
 class ArmYield:
-    """Columns of a drive term that holds for one recording: `arm_yield`, and one for every source of error by its name.
+    """Columns of a drive term that holds for one recording: `arm_yield`, and one for every source of error.
 
-    `shift` (T, n) N m is the torque of the yielding arm less that of the rigid one at the instants `time` (T,), `slopes` (T, n, s) the
-    derivative of the yielding arm's by the `sources`, in estimation coordinates.
+    `shift` (T, n) N m is the torque of the yielding arm less that of the rigid one at the instants `time` (T,). `slopes` (T, n, s) are the
+    derivatives by the `sources`, in estimation coordinates: by inertials those of the shift, for the columns of links have those of the
+    rigid arm, by others those of the torque.
     """
 
     time: np.ndarray
@@ -59,18 +67,25 @@ class ArmYield:
         states = motion.q, motion.dq, motion.ddq
         smoothed = _Smoothed(float(motion.time[1] - motion.time[0]))
 
+        def rigid(robot: RobotModel) -> np.ndarray:
+            return yielding_torque(robot, *states, np.zeros_like, payload, passes=1)
+
         def torque(robot: RobotModel) -> np.ndarray:
             return yielding_torque(robot, *states, smoothed, payload, _PASSES)
 
-        rigid = yielding_torque(model, *states, np.zeros_like, payload)
-        slopes = np.zeros((*rigid.shape, len(sources)))
+        def shift(robot: RobotModel) -> np.ndarray:
+            return torque(robot) - rigid(robot)
+
+        slopes = np.zeros((*motion.q.shape, len(sources)))
         for k, name in enumerate(sources):
-            value, log = model.value(name), name.endswith(".stiffness")
+            value, key = model.value(name), name.rpartition(".")[2]
+            changed = torque if key in ("stiffness", *GEOMETRY) else shift
+            log = key in ("stiffness", "mass")
             size = _STEP if log else _STEP * _SMALL
             ends = [value * np.exp(s * size) if log else value + s * size for s in (1, -1)]
-            above, below = (torque(model.with_values({name: end})) for end in ends)
+            above, below = (changed(model.with_values({name: end})) for end in ends)
             slopes[:, :, k] = (above - below) / (2 * size)
-        return cls(motion.time, torque(model) - rigid, slopes, tuple(sources))
+        return cls(motion.time, shift(model), slopes, tuple(sources))
 
     @cached_property
     def _curves(self) -> Any:
@@ -81,7 +96,7 @@ class ArmYield:
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         """For every joint the shift, then the slopes."""
         values = self._curves(np.clip(motion.time, self.time[0], self.time[-1]))
-        for k, name in enumerate((YIELD, *self.sources)):
+        for k, name in enumerate((YIELD, *map(error_column, self.sources))):
             for joint in range(model.n):
                 yield Column(name, joint, values[:, joint, k])
 

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.dynamics.arm_yield import YIELD
+from flexcal.dynamics.arm_yield import YIELD, error_column
 from flexcal.dynamics.experiment_system import Batch
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.robot_prior import FRICTION, RobotPrior
@@ -100,14 +100,15 @@ class PayloadEquations:
         first = self.prior.free.shape[1]
         known = slice(first, first + self.prior.base_root.shape[1])
         changes = {name: known.stop + number for number, name in enumerate(self._rubbing)}
+        errors = dict(zip(map(error_column, self.prior.sources), self.prior.source_root, strict=True))
         moved, link = in_link(self.held), len(INERTIAL) * self.held.joint
         result[-1, -1] = 1.0
         for row, number in zip(result, members, strict=False):
             name = names[number]
             if name == YIELD:
                 row[-1] = -1.0
-            elif name in self.prior.sources:
-                row[known] = self.prior.source_root[self.prior.sources.index(name)]
+            elif name in errors:
+                row[known] = errors[name]
             elif number in base:
                 row[:first] = self.prior.free[base[number]]
                 row[known] = self.prior.base_root[base[number]]

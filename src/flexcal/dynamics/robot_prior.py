@@ -51,14 +51,16 @@ class RobotPrior:
             if name.rpartition(".")[0] in links or name in observation.names
         ]
         dynamics = [name for name in owned if model.posterior.determines(name)] if found is not None else []
-        items = (*model.posterior.parameters.subset(dynamics), *(declared(model, name) for name in sources))
+        others = [name for name in sources if name not in dynamics]
+        items = (*model.posterior.parameters.subset(dynamics), *(declared(model, name) for name in others))
         covariance = model.posterior.prior(Parameters(items))[1]
         root = _root(covariance)
-        count = len(dynamics)
-        base_root = _jacobian(observation, base, owned, dynamics) @ root[:count]
+        base_root = _jacobian(observation, base, owned, dynamics) @ root[: len(dynamics)]
         free = np.eye(len(kept)) if found is None else _free(found, kept)
         values = base.found.regrouping @ observation.values()
-        return cls(values, base_root, free, sources, root[count:])
+        return cls(
+            values, base_root, free, sources, root[[(dynamics + others).index(name) for name in sources]]
+        )
 
 
 def _root(covariance: np.ndarray) -> np.ndarray:

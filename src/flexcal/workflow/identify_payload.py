@@ -38,7 +38,7 @@ from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.log_torques import require_joint_torques
 from flexcal.workflow.payload_remarks import payload_remarks
-from flexcal.workflow.recorded_logs import recorded_logs
+from flexcal.workflow.recorded_logs import RecordedLogs, recorded_with
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
@@ -113,9 +113,10 @@ def identify_robot_payload(
     fit the robot, says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and
     as `identify_payload` does; nothing is written then.
     """
-    logs, free = recorded_logs(logs), recorded_logs(free)
-    require_distinct([*logs, *free])
-    nominal = RobotModel.from_yaml(robot, estimates=False)
+    loaded, unloaded = RecordedLogs.of(logs), RecordedLogs.of(free)
+    every = [*loaded.files, *unloaded.files]
+    require_distinct(every)
+    nominal = recorded_with(RobotModel.from_yaml(robot, estimates=False), [*loaded.plans, *unloaded.plans])
     bare, frame = _held(nominal, frame)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="payload") if source.exists() else {}
@@ -124,28 +125,31 @@ def identify_robot_payload(
             f"{source} has no block 'dynamics', so the payload cannot be told from the robot; run 'flexcal identify dynamics {robot} "
             "LOGS…' on recordings without payload first, or give such recordings with --free."
         )
-    _require_news(free, blocks)
+    _require_news(unloaded.files, blocks)
     model = with_blocks(bare, blocks, source)
-    every = [*logs, *free]
+    if "dynamics" in blocks:
+        model = model.with_estimate(
+            blocks["dynamics"]
+        )  # later blocks keep no covariance of links with drives
     treatment = _slow(treatment_of(model, every), model, every)
     with TemporaryDirectory(prefix="flexcal_") as folder:
         read = read_logs(every, model, treatment, Path(folder), jobs=jobs)
-        loaded = [True] * len(logs) + [False] * len(free)
-        _require_payloads(read, loaded)
+        carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
+        _require_payloads(read, carries)
         require_joint_torques(read, model)
         for number in range(_PASSES if model.elastic else 1):
             progress("payload", number / _PASSES)
-            fit = _fit(model, read, loaded, blocks.get("dynamics"), treatment, jobs)
+            fit = _fit(model, read, carries, blocks.get("dynamics"), treatment, jobs)
             model = model.with_values(fit.estimate.values)
         progress("payload", 1.0)
     if fit.error > _SENSELESS:
         raise InputError(
-            f"{logs[0]}: the fit misses {100 * fit.error:.0f} % of the torques, so they are not those of this robot's joints in N m; check "
+            f"{every[0]}: the fit misses {100 * fit.error:.0f} % of the torques, so they are not those of this robot in N m; check "
             "robot.yaml, and signs, units and gear ratios under `signals:`."
         )
     origin = provenance(
         [robot, bare.urdf, *every],
-        {"loaded": len(logs), "free": len(free)},
+        {"loaded": len(loaded.files), "free": len(unloaded.files)},
         source if blocks else None,
         tuple(blocks),
     )

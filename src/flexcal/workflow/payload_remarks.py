@@ -25,14 +25,12 @@ def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block
             f"no body has what these torques ask for: the nearest one raises the sum of squares by {fit.rise:.3g}; check the drive "
             "gains, that the robot's own dynamics are of this robot, and the frame"
         )
-    interval = found.interval("payload.mass")
-    if declared.payload is not None and interval is not None:
-        mass = declared.payload.mass
-        if not interval[0] <= mass <= interval[1]:
-            yield f"robot.yaml declares {mass:g} kg; what was identified counts from now on"
+    low, high = found.interval("payload.mass") or (0.0, 0.0)
+    if declared.payload is not None and not low <= declared.payload.mass <= high:
+        yield f"robot.yaml declares {declared.payload.mass:g} kg; what was identified counts from now on"
     for name, block in blocks.items():
-        if "payload.mass" in block.parameters:
+        mass = block.values.get("payload.mass", low)
+        if not low <= mass <= high:
             yield (
-                f"the block '{name}' was found with a payload of {block.values['payload.mass']:.4g} kg; if the robot held this one then, "
-                "make that block again"
+                f"the block '{name}' was found with a payload of {mass:.4g} kg; if the robot held this one then, make that block again"
             )

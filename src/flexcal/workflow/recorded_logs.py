@@ -1,21 +1,46 @@
-"""The joint logs that a verb is given, as files or as the folder of a plan of trajectories."""
+"""The joint logs that a verb is given, as files or as folders of plans of trajectories."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from flexcal.data import TrajectoryPlan, labels, read_plan_of
 from flexcal.data.experiment_folder import PLAN, existing_file
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
 
 
-def recorded_logs(paths: Sequence[Path]) -> list[Path]:
-    """The files, and those of folders as 'measure' leaves them; raises `InputError` for a folder that holds no trajectories."""
-    found: list[Path] = []
-    for path in paths:
-        if path.is_dir():
-            plan = read_plan_of(path / PLAN, TrajectoryPlan)
-            found += [existing_file(path, label.name) for label in labels(plan)]
-        else:
-            found.append(path)
-    return found
+@dataclass(frozen=True)
+class RecordedLogs:
+    """Their `files`; of those in folders the `plans`, which say what a torque is over its sample."""
+
+    files: tuple[Path, ...]
+    plans: tuple[TrajectoryPlan, ...]
+
+    @classmethod
+    def of(cls, paths: Sequence[Path]) -> RecordedLogs:
+        """Files, and folders as 'measure' leaves them; raises `InputError` for a folder that holds no trajectories."""
+        files: list[Path] = []
+        plans: list[TrajectoryPlan] = []
+        for path in paths:
+            if path.is_dir():
+                plans.append(read_plan_of(path / PLAN, TrajectoryPlan))
+                files += [existing_file(path, label.name) for label in labels(plans[-1])]
+            else:
+                files.append(path)
+        return cls(tuple(files), tuple(plans))
+
+
+def recorded_with(model: RobotModel, plans: Sequence[TrajectoryPlan]) -> RobotModel:
+    """The robot, its `dynamics: tau:` as the plans have it; raises `InputError` where these differ."""
+    torques = sorted({plan.torque for plan in plans})
+    if len(torques) > 1:
+        raise InputError(
+            f"these folders have torques that are '{torques[0]}' and '{torques[1]}' over a sample; give recordings of one kind."
+        )
+    if not torques:
+        return model
+    dynamics = replace(model.config.dynamics, torque=torques[0])
+    return replace(model, config=replace(model.config, dynamics=dynamics))
