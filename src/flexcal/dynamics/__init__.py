@@ -1,7 +1,7 @@
 """Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
 
 from flexcal.dynamics.arm_side import ArmSide
-from flexcal.dynamics.arm_yield import ArmYield
+from flexcal.dynamics.arm_yield import ArmYield, error_sources
 from flexcal.dynamics.attenuation import attenuation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.column_errors import column_errors, noisy_logs
@@ -119,6 +119,7 @@ __all__ = [
     "direct_and_inverse",
     "drive_gains",
     "energy_least_squares",
+    "error_sources",
     "essential_parameters",
     "experiment_system",
     "feasible_least_squares",

@@ -17,6 +17,7 @@ from flexcal.dynamics.payload_body import (
 )
 from flexcal.dynamics.payload_equations import PayloadEquations
 from flexcal.dynamics.payload_noise import first_noise, residual_noise
+from flexcal.dynamics.regression import RegressionData
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
 from flexcal.estimation.student import student_quantile
@@ -35,12 +36,13 @@ class PayloadFit:
     """The `estimate` of `payload.mass` and so on.
 
     `rise` is by how much a body with these raises the sum of squares above its minimum; `error` the share of the torques' norm that is
-    missed.
+    missed, and `own_error` that which the base parameters miss that fit each joint and recording best (NaN where too short).
     """
 
     estimate: Estimate
     rise: float
     error: float
+    own_error: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,7 +105,13 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
     covariance[0] /= body[0]
     covariance[:, 0] /= body[0]
     estimate = _estimate(found, nearest.rise, body, covariance, told)
-    return PayloadFit(estimate, nearest.rise, found.error)
+    return PayloadFit(estimate, nearest.rise, found.error, _own_error(equations.data))
+
+
+def _own_error(data: RegressionData) -> float:
+    parts = zip(data.subsystems, data.noise(), strict=True)
+    left = sum(sigma**2 * (s.triangle.rows - rank) for s, (sigma, rank) in parts)
+    return float(np.sqrt(left / sum(np.sum(s.triangle.right**2) for s in data.subsystems)))
 
 
 def _body(held: Payload, mass: float) -> np.ndarray:

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.arm_yield import error_sources
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.observation import Observation
 from flexcal.estimation import Estimate, Parameters
@@ -34,15 +33,20 @@ class RobotPrior:
     source_root: np.ndarray
 
     @classmethod
-    def of(cls, observation: Observation, base: BaseParameters, found: Estimate | None) -> RobotPrior:
+    def of(
+        cls,
+        observation: Observation,
+        base: BaseParameters,
+        found: Estimate | None,
+        sources: tuple[str, ...] = (),
+    ) -> RobotPrior:
         """From the posterior of the observed model, in which `found` is the block `dynamics`; without it the base parameters are free.
 
         A base parameter that the recordings of `found` hid is free, with those that took its place; so is friction that was found beside
-        terms which are not the classic ones of `observation`, and a drive's parameter that was not found at all. Springs and geometry are
-        as the posterior knows them, else as uncertain as declared.
+        terms which are not the classic ones of `observation`, and a drive's parameter that was not found at all. The `sources` of error
+        are as the posterior knows them, else as uncertain as declared.
         """
         model = observation.model
-        sources = error_sources(model)
         links = {joint.link for joint in model.joints}
         kept = base.found.kept_names
         owned = [

@@ -24,6 +24,7 @@ from flexcal.dynamics import (
     RobotPrior,
     Window,
     batches_each,
+    error_sources,
     identify_payload,
     log_blocks,
 )
@@ -43,8 +44,8 @@ from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
 
-_PASSES = 3
-"""Fits of an elastic robot, each with the springs loaded by the payload of the one before."""
+_ROUGH = 2
+"""Fits of an elastic robot before the last one, each with the springs loaded by the payload of the one before."""
 _ROWS_HZ = 6.0
 """Rows a second of an elastic robot, at most: its springs yield as `ArmYield` has it only well below the first resonance."""
 _SENSELESS = 0.5
@@ -114,6 +115,7 @@ def identify_robot_payload(
     as `identify_payload` does; nothing is written then.
     """
     loaded, unloaded = RecordedLogs.of(logs), RecordedLogs.of(free)
+    _require_plans(loaded, unloaded)
     every = [*loaded.files, *unloaded.files]
     require_distinct(every)
     nominal = recorded_with(RobotModel.from_yaml(robot, estimates=False), [*loaded.plans, *unloaded.plans])
@@ -137,10 +139,14 @@ def identify_robot_payload(
         carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
         _require_payloads(read, carries)
         require_joint_torques(read, model)
-        for number in range(_PASSES if model.elastic else 1):
-            progress("payload", number / _PASSES)
-            fit = _fit(model, read, carries, blocks.get("dynamics"), treatment, jobs)
-            model = model.with_values(fit.estimate.values)
+        known = blocks.get("dynamics")
+        for number in range(_ROUGH if model.elastic else 0):
+            progress("payload", number / (_ROUGH + 1))
+            rough = _fit(model, read, carries, known, (), treatment)
+            model = model.with_values(rough.estimate.values)
+        progress("payload", _ROUGH / (_ROUGH + 1))
+        fit = _fit(model, read, carries, known, error_sources(model), treatment)
+        model = model.with_values(fit.estimate.values)
         progress("payload", 1.0)
     if fit.error > _SENSELESS:
         raise InputError(
@@ -198,6 +204,16 @@ def _require_news(free: Sequence[Path], blocks: Mapping[Block, Estimate]) -> Non
             )
 
 
+def _require_plans(loaded: RecordedLogs, free: RecordedLogs) -> None:
+    """Raises `InputError` for trajectories that were planned otherwise than they are given here."""
+    if any(plan.payload == 0 for plan in loaded.plans):
+        raise InputError(
+            "a folder among LOGS was planned without the payload; give it with --free, or design it with --loaded."
+        )
+    if any(plan.payload != 0 for plan in free.plans):
+        raise InputError("a folder under --free was planned with the payload; give it among LOGS.")
+
+
 def _require_payloads(logs: Sequence[JointLog], loaded: Sequence[bool]) -> None:
     for log, held in zip(logs, loaded, strict=True):
         if held and log.payload == 0:
@@ -215,16 +231,16 @@ def _fit(
     logs: Sequence[JointLog],
     loaded: Sequence[bool],
     dynamics: Estimate | None,
+    sources: tuple[str, ...],
     treatment: Treatment,
-    jobs: int,
 ) -> PayloadFit:
     """With springs that yield under the payload of the `model`."""
     plain = Observation(model, CLASSIC)
     base = BaseParameters.of(plain)
-    prior = RobotPrior.of(plain, base, dynamics)
+    prior = RobotPrior.of(plain, base, dynamics, sources)
     systems, wide = [], plain
     for log, held in zip(logs, loaded, strict=True):
-        wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, prior.sources, None if held else 0.0)))
+        wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, sources, None if held else 0.0)))
         systems += log_systems(
             [LogPart(log, Window())],
             wide,

@@ -11,6 +11,8 @@ from flexcal.model import RobotModel
 
 _BODILESS = 29.6
 """Sum of ten squared normal errors that one in a thousand exceeds."""
+_UNLIKE = 3.0
+"""Times what must be missed of the torques that is too much."""
 
 
 def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block, Estimate]) -> Iterator[str]:
@@ -24,6 +26,11 @@ def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block
         yield (
             f"no body has what these torques ask for: the nearest one raises the sum of squares by {fit.rise:.3g}; check the drive "
             "gains, that the robot's own dynamics are of this robot, and the frame"
+        )
+    if fit.error > _UNLIKE * fit.own_error:
+        yield (
+            f"the robot's own dynamics do not fit these recordings: {100 * fit.error:.2g} % of the torques are missed, where another robot "
+            f"of these links would miss {100 * fit.own_error:.2g} %; identify them again, or give --free recordings"
         )
     low, high = found.interval("payload.mass") or (0.0, 0.0)
     if declared.payload is not None and not low <= declared.payload.mass <= high:
