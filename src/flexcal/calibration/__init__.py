@@ -1,30 +1,42 @@
 """Stage 2: geometry from measured points, with the elastic deflection taken into account, and its verification."""
 
+from flexcal.calibration.accuracy_map import AccuracyMap, accuracy_map, random_poses_in
 from flexcal.calibration.calibrate import Calibration, calibrate
 from flexcal.calibration.drift import Drift
 from flexcal.calibration.elastic_prior import ElasticPrior
+from flexcal.calibration.error_scale import ErrorScale, error_scale
+from flexcal.calibration.error_sources import error_sources
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.plausibility import Moved, moved_far
 from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.propagation import Propagation, propagation
 from flexcal.calibration.registration import register, rigid_motion
 from flexcal.calibration.term_selection import TermSelection, select_terms
 from flexcal.calibration.terms import geometric_parameters
 from flexcal.calibration.verification import Verification, verify
 
 __all__ = [
+    "AccuracyMap",
     "Calibration",
     "Drift",
     "ElasticPrior",
+    "ErrorScale",
     "ErrorStatistics",
     "Moved",
     "Prediction",
+    "Propagation",
     "TermSelection",
     "Verification",
+    "accuracy_map",
     "calibrate",
+    "error_scale",
+    "error_sources",
     "geometric_parameters",
     "moved_far",
     "predict",
+    "propagation",
+    "random_poses_in",
     "register",
     "require_points",
     "rigid_motion",

@@ -77,7 +77,7 @@ class Prediction:
             return own * np.eye(3)["xyz".index(key)]
         values = [self.model.value(f"station.{station}.{k}") for k in STATION]
         arm = self.position - np.array(values[:3])
-        return own * np.cross(_left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])], arm)
+        return own * np.cross(left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])], arm)
 
     def load(self, name: str) -> np.ndarray:
         """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""
@@ -109,7 +109,7 @@ class Prediction:
         raise FlexcalError(f"the position of a point does not depend on '{name}'.")
 
 
-def _left_jacobian(vector: np.ndarray) -> np.ndarray:
+def left_jacobian(vector: np.ndarray) -> np.ndarray:
     """How a rotation turns (3, 3), in fixed axes, as its rotation vector (3,) changes."""
     angle = float(np.linalg.norm(vector))
     skew = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])

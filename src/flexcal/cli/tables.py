@@ -20,6 +20,18 @@ def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     return table
 
 
+def map_table(document: Mapping[str, Any]) -> Table:
+    """Predicted mean and 95 % of the tool's error: median, nine of ten and worst over the poses, mm."""
+    table = Table(title="predicted error of the tool", title_justify="left")
+    table.add_column("")
+    for heading in ("median mm", "9 of 10 mm", "worst mm"):
+        table.add_column(heading, justify="right")
+    for label, key in (("mean", "mean"), ("95 % within", "p95")):
+        numbers = document["predicted"][key].values()
+        table.add_row(label, *(_millimetres(value) for value in numbers))
+    return table
+
+
 def predicted_table(std: Mapping[str, float]) -> Table:
     """One row a spring: predicted standard deviations of stiffness and damping, relative, by parameter name."""
     table = Table(title="predicted standard deviation", title_justify="left")

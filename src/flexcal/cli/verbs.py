@@ -199,6 +199,14 @@ STEPS = (
                 ("results.json", "points.csv", "arm.npz", "report.html"),
             ),
             Verb(
+                ("map",),
+                "map",
+                "Map",
+                "how accurate the tool should be all over where the robot works, and why not more",
+                "flexcal map robot.yaml --verification others.csv --out map.html",
+                page=True,
+            ),
+            Verb(
                 ("compensate",),
                 "compensate",
                 "Compensate",
@@ -355,6 +363,7 @@ _ALSO_CALLED = {
     "damping": "identify stiffness",
     "correct": "compensate",
     "apply": "compensate",
+    "accuracy": "map",
 }
 
 

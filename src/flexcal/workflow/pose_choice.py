@@ -75,7 +75,7 @@ def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> W
             return None
         return working_box(checker, np.array(declared.lower), np.array(declared.upper), rng)
     if ":" in given:
-        corners = _corners(given)
+        corners = box_corners(given)
         return working_box(checker, corners[0], corners[1], rng)
     q, points = read_working(Path(given), model)
     if points is not None:
@@ -84,8 +84,8 @@ def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> W
     return WorkingVolume(q, point_kinematics(model, q, jacobians=False).position)
 
 
-def _corners(text: str) -> np.ndarray:
-    """Corners (2, 3) of "x:X,y:Y,z:Z"."""
+def box_corners(text: str) -> np.ndarray:
+    """Corners (2, 3) of "x:X,y:Y,z:Z"; raises `InputError` for other text."""
     try:
         ranges = [[float(end) for end in part.split(":")] for part in text.split(",")]
         corners = np.array(ranges).T

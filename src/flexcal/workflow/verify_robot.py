@@ -17,7 +17,7 @@ from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
-from flexcal.workflow.calibrated_robot import calibrated_robot
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.pose_remarks import unused_columns
@@ -102,20 +102,12 @@ def verify_robot(
     arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no
     calibration pose was measured, or a file does not fit.
     """
-    require_distinct(files)
     calibrated = calibrated_robot(robot, estimates, "verify")
     model, bare, blocks = calibrated.model, calibrated.nominal, calibrated.blocks
-    poses = read_poses(list(files), model, require_motion=False)
-    require_points(poses, " and ".join(str(file) for file in files))
-    for station in poses.stations:
-        if f"station.{station}.x" not in model.posterior.parameters:
-            raise FlexcalError(
-                f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
-            )
-    before = nominal_errors(bare, poses) if _registrable(poses) else None
-    known = blocks["calibration"].provenance.values()
-    fitted = tuple(file.name for file in files if sha256_of(file) in known)
+    poses = verification_poses(calibrated, files)
+    before = nominal_errors(bare, poses) if registrable(poses) else None
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
+    fitted = fitted_files(calibrated, files)
     result = RobotVerification(model, poses, verify(model, poses), before, fitted, origin, command)
     if out is not None:
         write_results(out, result.document())
@@ -125,12 +117,32 @@ def verify_robot(
     return result
 
 
+def verification_poses(calibrated: CalibratedRobot, files: Sequence[Path]) -> PoseSet:
+    """Measured points of the `files`, from stations that the calibration found; raises `FlexcalError` where they are not that."""
+    require_distinct(files)
+    model = calibrated.model
+    poses = read_poses(list(files), model, require_motion=False)
+    require_points(poses, " and ".join(str(file) for file in files))
+    for station in poses.stations:
+        if f"station.{station}.x" not in model.posterior.parameters:
+            raise FlexcalError(
+                f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
+            )
+    return poses
+
+
+def fitted_files(calibrated: CalibratedRobot, files: Sequence[Path]) -> tuple[str, ...]:
+    """Names of the `files` that the calibration was made from."""
+    known = calibrated.blocks["calibration"].provenance.values()
+    return tuple(file.name for file in files if sha256_of(file) in known)
+
+
 def _rms(distance: np.ndarray) -> float:
     """Root mean square (mm) of distances (N,) in m."""
     return float(np.sqrt(np.mean(distance**2))) / MILLIMETRE
 
 
-def _registrable(poses: PoseSet) -> bool:
+def registrable(poses: PoseSet) -> bool:
     """Whether every station has the four points off a line that a registration with something left to say needs."""
     for station in poses.stations:
         points = poses.position[poses.station == station]

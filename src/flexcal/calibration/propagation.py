@@ -1,0 +1,168 @@
+"""What the uncertainty of the estimated parameters does to a point, for many poses at once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.prediction import left_jacobian
+from flexcal.errors import FlexcalError
+from flexcal.model import Equilibrium, RobotModel, carried_mass, point_kinematics, static_equilibrium
+from flexcal.model.equilibrium import elastic_axes
+from flexcal.model.names import GEOMETRY, SPRINGS, STATION
+from flexcal.model.rotations import vector_rotation
+
+_GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance")
+
+
+def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
+    """The names in the robot's posterior that move a point at rest; without `elastic` those that move one of the rigid arm."""
+    names = model.posterior.parameters.names
+    return [n for n in names if _is_geometric(n) or (elastic and _is_elastic(n))]
+
+
+def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
+    """R (p, p) with R Rᵀ the covariance of the named parameters in natural units."""
+    values, vectors = np.linalg.eigh(model.posterior.marginal(names))
+    parameters = model.posterior.parameters.subset(names)
+    slopes = parameters.natural_slope(parameters.coordinates())
+    return slopes[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """A root of the parameters' covariance, sorted by how its rows reach the point `target` under `payload` kg.
+
+    `rows` (6 n + 6 + d + 4 n + T + 6, p): by geometric errors of joints and tool, by the stiffness of each of the d elastic coordinates, by
+    mass and first moment of each link, by the T `twisting` parameters (joint and kind), by the place of the `station`; natural units.
+    """
+
+    model: RobotModel
+    target: str
+    payload: float
+    station: str
+    twisting: tuple[tuple[int, str], ...]
+    rows: np.ndarray
+
+    def roots(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (N, 3) m at `q` (N, n), and roots A (N, 3, p) m: A Aᵀ is the covariance of what an instrument at the station finds wrong.
+
+        Both in the base frame. Derivatives are taken with every backlash in its middle: they differ by the gap, some 1e-4 of them.
+        """
+        model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
+        middle = np.zeros((len(q), model.n))
+        rest = static_equilibrium(model, q, self.payload, flank=middle, sensitivities=True)
+        at = point_kinematics(model, q, rest.deflection, point=self.target)
+        by_motion = at.motion_jacobian[:, :3]
+        by_load = -np.matmul(by_motion[:, :, axes[:, 0], axes[:, 1]], rest.compliance)
+        by_geometry = at.geometry_jacobian[:, :3]
+        by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, rest.coupling)
+        stretch = rest.deflection[:, axes[:, 0], axes[:, 1]]
+        drives = np.flatnonzero(axes[:, 1] == 2)
+        stretch[:, drives] = -rest.torque[:, axes[drives, 0]] / model.stiffness[axes[drives, 0], 2]
+        twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, rest)[:, None]
+        columns = (
+            by_geometry,
+            by_load * stretch[:, None],
+            np.matmul(by_load, rest.regressor),
+            twists,
+            self._by_station(at.position),
+        )
+        stacked = np.concatenate(columns, axis=2)
+        roots = stacked.reshape(-1, stacked.shape[2]) @ self.rows
+        return at.position, roots.reshape(len(q), 3, -1)
+
+    def _twist(self, q: np.ndarray, rest: Equilibrium) -> np.ndarray:
+        """How far joints turn (N, T) with the twisting parameters."""
+        columns = np.empty((len(q), len(self.twisting)))
+        for k, (joint, kind) in enumerate(self.twisting):
+            if kind == "backlash":
+                columns[:, k] = -np.sign(rest.torque[:, joint])
+            elif kind == "gravity_compliance":
+                columns[:, k] = -rest.torque[:, joint]
+            else:
+                order, wave = kind.split("_")[1:]
+                columns[:, k] = (np.sin if wave == "sin" else np.cos)(int(order) * q[:, joint])
+        return columns
+
+    def _by_station(self, position: np.ndarray) -> np.ndarray:
+        """∂(point seen from the station, turned into the base frame)/∂(x, y, z, rx, ry, rz of the station), (N, 3, 6)."""
+        place = self.model.station[self.model.station_index(self.station)]
+        turn = vector_rotation(place[3:])
+        axes = turn.T @ left_jacobian(place[3:])
+        result = np.empty((len(position), 3, 6))
+        result[:, :, :3] = turn.T
+        result[:, :, 3:] = np.cross(axes.T[None], position[:, None]).swapaxes(1, 2)
+        return result
+
+
+def propagation(
+    model: RobotModel, *, target: str | None = None, station: str | None = None, payload: float | None = None
+) -> Propagation:
+    """How the posterior of `model` reaches a target (default: the first), seen from a station (default: the first), under a payload.
+
+    `payload` in kg as `carried_mass` takes it, None for the declared one. Raises `FlexcalError` for unknown names, a payload without a
+    declaration, and a robot of which nothing was estimated that moves a point.
+    """
+    name = model.point(target).name
+    names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
+    if not names:
+        raise FlexcalError(f"nothing was estimated of {model.name} that moves a point; calibrate it first.")
+    mass = float(carried_mass(model, None if payload is None else np.array([payload]), 1)[0])
+    place = model.stations[0] if station is None else station
+    root = covariance_root(model, names)
+    n, axes = model.n, elastic_axes(model)
+    owners = [*model.joint_names, "tool"]
+    links = [joint.link for joint in model.joints]
+    twisting = [_twisting(model, item) for item in names]
+    twists = [item for item in twisting if item is not None]
+    first_twist = 6 * n + 6 + len(axes) + 4 * n
+    rows = np.zeros((first_twist + len(twists) + 6, len(names)))
+    for item, row in zip(names, root, strict=True):
+        owner, _, key = item.rpartition(".")
+        body = 6 * n + 6 + len(axes)
+        if owner == f"station.{place}":
+            rows[first_twist + len(twists) + STATION.index(key)] += row
+        elif owner == f"point.{name}":
+            rows[6 * n + 3 + "xyz".index(key)] += row
+        elif owner in owners and key in GEOMETRY:
+            if owner != "tool" or not key.startswith("length") or name == next(iter(model.points)):
+                rows[6 * owners.index(owner) + GEOMETRY.index(key)] += row
+        elif (twist := _twisting(model, item)) is not None:
+            rows[first_twist + twists.index(twist)] += row
+        elif key == "stiffness":
+            joint, _, spring = owner.rpartition(".")
+            rows[6 * n + 6 + axes.index((model.joint_index(joint), SPRINGS.index(spring)))] += row
+        elif owner == "payload":
+            held = model.payload
+            assert held is not None
+            own = body + 4 * held.joint
+            share = mass / held.mass if held.mass > 0 else 1.0
+            moments = share * np.array([1.0, *held.com_in_link]) if key == "mass" else np.zeros(4)
+            if key != "mass":
+                moments[1:] = mass * held.rotation[:, "xyz".index(key[-1])]
+            rows[own : own + 4] += np.outer(moments, row)
+        elif owner in links:
+            i = links.index(owner)
+            moments = np.array([1.0, *model.com[i]]) if key == "mass" else np.zeros(4)
+            if key != "mass":
+                moments[1 + "xyz".index(key[-1])] = model.mass[i]
+            rows[body + 4 * i : body + 4 * i + 4] += np.outer(moments, row)
+    return Propagation(model, name, mass, place, tuple(twists), rows)
+
+
+def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
+    owner, _, key = name.rpartition(".")
+    if key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
+        return model.joint_index(owner), key
+    return None
+
+
+def _is_elastic(name: str) -> bool:
+    return name.endswith((".stiffness", ".mass", ".com_x", ".com_y", ".com_z"))
+
+
+def _is_geometric(name: str) -> bool:
+    key = name.rpartition(".")[2]
+    return key in _GEOMETRIC or key.startswith("transmission_")

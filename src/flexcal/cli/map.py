@@ -1,0 +1,96 @@
+"""`flexcal map`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_robot
+
+
+@dataclass(frozen=True)
+class Map:
+    """Predict how accurate the tool is all over where the robot works: mean and 95 % of its error, from the calibration's uncertainty.
+
+    The poses are random ones that put the target into the volume, in whatever orientation comes, or those of a file. With --verification,
+    measured poses that the calibration never saw say whether the prediction can be believed, and make it larger where it cannot. The page
+    shows where errors are large, and what they come from.
+    """
+
+    robot: Robot
+    out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("map.html")
+    """The page (.html), or a table of the poses (.csv, .parquet) with the page beside it."""
+    working: Annotated[
+        str | None,
+        arg(metavar="BOX|FILE", help_behavior_hint="(default: as robot.yaml declares, else anywhere)"),
+    ] = None
+    """Ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a file of points x, y, z, or of pose, q1, q2 and so on."""
+    verification: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
+    """Measured poses that the calibration never saw."""
+    count: Annotated[int, arg(metavar="N")] = 20_000
+    """Number of random poses; those of a file all count."""
+    payload: Annotated[
+        float | None, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+    ] = None
+    """Payload held, kg."""
+    estimates: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
+    ] = None
+    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Of the random poses."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Map, and print how accurate the tool is, where it is worst, and why."""
+        from flexcal.cli.tables import map_table
+        from flexcal.workflow.map_accuracy import map_accuracy
+
+        require_robot(self.robot)
+        require_at_least(1, count=self.count)
+        require_at_least(0, seed=self.seed, payload=self.payload)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = map_accuracy(
+                self.robot,
+                self.out,
+                working=self.working,
+                count=self.count,
+                verification=self.verification,
+                payload=self.payload,
+                estimates=self.estimates,
+                seed=self.seed,
+                progress=progress,
+            )
+        document = found.document()
+        console.show(map_table(document))
+        sources = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in document["sources"].items())
+        console.say(f"its variance would fall, were these known exactly: {sources}")
+        worst = document["worst"][0]
+        place = ", ".join(f"{value:.3f}" for value in worst["position_m"])
+        console.say(f"worst at {place} m (base frame): 95 % within {worst['p95_mm']:.3f} mm")
+        if (check := document["verification"]) is not None:
+            console.say(
+                f"errors at {check['poses']} poses are {check['factor']:.2f} ({check['low']:.2f} to {check['high']:.2f}) times "
+                f"the predicted size, {100 * check['inside_95_percent']:.0f} % within the bound for 95 %: {_VERDICTS[check['verdict']]}"
+            )
+        for remark in document["remarks"]:
+            console.say(remark)
+        pages = dict.fromkeys([self.out, self.out.with_suffix(".html")])
+        console.say(f"wrote {' and '.join(str(path) for path in pages)}: {document['poses']} poses")
+        where = "" if self.estimates is None else f" --estimates {self.estimates}"
+        console.finish(
+            document,
+            f"flexcal compensate {self.robot} TARGETS.csv{where}, for the commands that make the tool so accurate",
+        )
+
+
+_VERDICTS = {
+    "right": "the prediction holds",
+    "optimistic": "it was too optimistic, and the map is larger by this factor",
+    "cautious": "it is cautious, and the map was left as it is",
+}

@@ -1,0 +1,246 @@
+"""The page of an accuracy map (`flexcal map`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration import AccuracyMap, ErrorScale, Verification
+from flexcal.model import RobotModel
+from flexcal.report.figures.accuracy_space import SHOWN, accuracy_space
+from flexcal.report.figures.accuracy_views import accuracy_views
+from flexcal.report.figures.error_sources import error_sources_figure
+from flexcal.report.figures.predicted_quantiles import predicted_quantiles
+from flexcal.report.notation import millimetres, scaled, significant
+from flexcal.report.page import (
+    Block,
+    Check,
+    Fact,
+    FigureBlock,
+    Page,
+    Section,
+    Table,
+    Text,
+    Verdict,
+    worst,
+)
+from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
+from flexcal.units import MILLIMETRE
+
+_FEW = 20
+
+
+@dataclass(frozen=True, eq=False)
+class MapStudy:
+    """A map, its `box` (2, 3) m where there is one, `results` as the verb prints them; what a verification says, and that verification
+    with the 1σ (N, 3) m of its noise, None where its files state none."""
+
+    model: RobotModel
+    map: AccuracyMap
+    box: np.ndarray | None
+    results: Mapping[str, Any]
+    scale: ErrorScale | None = None
+    verification: tuple[Verification, np.ndarray | None] | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_map_page(path: Path, study: MapStudy) -> None:
+    """Write the page of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, map_page(study))
+
+
+def map_page(study: MapStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    p95, mean = results["predicted"]["p95"], results["predicted"]["mean"]
+    checks = _checks(study)
+    leading = max(results["sources"], key=results["sources"].__getitem__)
+    verdict = Verdict(
+        worst(checks),
+        f"The tool is within {_mm(p95['p90_mm'])} mm",
+        f"At nine of ten of {results['poses']} poses, {_where(study)}, the point '{results['target']}' is within "
+        f"{_mm(p95['p90_mm'])} mm of where the calibrated model says, in 95 of 100 cases; at the worst within {_mm(p95['worst_mm'])} mm.",
+        (
+            Fact("How far off is it on average?", _mm(mean["median_mm"]), "mm", "Mean error, at the median pose."),
+            Fact("How far off at most?", _mm(p95["worst_mm"]), "mm", "95 % stay below this at the worst pose."),
+            Fact("What does it come from?", _percent(results["sources"][leading]), "%", f"of the variance would go, were {leading} known."),
+        ),
+        (),
+        "",
+        checks,
+    )  # fmt: skip
+    sections = [_numbers(study), _space(study), _sources(study)]
+    if study.verification is not None:
+        sections.append(_observed(study))
+    sections.append(provenance_section("", None, {}, study.provenance))
+    return Page(
+        title=f"{study.model.name}: accuracy map",
+        subtitle=f"Predicted error of the tool with {significant(results['payload_kg'], 3)} kg of payload",
+        verdict=verdict,
+        sections=sections,
+        document=results,
+    )
+
+
+def _where(study: MapStudy) -> str:
+    if study.box is not None:
+        low, high = study.box
+        ranges = ", ".join(f"{n} {a:g} to {b:g}" for n, a, b in zip("xyz", low, high, strict=True))
+        return f"random ones with the point in the working volume ({ranges} m, base frame)"
+    return "those given or random ones all over the joint ranges"
+
+
+def _checks(study: MapStudy) -> tuple[Check, ...]:
+    scale = study.scale
+    question = "Can the prediction be believed?"
+    if scale is None:
+        answer = "Not known: nothing was verified. Measure poses that the calibration never saw and give them with --verification."
+        return (Check(question, answer, "care"),)
+    said = (
+        f"Errors at {len(scale.probability)} measured poses are {scale.factor:.2f} times the predicted size (95 % interval {scale.low:.2f} "
+        f"to {scale.high:.2f}), and {100 * scale.inside:.0f} % of them lie within the bound for 95 %."
+    )
+    said = {
+        "right": f"Yes. {said}",
+        "optimistic": f"No, it was too optimistic. {said} All numbers here are multiplied by {scale.factor:.2f}.",
+        "cautious": f"It is cautious. {said} The numbers here were left as they are.",
+    }[scale.verdict]
+    checks = [Check(question, said, "care" if scale.verdict == "optimistic" else "good")]
+    if not scale.noise_known:
+        checks.append(
+            Check(
+                "Is the instrument's noise known?",
+                "No: the files state no sigma, so it counts as the robot's.",
+                "care",
+            )
+        )
+    if len(scale.probability) < _FEW:
+        checks.append(
+            Check(
+                "Were enough poses verified?",
+                f"{len(scale.probability)} are few; measure {_FEW} or more.",
+                "care",
+            )
+        )
+    return tuple(checks)
+
+
+def _numbers(study: MapStudy) -> Section:
+    results = study.results
+    rows = tuple(
+        (label, *(_mm(results["predicted"][key][column]) for column in ("median_mm", "p90_mm", "worst_mm")))
+        for label, key in (("mean error", "mean"), ("95 % of errors are below", "p95"))
+    )
+    places = []
+    for item in results["worst"]:
+        leading = max(item["sources"], key=item["sources"].__getitem__)
+        place = ", ".join(f"{value:.3f}" for value in item["position_m"])
+        places.append(
+            (place, _mm(item["mean_mm"]), _mm(item["p95_mm"]), leading, _joints(study.model, item["q"]))
+        )
+    blocks: list[Block] = [
+        Table(
+            "table-errors", "Predicted error / mm", ("", "median pose", "9 of 10 poses", "worst pose"), rows
+        ),
+        Table(
+            "table-worst",
+            "Where it is worst",
+            ("x, y, z / m", "mean / mm", "95 % / mm", "mostly from", "joint positions"),
+            tuple(places),
+            text_columns=(3, 4),
+            note="In the robot's base frame; places that are apart from each other.",
+        ),
+        Text(
+            (
+                "The error is the distance between where the calibrated model has the point and where an instrument at the station "
+                f"'{results['station']}' would find it, without the instrument's own noise. It comes from the covariance of all that was "
+                "estimated; what the model does not know, such as wear or warm-up, is not in it.",
+            )
+        ),
+    ]
+    return Section("numbers", "How accurate", "", tuple(blocks))
+
+
+def _space(study: MapStudy) -> Section:
+    found = study.map
+    drawn = min(len(found.q), SHOWN)
+    blocks: tuple[Block, ...] = (
+        FigureBlock(
+            "figure-views",
+            "Three views of the volume",
+            accuracy_views(found),
+            "Colour: the distance that 95 % of errors stay below, averaged over all poses behind a cell.",
+            "Predicted error in three views of the volume.",
+        ),
+        FigureBlock(
+            "figure-space",
+            "In three dimensions",
+            accuracy_space(found),
+            f"{drawn} of {len(found.q)} poses, each in its own orientation of the tool. Drag to turn.",
+            f"Predicted error of {drawn} poses in space.",
+        ),
+    )
+    return Section("space", "Where", "", blocks)
+
+
+def _sources(study: MapStudy) -> Section:
+    results = study.results
+    block = FigureBlock(
+        "figure-sources",
+        "What the error comes from",
+        error_sources_figure(results["sources"], results["worst"][0]["sources"]),
+        "By how much of itself the variance of the error would fall if all parameters of a kind were known exactly. Kinds that are "
+        "correlated share, so the bars need not add up to 100 %. To bring the longest bar down, measure more poses, or better ones: "
+        "flexcal design poses.",
+        "Shares of the variance by kind of parameter.",
+    )
+    return Section("sources", "Why", "", (block,))
+
+
+def _observed(study: MapStudy) -> Section:
+    assert study.verification is not None and study.scale is not None
+    found, noise = study.verification
+    scale = study.scale
+    rows = (
+        ("observed over predicted size", f"{scale.factor:.2f}"),
+        ("95 % interval", f"{scale.low:.2f} to {scale.high:.2f}"),
+        ("independent numbers in it", f"{scale.freedom:.0f}"),
+        ("poses within the bound for 95 %", f"{100 * scale.inside:.0f} %"),
+        ("poses within the bound for 50 %", f"{100 * float((scale.probability <= 0.5).mean()):.0f} %"),
+    )
+    blocks: tuple[Block, ...] = (
+        Table("table-scale", "Observed against predicted errors", ("", ""), rows),
+        FigureBlock(
+            "figure-predicted",
+            "Predicted against observed errors",
+            predicted_quantiles(found, noise),
+            "Sorted errors at the verification poses against the quantiles that the covariance of the parameters and the instrument's "
+            "noise predict. Points on the dashed line: the prediction was right. Above it: the robot is worse than promised.",
+            "Sorted observed errors against predicted quantiles.",
+        ),
+    )
+    return Section("observed", "Is it so?", "", blocks)
+
+
+def _joints(model: RobotModel, q: np.ndarray) -> str:
+    texts = []
+    for joint, value in zip(model.joints, q, strict=True):
+        if joint.kind == "revolute":
+            texts.append(f"{np.degrees(value):.0f}°")
+        else:
+            factor, unit = scaled("m")
+            texts.append(f"{factor * value:.0f} {unit}")
+    return ", ".join(texts)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f}"
+
+
+def _mm(value: float) -> str:
+    return millimetres(value * MILLIMETRE)

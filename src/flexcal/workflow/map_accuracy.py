@@ -1,0 +1,221 @@
+"""How accurate the calibrated robot should be where it works."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration import (
+    AccuracyMap,
+    ErrorScale,
+    Propagation,
+    Verification,
+    accuracy_map,
+    error_scale,
+    error_sources,
+    propagation,
+    random_poses_in,
+    verify,
+)
+from flexcal.data import provenance
+from flexcal.data.table import write_table
+from flexcal.design import CollisionChecker
+from flexcal.errors import InputError
+from flexcal.progress import Progress, silent
+from flexcal.report.accuracy_map import MapStudy, write_map_page
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.pose_choice import box_corners, working_volume
+from flexcal.workflow.verify_robot import fitted_files, verification_poses
+
+PAGE = ".html"
+_WORST = 5
+_APART = 0.1
+"""Of the extent of all points: worst places are at least so far from each other."""
+_SOURCE_POSES = 200
+"""Poses at which the sources of the error are averaged."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotMap:
+    """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say of it.
+
+    `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the `worst` rows.
+    """
+
+    reach: Propagation
+    map: AccuracyMap
+    box: np.ndarray | None
+    worst: np.ndarray
+    sources: dict[str, float]
+    worst_sources: dict[str, np.ndarray]
+    scale: ErrorScale | None
+    fitted: tuple[str, ...]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence each."""
+        remarks = []
+        if self.scale is None:
+            remarks.append(
+                "nothing was verified, so this is what the calibration claims of itself; give --verification with poses that it never saw"
+            )
+        elif not self.scale.noise_known:
+            remarks.append(
+                "the verification files state no sigma, so the instrument's noise counts as the robot's"
+            )
+        if self.fitted:
+            remarks.append(
+                f"the calibration was fitted to {' and '.join(self.fitted)}, which verifies nothing"
+            )
+        return tuple(remarks)
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        found, scale = self.map, self.scale
+        return {
+            "poses": len(found.q),
+            "target": self.reach.target,
+            "station": self.reach.station,
+            "payload_kg": self.reach.payload,
+            "box_m": self.box,
+            "predicted": {"mean": _spread(found.mean), "p95": _spread(found.p95)},
+            "sources": self.sources,
+            "worst": [
+                {
+                    "position_m": found.position[k],
+                    "q": found.q[k],
+                    "mean_mm": found.mean[k] / MILLIMETRE,
+                    "p95_mm": found.p95[k] / MILLIMETRE,
+                    "sources": {kind: float(shares[row]) for kind, shares in self.worst_sources.items()},
+                }
+                for row, k in enumerate(self.worst)
+            ],
+            "verification": None
+            if scale is None
+            else {
+                "poses": len(scale.probability),
+                "factor": scale.factor,
+                "low": scale.low,
+                "high": scale.high,
+                "inside_95_percent": scale.inside,
+                "verdict": scale.verdict,
+                "applied": applied_factor(scale),
+            },
+            "remarks": list(self.remarks),
+        }
+
+
+def applied_factor(scale: ErrorScale | None) -> float:
+    """What the map is multiplied by: the factor where errors are larger than chance allows; never less than one."""
+    return scale.factor if scale is not None and scale.verdict == "optimistic" else 1.0
+
+
+def map_accuracy(
+    robot: Path,
+    out: Path,
+    *,
+    working: str | None = None,
+    count: int = 20_000,
+    verification: Sequence[Path] = (),
+    payload: float | None = None,
+    estimates: Path | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> RobotMap:
+    """Predict the tool's error at `count` random poses in a box, or at the poses or points of a file, and write the map to `out`.
+
+    `working` is a box "x:X,y:Y,z:Z", m, base frame, or a file as `read_working` reads it; None for what robot.yaml declares, else anywhere.
+    `out` is a page (.html), or a table (.csv, .parquet) with the page beside it. `payload` in kg, None for the declared one. Raises
+    `FlexcalError` where there is no calibration, files do not fit, or the robot does not reach.
+    """
+    if out.suffix not in (PAGE, ".csv", ".parquet"):
+        raise InputError(f"{out} must end in .html, .csv or .parquet; give another --out.")
+    calibrated = calibrated_robot(robot, estimates, "map")
+    model = calibrated.model
+    stations = [s for s in model.stations if f"station.{s}.x" in model.posterior.parameters]
+    reach = propagation(model, station=stations[0] if stations else None, payload=payload)
+    rng = np.random.default_rng([seed, 7])
+    box, q = _poses(reach, working, count, seed, rng, progress)
+    found = accuracy_map(reach, q, progress=progress)
+    scale, study = _verified(calibrated, verification)
+    found = found.scaled(applied_factor(scale))
+    worst = _worst(found)
+    some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
+    shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
+    fitted = fitted_files(calibrated, verification)
+    result = RobotMap(reach, found, box, worst, shares, error_sources(reach, q[worst]), scale, fitted)
+    origin = provenance(
+        [robot, calibrated.nominal.urdf, *verification],
+        {"seed": seed},
+        calibrated.stored,
+        tuple(calibrated.blocks),
+    )
+    page = MapStudy(model, found, box, result.document(), scale, study, origin)
+    if out.suffix != PAGE:
+        _write_table(out, found)
+    write_map_page(out.with_suffix(PAGE), page)
+    return result
+
+
+def _poses(
+    reach: Propagation,
+    working: str | None,
+    count: int,
+    seed: int,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[np.ndarray | None, np.ndarray]:
+    """The box, where there is one, and the poses."""
+    if working is not None and ":" not in working:
+        place = working_volume(CollisionChecker(reach.model), working, seed)
+        assert place is not None
+        return None, place.q
+    declared = reach.model.config.working_volume
+    box = None
+    if working is not None:
+        box = box_corners(working)
+    elif declared is not None:
+        box = np.array([declared.lower, declared.upper])
+    return box, random_poses_in(reach, count, rng, box, progress)
+
+
+def _verified(
+    calibrated: CalibratedRobot, files: Sequence[Path]
+) -> tuple[ErrorScale | None, tuple[Verification, np.ndarray | None] | None]:
+    """How large errors at the poses of the `files` are against their prediction, and the verification with its noise."""
+    if not files:
+        return None, None
+    poses = verification_poses(calibrated, files)
+    found = verify(calibrated.model, poses)
+    noise = poses.sigma if poses.sigma_given else None
+    return error_scale(found, noise), (found, noise)
+
+
+def _worst(found: AccuracyMap) -> np.ndarray:
+    """Rows of the worst places that are apart from each other, the worst first."""
+    least = _APART * float(np.linalg.norm(np.ptp(found.position, axis=0)))
+    chosen: list[int] = []
+    for k in np.argsort(-found.p95, kind="stable"):
+        if all(np.linalg.norm(found.position[k] - found.position[c]) >= least for c in chosen):
+            chosen.append(int(k))
+        if len(chosen) == _WORST:
+            break
+    return np.array(chosen)
+
+
+def _write_table(out: Path, found: AccuracyMap) -> None:
+    columns = {name: found.position[:, i] for i, name in enumerate("xyz")}
+    columns |= {f"q{i + 1}": found.q[:, i] for i in range(found.q.shape[1])}
+    errors = {"mean_mm": found.mean / MILLIMETRE, "p95_mm": found.p95 / MILLIMETRE}
+    write_table(out, columns | errors)
+
+
+def _spread(values: np.ndarray) -> dict[str, float]:
+    """Median, nine of ten and worst over the poses, mm."""
+    median, most, worst = (float(v) / MILLIMETRE for v in np.quantile(values, [0.5, 0.9, 1.0]))
+    return {"median_mm": median, "p90_mm": most, "worst_mm": worst}
