@@ -12,11 +12,18 @@ from flexcal.calibration.plausibility import Moved, moved_far
 from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.propagation import Propagation, propagation
 from flexcal.calibration.registration import register, rigid_motion
+from flexcal.calibration.repeatability import (
+    CYCLES,
+    PoseRepeatability,
+    noise_repeatability,
+    repeatability,
+)
 from flexcal.calibration.term_selection import TermSelection, select_terms
 from flexcal.calibration.terms import geometric_parameters
 from flexcal.calibration.verification import Verification, verify
 
 __all__ = [
+    "CYCLES",
     "AccuracyMap",
     "Calibration",
     "Drift",
@@ -24,6 +31,7 @@ __all__ = [
     "ErrorScale",
     "ErrorStatistics",
     "Moved",
+    "PoseRepeatability",
     "Prediction",
     "Propagation",
     "TermSelection",
@@ -34,10 +42,12 @@ __all__ = [
     "error_sources",
     "geometric_parameters",
     "moved_far",
+    "noise_repeatability",
     "predict",
     "propagation",
     "random_poses_in",
     "register",
+    "repeatability",
     "require_points",
     "rigid_motion",
     "select_terms",

@@ -25,9 +25,9 @@ _FEWEST = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class AccuracyMap:
-    """At each pose `q` (N, n), rad or m, the point's `position` (N, 3), base frame, `mean` and 95 % quantile `p95` (N,) of its error.
+    """At each pose `q` (N, n), rad or m: the point's `position` (N, 3), base frame, `mean` and 95 % quantile `p95` (N,) of its error, m.
 
-    In m. The error is the distance between where the calibrated model has the point and where an instrument at the station finds it, from the
+    The error is the distance between where the calibrated model has the point and where an instrument at the station finds it, from the
     uncertainty of the parameters alone.
     """
 

@@ -32,6 +32,28 @@ def map_table(document: Mapping[str, Any]) -> Table:
     return table
 
 
+def repeatability_table(document: Mapping[str, Any]) -> Table:
+    """One row a measure of ISO 9283: mean and largest over the poses, mm."""
+    visits = document["visits"]
+    table = Table(
+        title=f"{document['poses']} poses, {visits['total']} visits, {visits['fewest']} at least (ISO 9283)",
+        title_justify="left",
+    )
+    table.add_column("")
+    for heading in ("mean mm", "max mm"):
+        table.add_column(heading, justify="right")
+    labels = {
+        "rp_mm": "repeatability RP",
+        "ap_nominal_mm": "accuracy AP, as delivered (registered only)",
+        "ap_calibrated_mm": "accuracy AP, calibrated",
+        "vap_mm": "variation of AP by direction, vAP",
+    }
+    for key, label in labels.items():
+        if document.get(key) is not None:
+            table.add_row(label, *(_millimetres(value) for value in document[key].values()))
+    return table
+
+
 def predicted_table(std: Mapping[str, float]) -> Table:
     """One row a spring: predicted standard deviations of stiffness and damping, relative, by parameter name."""
     table = Table(title="predicted standard deviation", title_justify="left")

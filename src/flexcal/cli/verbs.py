@@ -199,6 +199,14 @@ STEPS = (
                 ("results.json", "points.csv", "arm.npz", "report.html"),
             ),
             Verb(
+                ("repeatability",),
+                "repeatability",
+                "Repeatability",
+                "pose accuracy and repeatability after ISO 9283, from repeated visits",
+                "flexcal repeatability robot.yaml visits.csv",
+                ("results.json", "report.html"),
+            ),
+            Verb(
                 ("map",),
                 "map",
                 "Map",

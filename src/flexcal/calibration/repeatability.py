@@ -1,0 +1,115 @@
+"""Pose accuracy and repeatability of ISO 9283 from repeated visits to the same commanded poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import PoseSet
+from flexcal.errors import FlexcalError
+
+SAME_COMMAND = 1e-4
+"""rad or m: rows whose joint positions differ by no more than this are visits to one commanded pose."""
+CYCLES = 30
+"""Visits to each pose that the standard asks for."""
+_NOISE = np.sqrt(8 / np.pi) + 3 * np.sqrt(3 - 8 / np.pi)
+"""RP of many visits with nothing but an instrument's noise of 1σ an axis, in σ: l̄ and S_l are those of a χ distribution."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseRepeatability:
+    """One commanded pose: the `rows` (K,) of its visits in measuring order, and what ISO 9283:1998 makes of them.
+
+    `deviations` (K, 3) m from the barycentre; `repeatability` RP = l̄ + 3 S_l (7.2.2), m; `rotation` (3,) rad, 3 S about x, y, z of the
+    instrument's frame, None where no orientation was measured; `direction_variation` vAP (7.2.3), m, the largest distance between the
+    barycentres of visits that came from different poses, None where no two directions have two visits each.
+    """
+
+    rows: np.ndarray
+    deviations: np.ndarray
+    repeatability: float
+    rotation: np.ndarray | None
+    direction_variation: float | None
+
+    def accuracy(self, errors: np.ndarray) -> float:
+        """AP, m: the distance between barycentre and command (7.2.1), from `errors` (N, 3) of all rows, measured minus commanded."""
+        return float(np.linalg.norm(errors[self.rows].mean(axis=0)))
+
+
+def repeatability(poses: PoseSet) -> list[PoseRepeatability]:
+    """The poses that were visited twice or more, in the order of their first visits.
+
+    Rows belong to one pose where joint positions, target, station and payload are the same, whatever number they have. Raises
+    `FlexcalError` for lengths, and where no pose was visited twice.
+    """
+    if poses.length is not None:
+        raise FlexcalError("lengths of a wire do not show where a point is; give points x, y, z.")
+    number = _numbers(poses)
+    groups = [np.flatnonzero(number == k) for k in range(number.max() + 1)]
+    found = [_evaluate(poses, rows, number) for rows in groups if len(rows) > 1]
+    if not found:
+        raise FlexcalError(
+            f"each of the {len(poses)} poses was visited once only (joint positions within {SAME_COMMAND:g} rad count as the same); "
+            f"visit some of them {CYCLES} times."
+        )
+    return found
+
+
+def noise_repeatability(sigma: np.ndarray) -> float:
+    """RP, m, that an instrument's 1σ noise (N, 3) alone shows at many visits."""
+    return _NOISE * float(np.sqrt((sigma**2).mean()))
+
+
+def _numbers(poses: PoseSet) -> np.ndarray:
+    """The commanded pose (N,) of every row, counted from 0 in the order in which they first appear."""
+    payload = np.zeros(len(poses)) if poses.payload is None else poses.payload
+    first: list[int] = []
+    number = np.zeros(len(poses), dtype=int)
+    for row in range(len(poses)):
+        alike = (
+            (np.abs(poses.q[first] - poses.q[row]) <= SAME_COMMAND).all(axis=1)
+            & (poses.target[first] == poses.target[row])
+            & (poses.station[first] == poses.station[row])
+            & (payload[first] == payload[row])
+        )
+        if alike.any():
+            number[row] = int(np.argmax(alike))
+        else:
+            number[row] = len(first)
+            first.append(row)
+    return number
+
+
+def _evaluate(poses: PoseSet, rows: np.ndarray, number: np.ndarray) -> PoseRepeatability:
+    points = poses.position[rows]
+    deviations = points - points.mean(axis=0)
+    distance = np.linalg.norm(deviations, axis=1)
+    return PoseRepeatability(
+        rows,
+        deviations,
+        float(distance.mean() + 3 * distance.std(ddof=1)),
+        None if poses.quaternion_wxyz is None else _rotation_spread(poses.quaternion_wxyz[rows]),
+        _direction_variation(points, rows, number),
+    )
+
+
+def _rotation_spread(quaternion_wxyz: np.ndarray) -> np.ndarray:
+    from scipy.spatial.transform import Rotation
+
+    turns = Rotation.from_quat(quaternion_wxyz, scalar_first=True)
+    return 3 * (turns * turns.mean().inv()).as_rotvec().std(axis=0, ddof=1)
+
+
+def _direction_variation(points: np.ndarray, rows: np.ndarray, number: np.ndarray) -> float | None:
+    """Directions are told apart by the commanded pose that was measured before."""
+    before = np.where(rows > 0, number[np.maximum(rows - 1, 0)], -1)
+    centres = [
+        points[before == k].mean(axis=0)
+        for k in np.unique(before)
+        if k not in (-1, number[rows[0]]) and (before == k).sum() > 1
+    ]
+    if len(centres) < 2:
+        return None
+    apart = np.array(centres)
+    return float(np.linalg.norm(apart[:, None] - apart[None], axis=2).max())

@@ -1,0 +1,52 @@
+"""`flexcal repeatability`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Json, MaybePath, PoseFiles, Robot, require_files, require_robot
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Find pose accuracy and repeatability (ISO 9283: AP, RP, vAP) from repeated visits to the same poses.
+
+    Rows whose joint positions are the same are visits to one pose, whatever their numbers; other rows are left out. RP needs no
+    calibration.
+    """
+
+    robot: Robot
+    poses: PoseFiles
+    estimates: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml, if there)")
+    ] = None
+    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
+    """Folder for report.html and results.json; without it there is no report."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Evaluate the visits, and print AP and RP."""
+        from flexcal.cli.tables import repeatability_table
+        from flexcal.workflow.repeat_robot import repeat_robot
+
+        require_robot(self.robot, *self.poses)
+        require_files(self.poses, "POSES")
+        console = Console(self.json)
+        document = repeat_robot(self.robot, self.poses, estimates=self.estimates, out=self.out).document()
+        console.show(repeatability_table(document))
+        noise = document["instrument_rp_mm"]
+        if noise is not None:
+            console.say(f"the instrument's noise alone would show an RP of {noise:.3f} mm")
+        for remark in document["remarks"]:
+            console.say(remark)
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+        console.finish(
+            document,
+            f"flexcal certificate {self.robot} --targets TARGETS.csv --before BEFORE.csv --after AFTER.csv, once commands are compensated",
+        )

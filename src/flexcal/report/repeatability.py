@@ -1,0 +1,139 @@
+"""The report of repeated visits (`flexcal repeatability`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration import CYCLES, PoseRepeatability
+from flexcal.data import PoseSet
+from flexcal.report.figures.residual_order import residual_order
+from flexcal.report.notation import NOTHING, millimetres
+from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Table, Text, Verdict, worst
+from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
+from flexcal.units import MILLIMETRE
+
+KINDS = {"nominal": "AP as delivered", "calibrated": "AP calibrated"}
+
+
+@dataclass(frozen=True, eq=False)
+class RepeatabilityStudy:
+    """The `visited` among `poses` of the robot called `name`, and `results` as the verb prints them."""
+
+    name: str
+    poses: PoseSet
+    visited: Sequence[PoseRepeatability]
+    results: Mapping[str, Any]
+    provenance: Mapping[str, str] = field(default_factory=dict)
+
+
+def write_repeatability_report(path: str | Path, study: RepeatabilityStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, repeatability_page(study))
+
+
+def repeatability_page(study: RepeatabilityStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    checks = _checks(study)
+    rp = results["rp_mm"]
+    facts = [Fact("How well does it repeat?", _mm(rp["max"]), "mm", "RP at the worst pose (ISO 9283).")]
+    for kind, label in KINDS.items():
+        if f"ap_{kind}_mm" in results:
+            block = results[f"ap_{kind}_mm"]
+            facts.append(
+                Fact(
+                    f"{label}?",
+                    _mm(block["mean"]),
+                    "mm",
+                    f"Mean over the poses; worst {_mm(block['max'])} mm.",
+                )
+            )
+    verdict = Verdict(
+        worst(checks),
+        f"The robot repeats within {_mm(rp['max'])} mm",
+        f"{results['poses']} poses were visited {results['visits']['total']} times in all; RP is {_mm(rp['mean'])} mm on average.",
+        tuple(facts),
+        (),
+        "",
+        checks,
+    )
+    return Page(
+        title=f"{study.name}: repeatability and pose accuracy",
+        subtitle="After ISO 9283:1998, clauses 7.2.1 to 7.2.3",
+        verdict=verdict,
+        sections=[
+            _poses_section(study),
+            _order_section(study),
+            provenance_section("", None, {}, study.provenance),
+        ],
+        document=results,
+    )
+
+
+def repeatability_table(results: Mapping[str, Any]) -> Table:
+    """One row a pose."""
+    kinds = [kind for kind in KINDS if f"ap_{kind}_mm" in results]
+    columns = ("pose", "visits", *(f"{KINDS[kind]} / mm" for kind in kinds), "RP / mm", "vAP / mm")
+    rows = []
+    for item in results["each"]:
+        accuracy = [_mm(item[f"ap_{kind}_mm"]) for kind in kinds]
+        rows.append(
+            (str(item["pose"]), str(item["visits"]), *accuracy, _mm(item["rp_mm"]), _mm(item["vap_mm"]))
+        )
+    return Table("table-poses", "Pose by pose", columns, tuple(rows))
+
+
+def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
+    fewest = study.results["visits"]["fewest"]
+    enough = fewest >= CYCLES
+    answer = (
+        f"{fewest} or more."
+        if enough
+        else f"{fewest} at the pose with the fewest; ISO 9283 asks for {CYCLES}."
+    )
+    checks = [Check("Was every pose visited often enough?", answer, "good" if enough else "care")]
+    noise = study.results["instrument_rp_mm"]
+    question = "Is it the robot that is measured, and not the instrument?"
+    if noise is None:
+        checks.append(Check(question, "The files state no sigma, so this cannot be judged.", "unknown"))
+    else:
+        seen = study.results["rp_mm"]["mean"]
+        answer = f"The instrument's noise alone would show an RP of {_mm(noise)} mm; {_mm(seen)} mm are seen on average."
+        checks.append(Check(question, answer, "good" if seen > 1.5 * noise else "care"))
+    return tuple(checks)
+
+
+def _poses_section(study: RepeatabilityStudy) -> Section:
+    text = Text(
+        (
+            "AP is the distance between the barycentre of all visits and the commanded point; RP is the mean distance of the visits from "
+            "their barycentre plus three of its standard deviations; vAP is the largest distance between barycentres of visits that came "
+            "from different poses. The noise of the instrument is part of all of them.",
+            "As delivered, the commanded point is where the nominal robot has it, placed as well as it goes before the instrument; "
+            "calibrated, it is where the calibrated model has it.",
+        )
+    )
+    return Section("poses", "How accurate and how repeatable", "", (repeatability_table(study.results), text))
+
+
+def _order_section(study: RepeatabilityStudy) -> Section:
+    rows = np.concatenate([pose.rows for pose in study.visited])
+    deviations = np.concatenate([pose.deviations for pose in study.visited])
+    block = FigureBlock(
+        "figure-order",
+        "Deviations from the barycentre, in the order of measuring",
+        residual_order(deviations[np.argsort(rows)]),
+        "What goes with the order is drift: a robot that warms up, an instrument that settles.",
+        "Components of the deviations in measuring order.",
+    )
+    return Section("order", "In the order of measuring", "", (block,))
+
+
+def _mm(value: float | None) -> str:
+    return NOTHING if value is None else millimetres(value * MILLIMETRE)

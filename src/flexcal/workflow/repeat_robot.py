@@ -1,0 +1,142 @@
+"""Pose accuracy and repeatability of a robot from repeated visits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration import (
+    CYCLES,
+    PoseRepeatability,
+    noise_repeatability,
+    predict,
+    repeatability,
+)
+from flexcal.data import PoseSet, provenance, read_poses
+from flexcal.errors import InputError
+from flexcal.model import RobotModel
+from flexcal.report.repeatability import RepeatabilityStudy, write_repeatability_report
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.calibrate_robot import nominal_errors
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.pose_remarks import unused_columns
+from flexcal.workflow.results import write_results
+from flexcal.workflow.verify_robot import registrable
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRepeatability:
+    """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
+
+    "nominal": the nominal robot, laid as well as it goes through the points; "calibrated": the calibrated one.
+    """
+
+    poses: PoseSet
+    visited: list[PoseRepeatability]
+    errors: Mapping[str, np.ndarray]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence each."""
+        remarks = list(unused_columns(self.poses))
+        fewest = min(len(pose.rows) for pose in self.visited)
+        if fewest < CYCLES:
+            remarks.append(
+                f"ISO 9283 asks for {CYCLES} visits to each pose; here it is {fewest} at the pose with the fewest, so RP is less certain"
+            )
+        once = len(self.poses) - sum(len(pose.rows) for pose in self.visited)
+        if once:
+            remarks.append(f"{once} rows are of poses that were visited once; they are not used")
+        if "nominal" not in self.errors:
+            remarks.append(
+                "there are too few poses to lay the nominal robot through them, so its pose accuracy is not known: visit four or more"
+            )
+        if "calibrated" not in self.errors:
+            remarks.append(
+                "there is no calibration, or not from this station, so the calibrated robot's pose accuracy is not known"
+            )
+        return tuple(remarks)
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json: over all poses, and each of them."""
+        rows = [self._pose(pose) for pose in self.visited]
+        keys = ["rp_mm", "vap_mm", *(f"ap_{kind}_mm" for kind in self.errors)]
+        return {
+            "poses": len(rows),
+            "visits": {
+                "fewest": min(row["visits"] for row in rows),
+                "total": sum(row["visits"] for row in rows),
+            },
+            **{key: _spread([row[key] for row in rows if row[key] is not None]) for key in keys},
+            "instrument_rp_mm": noise_repeatability(self.poses.sigma) / MILLIMETRE
+            if self.poses.sigma_given
+            else None,
+            "each": rows,
+            "remarks": list(self.remarks),
+        }
+
+    def _pose(self, pose: PoseRepeatability) -> dict[str, Any]:
+        first = int(pose.rows[0])
+        return {
+            "pose": int(self.poses.pose[first]),
+            "target": str(self.poses.target[first]),
+            "visits": len(pose.rows),
+            "rp_mm": pose.repeatability / MILLIMETRE,
+            "rp_rotation_rad": pose.rotation,
+            "vap_mm": None if pose.direction_variation is None else pose.direction_variation / MILLIMETRE,
+            **{f"ap_{kind}_mm": pose.accuracy(e) / MILLIMETRE for kind, e in self.errors.items()},
+        }
+
+
+def repeat_robot(
+    robot: Path, files: Sequence[Path], *, estimates: Path | None = None, out: Path | None = None
+) -> RobotRepeatability:
+    """Pose accuracy and repeatability from the repeated visits in `files`; with `out`, results.json and report.html are left there.
+
+    `estimates` is an estimates.yaml, or a folder with one; without, that beside robot.yaml is used where it holds a calibration. Raises
+    `FlexcalError` where no pose was visited twice, or a file does not fit.
+    """
+    require_distinct(files)
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    poses = read_poses(list(files), nominal, require_motion=False)
+    visited = repeatability(poses)
+    calibrated = _calibrated(robot, estimates, nominal)
+    errors: dict[str, np.ndarray] = {}
+    if registrable(poses):
+        errors["nominal"] = nominal_errors(nominal, poses)
+    if calibrated is not None and _placed(calibrated.model, poses):
+        errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
+    result = RobotRepeatability(poses, visited, errors)
+    if out is not None:
+        document = result.document()
+        write_results(out, document)
+        stored = None if calibrated is None else calibrated.stored
+        blocks = () if calibrated is None else tuple(calibrated.blocks)
+        origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
+        study = RepeatabilityStudy(nominal.name, poses, visited, document, origin)
+        write_repeatability_report(out / "report.html", study)
+    return result
+
+
+def _calibrated(robot: Path, estimates: Path | None, nominal: RobotModel) -> CalibratedRobot | None:
+    """The calibrated robot; None where none was named and there is none beside robot.yaml."""
+    try:
+        return calibrated_robot(robot, estimates, "compare with")
+    except InputError:
+        if estimates is not None or (nominal.path.parent / nominal.config.estimates).exists():
+            raise
+        return None
+
+
+def _placed(model: RobotModel, poses: PoseSet) -> bool:
+    return all(f"station.{station}.x" in model.posterior.parameters for station in poses.stations)
+
+
+def _spread(values: Sequence[float]) -> dict[str, float] | None:
+    """Mean and largest over the poses; None where there are none."""
+    return {"mean": float(np.mean(values)), "max": float(np.max(values))} if values else None
