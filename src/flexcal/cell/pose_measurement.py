@@ -85,5 +85,5 @@ def measured_poses(
         target=np.full(size, truth.point().name),
         station=np.full(size, truth.stations[0]),
         temperature=temperature,
-        pose=np.arange(1, size + 1),
+        pose=plan.numbers,
     )

@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_robot
+from flexcal.cli.options import Estimates, Json, Paths, Robot, require_at_least, require_robot
 
 
 @dataclass(frozen=True)
@@ -37,10 +37,7 @@ class Map:
         float | None, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
     """Payload held, kg."""
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     seed: Annotated[int, arg(metavar="N")] = 0
     """Of the random poses."""
     json: Json = False

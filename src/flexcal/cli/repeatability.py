@@ -8,7 +8,7 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, PoseFiles, Robot, require_files, require_robot
+from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, require_files, require_robot
 
 
 @dataclass(frozen=True)
@@ -21,10 +21,7 @@ class Repeatability:
 
     robot: Robot
     poses: PoseFiles
-    estimates: Annotated[
-        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: beside robot.yaml, if there)")
-    ] = None
-    """estimates.yaml to use, or the folder that 'calibrate --out' wrote."""
+    estimates: Estimates = None
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html and results.json; without it there is no report."""
     json: Json = False

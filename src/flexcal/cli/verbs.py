@@ -229,6 +229,13 @@ STEPS = (
                 "flexcal predict robot.yaml commands.csv --out tool.csv",
             ),
             Verb(
+                ("certificate",),
+                "certificate",
+                "Certificate",
+                "accuracy before and after compensation at the same targets, on a sheet of A4",
+                "flexcal certificate robot.yaml --targets targets.csv --before nominal.csv --after compensated.csv",
+            ),
+            Verb(
                 ("report",),
                 "report",
                 "Report",

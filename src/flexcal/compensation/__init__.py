@@ -2,5 +2,6 @@
 
 from flexcal.compensation.compensate import Compensation, compensate
 from flexcal.compensation.postures import best_posture
+from flexcal.compensation.wanted import wanted_pose
 
-__all__ = ["Compensation", "best_posture", "compensate"]
+__all__ = ["Compensation", "best_posture", "compensate", "wanted_pose"]

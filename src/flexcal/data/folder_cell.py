@@ -74,11 +74,12 @@ class FolderCell:
         poses = read_poses(file, self.model, require_motion=False)
         first = np.sort(np.unique(poses.pose, return_index=True)[1])
         q = poses.q[first]
-        if q.shape[0] != len(own):
+        planned = own.q[np.sort(np.unique(own.numbers, return_index=True)[1])]
+        if len(q) != len(planned):
             raise InputError(
-                f"{file}: there are {q.shape[0]} poses, but the plan has {len(own)}; measure them all."
+                f"{file}: there are {len(q)} poses, but the plan has {len(planned)}; measure them all."
             )
-        apart = np.abs(q - own.q)
+        apart = np.abs(q - planned)
         if apart.max() > _SAME:
             row, joint = (int(i) for i in np.argwhere(apart > _SAME)[0])
             raise InputError(

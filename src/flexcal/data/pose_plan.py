@@ -16,6 +16,7 @@ class PosePlan:
     """N poses to stand still in and measure.
 
     q: (N, n) commanded joint positions, rad.
+    pose: (N,) their numbers; the same one again is another visit. None counts from 1.
     payload: (N,) kg at the declared payload's centre of mass (a single number counts for all); None takes what
         robot.yaml declares.
     seed: of the measurement, where something is drawn.
@@ -28,6 +29,7 @@ class PosePlan:
     payload: NDArray[np.float64] | None = None
     seed: int = 0
     name: str = "poses"
+    pose: NDArray[np.int64] | None = None
 
     def __post_init__(self) -> None:
         q = np.asarray(self.q, dtype=np.float64)
@@ -43,11 +45,21 @@ class PosePlan:
             if payload.min() < 0:
                 raise FlexcalError(f"the payload is {payload.min():g} kg; it must not be negative.")
             object.__setattr__(self, "payload", np.broadcast_to(payload, q.shape[0]).copy())
+        if self.pose is not None:
+            pose = np.asarray(self.pose, dtype=np.int64)
+            if pose.shape != (q.shape[0],):
+                raise FlexcalError(f"pose has {pose.size} numbers for {q.shape[0]} poses; give one each.")
+            object.__setattr__(self, "pose", pose)
         if self.seed < 0:
             raise FlexcalError(f"the seed is {self.seed}; it must not be negative.")
 
     def __len__(self) -> int:
         return self.q.shape[0]
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """Number (N,) of every pose."""
+        return np.arange(1, len(self) + 1) if self.pose is None else self.pose
 
     @property
     def joint_count(self) -> int:

@@ -7,12 +7,15 @@ import math
 from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flexcal.atomic import write_text
 from flexcal.report.ladder import ladder
 from flexcal.report.page import FigureBlock, Page
 from flexcal.report.palette import DARK, LIGHT, dark_of
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
 
 _MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
 _WORDS = {"good": "good", "care": "take care", "bad": "not good", "unknown": "not known"}
@@ -25,31 +28,40 @@ def write_page(path: str | Path, page: Page) -> None:
 
 def page_html(page: Page) -> str:
     """The whole document. Nothing in it is loaded from elsewhere."""
-    from jinja2 import Environment, PackageLoader, StrictUndefined
     from plotly.offline import get_plotlyjs
 
-    environment = Environment(
+    folder = files("flexcal.report") / "templates"
+    used = bool(page.figures)
+    return (
+        templates()
+        .get_template("report.html.j2")
+        .render(
+            page=page,
+            ladder=ladder(page.verdict.rungs),
+            marks=_MARKS,
+            words=_WORDS,
+            light=LIGHT,
+            dark=DARK,
+            style=(folder / "report.css").read_text("utf-8"),
+            script=(folder / "report.js").read_text("utf-8"),
+            specifications={block.id: figure_json(block) for block in page.figures},
+            dark_colours=script_json(dark_of()),
+            document=script_json(_plain(page.document)),
+            plotly=get_plotlyjs() if used else "",
+        )
+    )
+
+
+def templates() -> Environment:
+    """The templates of pages; a name that is not given to one is an error."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
         loader=PackageLoader("flexcal.report", "templates"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=StrictUndefined,
-    )
-    folder = files("flexcal.report") / "templates"
-    used = bool(page.figures)
-    return environment.get_template("report.html.j2").render(
-        page=page,
-        ladder=ladder(page.verdict.rungs),
-        marks=_MARKS,
-        words=_WORDS,
-        light=LIGHT,
-        dark=DARK,
-        style=(folder / "report.css").read_text("utf-8"),
-        script=(folder / "report.js").read_text("utf-8"),
-        specifications={block.id: figure_json(block) for block in page.figures},
-        dark_colours=script_json(dark_of()),
-        document=script_json(_plain(page.document)),
-        plotly=get_plotlyjs() if used else "",
     )
 
 

@@ -1,0 +1,60 @@
+"""`flexcal certificate`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import arg
+
+from flexcal.cli.console import Console
+from flexcal.cli.options import Estimates, Json, Robot, require_robot
+
+
+@dataclass(frozen=True)
+class Certificate:
+    """Certify a robot on a sheet of A4: how far it was from its targets before compensation, and how far it is after.
+
+    BEFORE was measured at the nominal commands of TARGETS, AFTER at those that 'flexcal compensate' made of it; both keep the targets' pose
+    numbers. Rows of one number are visits to one target. Print the page, or save it as PDF, from a browser.
+    """
+
+    robot: Robot
+    targets: Annotated[Path, arg(metavar="FILE")]
+    """The file that 'flexcal compensate' took."""
+    before: Annotated[Path, arg(metavar="FILE")]
+    """Points measured with nominal commands (CSV or Parquet)."""
+    after: Annotated[Path, arg(metavar="FILE")]
+    """Points measured with compensated commands."""
+    estimates: Estimates = None
+    out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("certificate.html")
+    """The page."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Compare, and print the accuracy before and after."""
+        from flexcal.cli.tables import error_table
+        from flexcal.workflow.certify_robot import certify_robot
+
+        require_robot(self.robot, self.targets, self.before, self.after)
+        console = Console(self.json)
+        document = certify_robot(
+            self.robot, self.targets, self.before, self.after, self.out, estimates=self.estimates
+        ).document()
+        labels = {
+            "before": "before, targets laid as well as they go",
+            "after": "after, where the calibration has them",
+            "after_refitted": "after, laid as well as they go",
+        }
+        rows = {label: document[key]["ap"] for key, label in labels.items()}
+        console.show(error_table("pose accuracy AP: distance to the target", rows))
+        for key in ("before", "after"):
+            if (repeated := document[key]["rp"]) is not None:
+                console.say(
+                    f"repeatability RP {key}: {repeated['mean_mm']:.3f} mm on average, {repeated['max_mm']:.3f} mm at most"
+                )
+        for remark in document["remarks"]:
+            console.say(remark)
+        console.say(f"wrote {self.out}: {document['targets']} targets")
+        console.finish(document, f"open {self.out} and print it, and sign it")

@@ -1,0 +1,135 @@
+"""The certificate: a robot before and after, on a sheet of paper (`flexcal certificate`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.atomic import write_text
+from flexcal.report.notation import NOTHING, millimetres, significant
+from flexcal.report.palette import LIGHT
+from flexcal.report.render import templates
+from flexcal.units import MILLIMETRE
+
+_WIDTH, _ROW = 640.0, 34.0
+"""Of the strip of errors and one of its rows, in its own units."""
+
+
+@dataclass(frozen=True, eq=False)
+class CertificateStudy:
+    """`results` as the verb prints them, and the error vectors (P, 3) m of each target before and after."""
+
+    results: Mapping[str, Any]
+    before: np.ndarray
+    after: np.ndarray
+
+
+def write_certificate(path: Path, study: CertificateStudy) -> None:
+    """Write the certificate of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_text(path, certificate_html(study))
+
+
+def certificate_html(study: CertificateStudy) -> str:
+    """The whole document, for A4; nothing in it is loaded from elsewhere, and it needs no scripts."""
+    results = study.results
+    style = (files("flexcal.report") / "templates" / "certificate.css").read_text("utf-8")
+    return (
+        templates()
+        .get_template("certificate.html.j2")
+        .render(
+            results=results,
+            rows=accuracy_rows(results),
+            parts=limiting_parts(results),
+            conditions=_conditions(results),
+            judgement=_judgement(results),
+            strip=error_strip(study.before, study.after),
+            colours=LIGHT,
+            style=style,
+        )
+    )
+
+
+def accuracy_rows(results: Mapping[str, Any]) -> list[tuple[str, ...]]:
+    """Label, AP mean, 90 % and worst, RP worst, in mm."""
+    labels = {
+        "before": "before: nominal commands, targets laid as well as they go",
+        "after": "after: compensated commands, targets where the calibration has them",
+        "after_refitted": "after, targets laid as well as they go",
+    }
+    rows = []
+    for key, label in labels.items():
+        block = results[key]
+        repeated = NOTHING if block["rp"] is None else _mm(block["rp"]["max_mm"])
+        rows.append((label, *(_mm(block["ap"][name]) for name in ("mean_mm", "p90_mm", "max_mm")), repeated))
+    return rows
+
+
+def limiting_parts(results: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """What the errors after compensation are made of, root mean square, mm."""
+    labels = {
+        "measured": "measured distance to the target",
+        "parameters": "uncertainty of the calibration, predicted",
+        "instrument": "noise of the instrument, stated",
+        "visit_to_visit": "from visit to visit, instrument included, measured",
+    }
+    return [(label, _mm(results["rms_mm"].get(key))) for key, label in labels.items()]
+
+
+def _conditions(results: Mapping[str, Any]) -> list[tuple[str, str]]:
+    before, after = results["before"], results["after"]
+    temperature = results["temperature"]
+    sigma = results["sigma_mm"]
+    return [
+        ("point", ", ".join(results["points"])),
+        ("instrument's place", ", ".join(results["stations"])),
+        ("instrument, 1σ an axis", "not stated" if sigma is None else f"{_mm(sigma)} mm"),
+        ("payload", ", ".join(f"{significant(mass, 4)} kg" for mass in results["payload_kg"])),
+        (
+            "temperature",
+            "not recorded" if temperature is None else f"{temperature[0]:.1f} to {temperature[1]:.1f}",
+        ),
+        ("targets compared", str(results["targets"])),
+        ("measurements", f"{before['measurements']} before, {after['measurements']} after"),
+    ]
+
+
+def _judgement(results: Mapping[str, Any]) -> str:
+    found = results["prediction"]
+    words = {
+        "right": "The predicted uncertainty holds.",
+        "optimistic": "The predicted uncertainty was too small.",
+        "cautious": "The predicted uncertainty was larger than needed.",
+    }[found["verdict"]]
+    return (
+        f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % of "
+        f"them; the errors are {found['factor']:.2f} times the predicted size (95 % interval {found['low']:.2f} to {found['high']:.2f})."
+    )
+
+
+def error_strip(before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
+    """Dots of the distances on a logarithmic scale: places of ticks and dots in a drawing 640 wide, with its height."""
+    distances = [np.linalg.norm(errors, axis=1) / MILLIMETRE for errors in (before, after)]
+    every = np.concatenate(distances)
+    low = np.floor(np.log10(max(float(np.quantile(every, 0.01)), 1e-4)))
+    high = max(np.ceil(np.log10(max(float(every.max()), 1e-4))), low + 1)
+
+    def place(values: np.ndarray) -> list[float]:
+        share = (np.log10(np.maximum(values, 10.0**low)) - low) / (high - low)
+        return (_WIDTH * share).round(1).tolist()
+
+    powers = np.arange(low, high + 1)
+    return {
+        "width": _WIDTH,
+        "row": _ROW,
+        "ticks": list(zip(place(10.0**powers), [f"{10.0**p:g}" for p in powers], strict=True)),
+        "rows": [("before", place(distances[0]), "rigid"), ("after", place(distances[1]), "elastic")],
+    }
+
+
+def _mm(value: float | None) -> str:
+    return NOTHING if value is None else millimetres(value * MILLIMETRE)

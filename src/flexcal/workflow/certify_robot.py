@@ -1,0 +1,258 @@
+"""A robot at the same targets before and after compensation."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import date
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration import (
+    ErrorScale,
+    ErrorStatistics,
+    PoseRepeatability,
+    Verification,
+    error_scale,
+    repeatability,
+    rigid_motion,
+    verify,
+)
+from flexcal.compensation import wanted_pose
+from flexcal.data import PoseSet, ToolTargets, read_targets, sha256_of
+from flexcal.errors import InputError
+from flexcal.model import RobotModel, carried_mass
+from flexcal.model.rotations import vector_rotation
+from flexcal.report.certificate import CertificateStudy, write_certificate
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.verify_robot import fitted_files, registrable, verification_poses
+
+_FAR = 0.25
+"""rad or m: a measured pose farther than this from the joint positions of its target belongs to another one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Visited:
+    """Measured `poses`, their `errors` (N, 3) m from their targets, and `centres` (P, 3) m, those of the barycentres of `numbers` (P,).
+
+    `visits` is None where no target was visited twice.
+    """
+
+    poses: PoseSet
+    errors: np.ndarray
+    numbers: np.ndarray
+    centres: np.ndarray
+    visits: list[PoseRepeatability] | None
+
+    @property
+    def accuracy(self) -> ErrorStatistics:
+        """Of the pose accuracy AP over all targets."""
+        return ErrorStatistics.of(self.centres)
+
+    def block(self) -> dict[str, Any]:
+        """For the JSON document."""
+        repeated = None
+        if self.visits is not None:
+            rp = np.array([pose.repeatability for pose in self.visits]) / MILLIMETRE
+            repeated = {
+                "visits": min(len(p.rows) for p in self.visits),
+                "mean_mm": rp.mean(),
+                "max_mm": rp.max(),
+            }
+        return {"measurements": len(self.poses), "ap": self.accuracy.in_millimetres(), "rp": repeated}
+
+
+@dataclass(frozen=True, eq=False)
+class RobotCertificate:
+    """Before and after at the same targets; `refitted`: after, with the targets laid as well as they go, as before is.
+
+    `verification` and `scale`: the measurements after against what the calibration predicts.
+    """
+
+    robot: CalibratedRobot
+    before: Visited
+    after: Visited
+    refitted: Visited
+    only_before: int
+    verification: Verification
+    scale: ErrorScale
+    files: Mapping[str, str]
+    fitted: tuple[str, ...]
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square distances after compensation, m: measured, and the parts that are known."""
+        noise = self.after.poses.sigma if self.after.poses.sigma_given else None
+        parts = {
+            "measured": float(np.sqrt((self.after.errors**2).sum(axis=1).mean())),
+            "parameters": float(np.sqrt((self.verification.parameter_rms**2).mean())),
+        }
+        if noise is not None:
+            parts["instrument"] = float(np.sqrt((noise**2).sum(axis=1).mean()))
+        if self.after.visits is not None:
+            spread = np.concatenate([pose.deviations for pose in self.after.visits])
+            free = len(spread) - len(self.after.visits)
+            parts["visit_to_visit"] = float(np.sqrt((spread**2).sum() / free))
+        return parts
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence each."""
+        remarks = []
+        if self.only_before:
+            remarks.append(
+                f"{self.only_before} targets were measured only before or only after, and are not compared"
+            )
+        if self.fitted:
+            remarks.append(
+                f"the calibration was fitted to {' and '.join(self.fitted)}, so this says little about other targets"
+            )
+        if not self.after.poses.sigma_given:
+            remarks.append("the files state no sigma, so the instrument's noise counts as the robot's")
+        return tuple(remarks)
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        temperature = [
+            s.poses.temperature for s in (self.before, self.after) if s.poses.temperature is not None
+        ]
+        every = np.concatenate(temperature) if temperature else None
+        model = self.robot.model
+        poses = self.after.poses
+        return {
+            "robot": model.name,
+            "date": date.today().isoformat(),
+            "program": f"flexcal {version('flexcal')}",
+            "targets": len(self.after.numbers),
+            "points": list(poses.targets),
+            "stations": list(poses.stations),
+            "sigma_mm": float(np.median(poses.sigma)) / MILLIMETRE if poses.sigma_given else None,
+            "payload_kg": sorted({float(m) for m in carried_mass(model, poses.payload, len(poses)).round(3)}),
+            "temperature": None if every is None else [float(every.min()), float(every.max())],
+            "before": self.before.block(),
+            "after": self.after.block(),
+            "after_refitted": self.refitted.block(),
+            "prediction": {
+                "factor": self.scale.factor,
+                "low": self.scale.low,
+                "high": self.scale.high,
+                "inside_95_percent": self.scale.inside,
+                "verdict": self.scale.verdict,
+            },
+            "rms_mm": {name: value / MILLIMETRE for name, value in self.rms.items()},
+            "files": self.files,
+            "remarks": list(self.remarks),
+        }
+
+
+def certify_robot(
+    robot: Path, targets: Path, before: Path, after: Path, out: Path, *, estimates: Path | None = None
+) -> RobotCertificate:
+    """Compare measurements at nominal and at compensated commands with the targets of both, and write the certificate to `out`.
+
+    Rows of `before` and `after` belong to the target of the same `pose` number. Before, the targets are laid as well as they go through the
+    measured points; after, where the calibration has the instrument. Raises `FlexcalError` where there is no calibration, files do
+    not fit, or fewer than four targets were measured before and after.
+    """
+    if out.suffix != ".html":
+        raise InputError(f"{out} must end in .html; give another --out.")
+    if before.resolve() == after.resolve():
+        raise InputError(
+            f"{before} is given as --before and as --after; measure the compensated commands too."
+        )
+    calibrated = calibrated_robot(robot, estimates, "certify")
+    model = calibrated.model
+    wanted = read_targets(targets, model)
+    base = wanted_pose(model, calibrated.nominal, wanted).position
+    sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
+    rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
+    common = np.intersect1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
+    every = np.union1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
+    visited = {}
+    for file, poses in sets.items():
+        kept = np.isin(wanted.pose[rows[file]], common)
+        points = base[rows[file][kept]]
+        visited[file] = (poses.subset(kept), points)
+    if not all(registrable(poses) for poses, _ in visited.values()):
+        raise InputError(
+            f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
+        )
+    known = verify(model, visited[after][0])
+    result = RobotCertificate(
+        calibrated,
+        _visited(visited[before][0], _laid(*visited[before])),
+        _visited(visited[after][0], _placed(model, *visited[after])),
+        _visited(visited[after][0], _laid(*visited[after])),
+        len(every) - len(common),
+        known,
+        error_scale(known, visited[after][0].sigma if visited[after][0].sigma_given else None),
+        _files(
+            [robot, calibrated.nominal.urdf],
+            {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
+        ),
+        fitted_files(calibrated, [after]),
+    )
+    write_certificate(out, CertificateStudy(result.document(), result.before.centres, result.after.centres))
+    return result
+
+
+def _rows(file: Path, poses: PoseSet, targets: Path, wanted: ToolTargets) -> np.ndarray:
+    """The row of the targets (N,) that every measured row belongs to."""
+    order = np.argsort(wanted.pose)
+    place = np.searchsorted(wanted.pose, poses.pose, sorter=order).clip(max=len(order) - 1)
+    rows = order[place]
+    strange = np.flatnonzero(wanted.pose[rows] != poses.pose)
+    if len(strange):
+        raise InputError(
+            f"{file}: pose {poses.pose[strange[0]]} is no target of {targets}; keep the targets' numbers when measuring."
+        )
+    other = np.flatnonzero(wanted.target[rows] != poses.target)
+    if len(other):
+        k = other[0]
+        raise InputError(
+            f"{file}: pose {poses.pose[k]} was measured at '{poses.target[k]}', but its target is one of '{wanted.target[rows[k]]}'."
+        )
+    if wanted.q is not None:
+        apart = np.abs(poses.q - wanted.q[rows])
+        if apart.max() > _FAR:
+            k, joint = (int(i) for i in np.argwhere(apart > _FAR)[0])
+            raise InputError(
+                f"{file}: pose {poses.pose[k]} was measured {apart[k, joint]:.3g} from its target's q{joint + 1} in {targets}, so it is "
+                "another one; keep the targets' numbers when measuring."
+            )
+    return rows
+
+
+def _placed(model: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray:
+    """Targets (N, 3), given as `points` (N, 3) in the base frame, where `model` has the instrument's stations; m."""
+    places = np.array([model.station[model.station_index(name)] for name in poses.station.tolist()])
+    turns = np.array([vector_rotation(place[3:]) for place in places])
+    return np.matmul(turns, points[:, :, None])[:, :, 0] + places[:, :3]
+
+
+def _laid(poses: PoseSet, points: np.ndarray) -> np.ndarray:
+    """Targets (N, 3), given as `points` (N, 3) in the base frame, as near to the measured ones as a rigid motion brings them; m."""
+    laid = np.empty(points.shape)
+    for station in poses.stations:
+        own = poses.station == station
+        turn, shift = rigid_motion(points[own], poses.position[own], station)
+        laid[own] = points[own] @ turn.T + shift
+    return laid
+
+
+def _visited(poses: PoseSet, targets: np.ndarray) -> Visited:
+    errors = poses.position - targets
+    numbers = np.unique(poses.pose)
+    centres = np.array([errors[poses.pose == k].mean(axis=0) for k in numbers])
+    visits = repeatability(poses) if len(numbers) < len(poses) else None
+    return Visited(poses, errors, numbers, centres, visits)
+
+
+def _files(robot: list[Path], others: Mapping[str, Path]) -> dict[str, str]:
+    """What each file is, its name and its SHA-256."""
+    named = {"robot": robot[0], "URDF": robot[1]} | dict(others)
+    return {f"{label}: {path.name}": sha256_of(path) for label, path in named.items()}
