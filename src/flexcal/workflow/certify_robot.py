@@ -77,7 +77,7 @@ class RobotCertificate:
     before: Visited
     after: Visited
     refitted: Visited
-    only_before: int
+    uncompared: int
     verification: Verification
     scale: ErrorScale
     files: Mapping[str, str]
@@ -86,32 +86,29 @@ class RobotCertificate:
     @property
     def rms(self) -> dict[str, float]:
         """Root mean square distances after compensation, m: measured, and the parts that are known."""
-        noise = self.after.poses.sigma if self.after.poses.sigma_given else None
         parts = {
             "measured": float(np.sqrt((self.after.errors**2).sum(axis=1).mean())),
             "parameters": float(np.sqrt((self.verification.parameter_rms**2).mean())),
         }
-        if noise is not None:
-            parts["instrument"] = float(np.sqrt((noise**2).sum(axis=1).mean()))
+        if self.after.poses.sigma_given:
+            parts["instrument"] = float(np.sqrt((self.after.poses.sigma**2).sum(axis=1).mean()))
         if self.after.visits is not None:
-            spread = np.concatenate([pose.deviations for pose in self.after.visits])
-            free = len(spread) - len(self.after.visits)
-            parts["visit_to_visit"] = float(np.sqrt((spread**2).sum() / free))
+            parts["visit_to_visit"] = _visit_to_visit(self.after.visits)
         return parts
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
         remarks = []
-        if self.only_before:
+        if self.uncompared:
             remarks.append(
-                f"{self.only_before} targets were measured only before or only after, and are not compared"
+                f"targets that were measured only before or only after are not compared: {self.uncompared}"
             )
         if self.fitted:
             remarks.append(
                 f"the calibration was fitted to {' and '.join(self.fitted)}, so this says little about other targets"
             )
-        if not self.after.poses.sigma_given:
+        if not self.after.poses.sigma_given and self.after.visits is None:
             remarks.append("the files state no sigma, so the instrument's noise counts as the robot's")
         return tuple(remarks)
 
@@ -182,14 +179,15 @@ def certify_robot(
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
         )
     known = verify(model, visited[after][0])
+    there = _visited(visited[after][0], _placed(model, *visited[after]))
     result = RobotCertificate(
         calibrated,
         _visited(visited[before][0], _laid(*visited[before])),
-        _visited(visited[after][0], _placed(model, *visited[after])),
+        there,
         _visited(visited[after][0], _laid(*visited[after])),
         len(every) - len(common),
         known,
-        error_scale(known, visited[after][0].sigma if visited[after][0].sigma_given else None),
+        error_scale(known, _noise(there)),
         _files(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
@@ -250,6 +248,19 @@ def _visited(poses: PoseSet, targets: np.ndarray) -> Visited:
     centres = np.array([errors[poses.pose == k].mean(axis=0) for k in numbers])
     visits = repeatability(poses) if len(numbers) < len(poses) else None
     return Visited(poses, errors, numbers, centres, visits)
+
+
+def _noise(visited: Visited) -> np.ndarray | None:
+    """1σ (N, 3) m with which a single measurement scatters: as seen from visit to visit, else as the instrument states, else unknown."""
+    if visited.visits is not None:
+        return np.full(visited.errors.shape, _visit_to_visit(visited.visits) / np.sqrt(3))
+    return visited.poses.sigma if visited.poses.sigma_given else None
+
+
+def _visit_to_visit(visits: list[PoseRepeatability]) -> float:
+    """Root mean square distance of single visits from where many would centre, m."""
+    spread = np.concatenate([pose.deviations for pose in visits])
+    return float(np.sqrt((spread**2).sum() / (len(spread) - len(visits))))
 
 
 def _files(robot: list[Path], others: Mapping[str, Path]) -> dict[str, str]:
