@@ -82,11 +82,11 @@ def error_scale(verification: Verification, noise: np.ndarray | None) -> ErrorSc
 def _bound(total: float, mean_and_freedom: Callable[[float], tuple[float, float]], share: float) -> float:
     """The factor with which errors as large as the observed `total` m² would be exceeded with the probability 1 - `share`."""
     from scipy.optimize import brentq
-    from scipy.stats import chi2
+    from scipy.special import gammaincinv
 
     def excess(factor: float) -> float:
         mean, freedom = mean_and_freedom(factor**2)
-        return mean * chi2.ppf(share, freedom) / freedom - total
+        return mean * 2 * float(gammaincinv(freedom / 2, share)) / freedom - total
 
     if excess(1e-6) >= 0:
         return 0.0

@@ -8,8 +8,8 @@ import numpy as np
 
 from flexcal.calibration.prediction import left_jacobian
 from flexcal.errors import FlexcalError
-from flexcal.model import Equilibrium, RobotModel, carried_mass, point_kinematics, static_equilibrium
-from flexcal.model.equilibrium import elastic_axes
+from flexcal.model import RobotModel, carried_mass, gravity_torque, point_kinematics
+from flexcal.model.equilibrium import elastic_axes, spring_loads
 from flexcal.model.names import GEOMETRY, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
@@ -48,24 +48,20 @@ class Propagation:
     def roots(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (N, 3) m at `q` (N, n), and roots A (N, 3, p) m: A Aᵀ is the covariance of what an instrument at the station finds wrong.
 
-        Both in the base frame. Derivatives are taken with every backlash in its middle: they differ by the gap, some 1e-4 of them.
+        Both in the base frame. Derivatives are those of the undeflected arm: they differ by its deflection angles, some 1e-3 of them.
         """
         model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
-        middle = np.zeros((len(q), model.n))
-        rest = static_equilibrium(model, q, self.payload, flank=middle, sensitivities=True)
-        at = point_kinematics(model, q, rest.deflection, point=self.target)
-        by_motion = at.motion_jacobian[:, :3]
-        by_load = -np.matmul(by_motion[:, :, axes[:, 0], axes[:, 1]], rest.compliance)
+        loads, regressor, coupling = spring_loads(model, q, self.payload)
+        at = point_kinematics(model, q, point=self.target)
+        stiffness = model.stiffness[axes[:, 0], axes[:, 1]]
+        by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
         by_geometry = at.geometry_jacobian[:, :3]
-        by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, rest.coupling)
-        stretch = rest.deflection[:, axes[:, 0], axes[:, 1]]
-        drives = np.flatnonzero(axes[:, 1] == 2)
-        stretch[:, drives] = -rest.torque[:, axes[drives, 0]] / model.stiffness[axes[drives, 0], 2]
-        twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, rest)[:, None]
+        by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
+        twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q)[:, None]
         columns = (
             by_geometry,
-            by_load * stretch[:, None],
-            np.matmul(by_load, rest.regressor),
+            by_load * (-loads / stiffness)[:, None],
+            np.matmul(by_load, regressor),
             twists,
             self._by_station(at.position),
         )
@@ -73,14 +69,16 @@ class Propagation:
         roots = stacked.reshape(-1, stacked.shape[2]) @ self.rows
         return at.position, roots.reshape(len(q), 3, -1)
 
-    def _twist(self, q: np.ndarray, rest: Equilibrium) -> np.ndarray:
+    def _twist(self, q: np.ndarray) -> np.ndarray:
         """How far joints turn (N, T) with the twisting parameters."""
         columns = np.empty((len(q), len(self.twisting)))
+        loaded = any(kind in ("backlash", "gravity_compliance") for _, kind in self.twisting)
+        torque = gravity_torque(self.model, q, self.payload) if loaded else np.zeros(q.shape)
         for k, (joint, kind) in enumerate(self.twisting):
             if kind == "backlash":
-                columns[:, k] = -np.sign(rest.torque[:, joint])
+                columns[:, k] = -np.sign(torque[:, joint])
             elif kind == "gravity_compliance":
-                columns[:, k] = -rest.torque[:, joint]
+                columns[:, k] = -torque[:, joint]
             else:
                 order, wave = kind.split("_")[1:]
                 columns[:, k] = (np.sin if wave == "sin" else np.cos)(int(order) * q[:, joint])

@@ -93,7 +93,7 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
 
     Found by putting a spring of unbounded stiffness in every joint; prismatic joints read 0.
     """
-    _, deflection, _ = _held_rigidly(model, q, payload, sensitivities=False)
+    _, deflection, _, _ = _held_rigidly(model, q, payload, _twists(model), sensitivities=False)
     return -_RIGID * deflection[:, :, 2]
 
 
@@ -101,23 +101,44 @@ def gravity_regressor(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
     """Derivative (samples, n, 4 n) of `gravity_torque` by mass and first moment of each link, its payload's included."""
-    twists, deflection, regressor = _held_rigidly(model, q, payload, sensitivities=True)
+    axes = _twists(model)
+    _, deflection, regressor, _ = _held_rigidly(model, q, payload, axes, sensitivities=True)
     result = np.zeros((len(deflection), model.n, 4 * model.n))
-    result[:, twists] = regressor
+    result[:, [joint for joint, _ in axes]] = regressor
     return result
 
 
+def spring_loads(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Torque (samples, d), N m, with which springs of the undeflected arm hold gravity, `regressor` and `coupling` of `Equilibrium`.
+
+    Those of the deflected arm differ by its angles, some 1e-3 of them, and are twice the work.
+    """
+    loads, _, regressor, coupling = _held_rigidly(model, q, payload, elastic_axes(model), sensitivities=True)
+    return -loads, regressor, coupling
+
+
+def _twists(model: RobotModel) -> list[tuple[int, int]]:
+    return [(i, 2) for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+
+
 def _held_rigidly(
-    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None, *, sensitivities: bool
-) -> tuple[list[int], np.ndarray, np.ndarray]:
-    """The revolute joints, deflection and regressor of `Equilibrium` with a spring of unbounded stiffness in each of these joints."""
+    model: RobotModel,
+    q: np.ndarray,
+    payload: np.ndarray | float | None,
+    axes: list[tuple[int, int]],
+    *,
+    sensitivities: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Gravity load (samples, d) N m on springs of unbounded stiffness about the `axes`, their deflection, regressor and coupling."""
     q = joint_batch(model, q)
-    twists = [i for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
     masses = payload_batch(model, payload, len(q))
-    stiffness = np.full(len(twists), _RIGID)
-    axes = [(i, 2) for i in twists]
-    deflection, _, regressor, _ = _solve(model, axes, stiffness, q, masses, sensitivities=sensitivities)
-    return twists, deflection, regressor
+    deflection, _, regressor, coupling = _solve(
+        model, axes, np.full(len(axes), _RIGID), q, masses, sensitivities=sensitivities
+    )
+    joints, components = (list(column) for column in zip(*axes, strict=True)) if axes else ([], [])
+    return _RIGID * deflection[:, joints, components], deflection, regressor, coupling
 
 
 def static_equilibrium(

@@ -106,9 +106,9 @@ def _judgement(results: Mapping[str, Any]) -> str:
         "cautious": "The predicted uncertainty was larger than needed.",
     }[found["verdict"]]
     return (
-        f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % of "
-        f"them; beyond what measurements scatter, errors are {found['factor']:.2f} times as large as the calibration predicts (95 % interval "
-        f"{found['low']:.2f} to {found['high']:.2f})."
+        f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % "
+        f"of them; beyond what measurements scatter, errors are {found['factor']:.2f} times as large as the calibration predicts (95 % "
+        f"interval {found['low']:.2f} to {found['high']:.2f})."
     )
 
 

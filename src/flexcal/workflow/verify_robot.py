@@ -143,9 +143,16 @@ def _rms(distance: np.ndarray) -> float:
 
 
 def registrable(poses: PoseSet) -> bool:
-    """Whether every station has the four points off a line that a registration with something left to say needs."""
+    """Whether every station has the four points off a line that a registration with something left to say needs, repeated visits apart."""
     for station in poses.stations:
-        points = poses.position[poses.station == station]
-        if len(points) < 4 or np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-3) < 2:
+        own = poses.station == station
+        points, commands = (
+            poses.position[own],
+            zip(poses.q[own].round(3).tolist(), poses.target[own], strict=True),
+        )
+        if (
+            len({(*q, target) for q, target in commands}) < 4
+            or np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-3) < 2
+        ):
             return False
     return True

@@ -1,0 +1,197 @@
+"""`flexcal map`, `repeatability` and `certificate` on the UR5's calibration, through files, and on files that do not fit."""
+
+from __future__ import annotations
+
+import re
+import shutil
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+from cli_files import copied, read_csv, snapshot, write_csv
+
+from flexcal.calibration import predict
+from flexcal.cli.main import main
+from flexcal.data import read_poses, sha256_of, write_poses
+from flexcal.model import RobotModel, point_kinematics
+from flexcal.report.notation import millimetres
+
+Q = [f"q{i}" for i in range(1, 7)]
+SIGMA = 2e-5
+
+
+@pytest.fixture(scope="module")
+def calibrated(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A UR5 with rigid geometry fitted to 150 poses of its grid, targets.csv of its random poses, the commands for them, and what a tracker
+    with noise sees three times at these commands when the calibrated robot is the real one."""
+    folder = copied(examples / "ur5_tracker", tmp_path_factory.mktemp("accuracy") / "ur5")
+    robot = folder / "robot.yaml"
+    header, rows = read_csv(folder / "grid.csv")
+    some = write_csv(folder / "some.csv", header, rows[::7][:140])
+    assert main(["calibrate", str(robot), str(some), "--terms", "kinematic"]) == 0
+    header, rows = read_csv(folder / "random.csv")
+    targets = write_csv(folder / "targets.csv", header[:7], rows[:, :7])
+    assert main(["compensate", str(robot), str(targets), "--out", str(folder / "commands.csv")]) == 0
+    model = RobotModel.from_yaml(robot)
+    nominal = read_poses(folder / "random.csv", model)
+    commands = pl.read_csv(folder / "commands.csv")
+    rng = np.random.default_rng(3)
+    rows_of = np.tile(np.arange(20), 3)
+    again = nominal.subset(rows_of)
+    q = commands.select(Q).to_numpy()[rows_of]
+    after = replace(again, q=q, sigma=np.full((60, 3), SIGMA), sigma_given=True)
+    seen = predict(model, after).position + SIGMA * rng.standard_normal((60, 3))
+    write_poses(folder / "after.csv", replace(after, position=seen))
+    return folder
+
+
+@pytest.fixture
+def ur5(calibrated: Path, tmp_path: Path) -> Path:
+    return Path(shutil.copytree(calibrated, tmp_path / "ur5"))
+
+
+def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
+    out = ur5 / "map.csv"
+    arguments = ["--working", "0.2:0.6,-0.4:0.4,0.1:0.6", "--count", "600", "--out", out]
+    done = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "random.csv", "--json")
+    assert done.status == 0 and "next: flexcal compensate" in done.err
+    document, table = done.document, pl.read_csv(out)
+    assert table.columns == ["x", "y", "z", *Q, "mean_mm", "p95_mm"] and len(table) == 600
+    model = RobotModel.from_yaml(ur5 / "robot.yaml")
+    at = point_kinematics(model, table.select(Q).to_numpy(), jacobians=False).position
+    np.testing.assert_allclose(table.select("x", "y", "z").to_numpy(), at, atol=1e-12)
+    p95 = table["p95_mm"].to_numpy()
+    assert document["predicted"]["p95"]["worst_mm"] == pytest.approx(p95.max())
+    assert document["predicted"]["p95"]["median_mm"] == pytest.approx(np.median(p95))
+    assert [item["p95_mm"] for item in document["worst"]] == sorted(
+        (item["p95_mm"] for item in document["worst"]), reverse=True
+    )
+    assert set(document["sources"]) == {"geometry", "instrument's place"}
+    check = document["verification"]
+    # the files state no sigma: the tracker's noise and what no rigid model can follow count as the robot's
+    assert check["verdict"] == "optimistic" and check["low"] > 1 and check["applied"] == check["factor"]
+    assert any("no sigma" in remark for remark in document["remarks"])
+    page = (ur5 / "map.html").read_text(encoding="utf-8")
+    assert "accuracy map" in page and "figure-predicted" in page
+    bare = run("map", ur5 / "robot.yaml", *arguments, "--json").document
+    ratio = document["predicted"]["p95"]["worst_mm"] / bare["predicted"]["p95"]["worst_mm"]
+    assert ratio == pytest.approx(check["factor"], rel=1e-9) and bare["verification"] is None
+    assert run("map", ur5 / "robot.yaml", *arguments).status == 0
+
+
+def test_map_of_given_poses(run, ur5: Path) -> None:
+    done = run(
+        "map", ur5 / "robot.yaml", "--working", ur5 / "targets.csv", "--out", ur5 / "here.html", "--json"
+    )
+    assert done.status == 0 and done.document["poses"] == 20 and done.document["box_m"] is None
+    assert "nothing was verified" in done.err and not (ur5 / "here.csv").exists()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "sentence"),
+    [
+        (["--out", "map.txt"], "map.txt must end in .html, .csv or .parquet"),
+        (["--working", "5:6,5:6,5:6"], "0 reach the working volume from 5, 5, 5 to 6, 6, 6 m"),
+        (["--working", "0.6:0.2,-1:1,0:1"], "is no box; give every smallest coordinate before the largest"),
+        (["--working", "0:1,a:b,0:1"], "is no box; write smallest and largest"),
+        (["--working", "nowhere.csv"], "nowhere.csv cannot be read"),
+        (["--count", "0"], "--count is 0; it must be at least 1"),
+        (["--payload", "2"], "robot.yaml declares none"),
+        (["--verification", "targets.csv"], "the column 'x' is missing"),
+        (["--estimates", "elsewhere"], "elsewhere does not exist"),
+    ],
+)
+def test_what_no_map_can_be_made_of(
+    run, ur5: Path, monkeypatch: pytest.MonkeyPatch, arguments: list, sentence: str
+) -> None:
+    monkeypatch.chdir(ur5)
+    before = snapshot(ur5)
+    done = run("map", "robot.yaml", *arguments)
+    assert done.status == 2 and sentence in done.err and done.err.strip().count("\nflexcal:") <= 1
+    assert "Traceback" not in done.err and snapshot(ur5) == before
+
+
+def test_repeatability_of_measured_visits(run, ur5: Path) -> None:
+    done = run("repeatability", ur5 / "robot.yaml", ur5 / "after.csv", "--out", ur5 / "visits", "--json")
+    assert done.status == 0
+    document, poses = done.document, pl.read_csv(ur5 / "after.csv")
+    assert document["poses"] == 20 and document["visits"] == {"fewest": 3, "total": 60}
+    points = poses.filter(pl.col("pose") == 4).select("x", "y", "z").to_numpy()
+    distance = np.sqrt(((points - points.sum(axis=0) / 3) ** 2).sum(axis=1))
+    rp = distance.mean() + 3 * np.sqrt(((distance - distance.mean()) ** 2).sum() / 2)
+    assert next(p for p in document["each"] if p["pose"] == 4)["rp_mm"] == pytest.approx(1e3 * rp)
+    # three visits with 0.02 mm of noise an axis centre within some 0.02 mm of where the model has the point
+    assert 0.01 < document["ap_calibrated_mm"]["mean"] < 0.03 < 0.3 < document["ap_nominal_mm"]["mean"]
+    assert "ISO 9283 asks for 30 visits to each pose; here it is 3" in done.err
+    assert "RP" in (ur5 / "visits" / "report.html").read_text(encoding="utf-8")
+    once = run("repeatability", ur5 / "robot.yaml", ur5 / "random.csv")
+    assert once.status == 2 and "each of the 20 poses was visited once only" in once.err
+
+
+def test_repeatability_needs_no_calibration(run, ur5_folder: Path, calibrated: Path) -> None:
+    done = run("repeatability", ur5_folder / "robot.yaml", calibrated / "after.csv", "--json")
+    assert done.status == 0 and "ap_calibrated_mm" not in done.document
+    assert any("there is no calibration" in remark for remark in done.document["remarks"])
+
+
+def certify(run, ur5: Path, *more: object):
+    given = ["--targets", ur5 / "targets.csv", "--before", ur5 / "random.csv", "--after", ur5 / "after.csv"]
+    return run("certificate", ur5 / "robot.yaml", *given, "--out", ur5 / "certificate.html", *more)
+
+
+def test_certificate(run, ur5: Path) -> None:
+    done = certify(run, ur5, "--json")
+    assert done.status == 0
+    document = done.document
+    before, after = document["before"]["ap"], document["after"]["ap"]
+    # 0.61 mm is what the README says of the UR5 before, and what is left is the noise of three visits
+    assert before["mean_mm"] == pytest.approx(0.61, abs=0.01) and document["before"]["rp"] is None
+    assert 0.01 < after["mean_mm"] < 0.03 and document["after"]["rp"]["visits"] == 3
+    assert document["after_refitted"]["ap"]["mean_mm"] < 1.1 * after["mean_mm"]
+    assert document["rms_mm"]["visit_to_visit"] == pytest.approx(1e3 * SIGMA * np.sqrt(3), rel=0.2)
+    assert document["prediction"]["verdict"] != "optimistic"
+    page = (ur5 / "certificate.html").read_text(encoding="utf-8")
+    for file in ("targets.csv", "random.csv", "after.csv", "robot.yaml"):
+        assert sha256_of(ur5 / file) in page and file in page
+    assert "@page { size: A4" in page and "<script" not in page and "http" not in page
+    assert (
+        len(re.findall("<circle", page)) == 40 and f"<b>{millimetres(1e-3 * before['p90_mm'])} mm</b>" in page
+    )
+
+
+def test_targets_without_a_command_are_not_compared(run, ur5: Path) -> None:
+    table = pl.read_csv(ur5 / "after.csv").filter(pl.col("pose") > 2)
+    table.write_csv(ur5 / "after.csv")
+    done = certify(run, ur5, "--json")
+    assert done.document["targets"] == 17 and "are not compared: 3" in done.err
+    assert done.document["before"]["measurements"] == 17
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (pl.col("pose") + 100, "after.csv: pose 100 is no target of"),
+        (((pl.col("pose") + 1) % 20), "so it is another one; keep the targets' numbers"),
+        (pl.lit("nose").alias("target"), "there is no point 'nose'"),
+        (pl.lit("roof").alias("station"), "roof"),
+    ],
+)
+def test_measurements_of_other_targets(run, ur5: Path, change: pl.Expr, sentence: str) -> None:
+    pl.read_csv(ur5 / "after.csv").with_columns(change).write_csv(ur5 / "after.csv")
+    before = snapshot(ur5)
+    done = certify(run, ur5)
+    assert done.status == 2 and sentence in done.err and done.err.count("\n") == 1
+    assert snapshot(ur5) == before
+
+
+def test_certificate_needs_two_measurements_of_four_targets(run, ur5: Path) -> None:
+    given = ["--targets", ur5 / "targets.csv", "--before", ur5 / "random.csv", "--after", ur5 / "random.csv"]
+    same = run("certificate", ur5 / "robot.yaml", *given)
+    assert same.status == 2 and "is given as --before and as --after" in same.err
+    pl.read_csv(ur5 / "after.csv").filter(pl.col("pose") < 3).write_csv(ur5 / "after.csv")
+    few = certify(run, ur5)
+    assert few.status == 2 and "3 targets were measured before and after; four or more" in few.err
+    odd = run("certificate", ur5 / "robot.yaml", *given[:-1], ur5 / "after.csv", "--out", ur5 / "page.pdf")
+    assert odd.status == 2 and "page.pdf must end in .html" in odd.err
