@@ -55,8 +55,10 @@ def uncertain(model: RobotModel, rng: np.random.Generator, kinds: tuple[str, ...
         ):
             continue
         names.append(name)
-    scales = {n: "log" if n.endswith("stiffness") else "linear" for n in names}
-    parameters = Parameters(Parameter(n, unit_of(n), model.value(n), scale=scales[n]) for n in names)
+    parameters = Parameters(
+        Parameter(n, unit_of(n), model.value(n), scale="log" if n.endswith("stiffness") else "linear")
+        for n in names
+    )
     mixed = np.eye(len(names)) + 0.1 * rng.standard_normal((len(names), len(names)))
     root = np.array([STD[n.rpartition(".")[2]] for n in names])[:, None] * mixed
     return replace(model, posterior=Posterior(parameters, root @ root.T))

@@ -16,8 +16,8 @@ from flexcal.model import point_kinematics
 from flexcal.model.joint_space import joint_ranges
 from flexcal.progress import Progress, silent
 
-_BATCH = 512
-"""Poses at once: their derivatives stay in the processor's cache."""
+_BATCH = 256
+"""Poses at once: their derivatives stay in the processor's cache, and in memory that need not be asked for again every time."""
 _DRAWN = 100_000
 _FEWEST = 1e-4
 """Share of all random poses below which a box counts as out of reach."""
@@ -45,22 +45,19 @@ def accuracy_map(
     reach: Propagation, q: np.ndarray, *, threads: int | None = None, progress: Progress = silent
 ) -> AccuracyMap:
     """Mean and 95 % quantile of the tool's error at poses `q` (N, n), to first order in the parameters; `threads` None takes all cores."""
+    found = AccuracyMap(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
     starts = range(0, len(q), _BATCH)
-    parts: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+
+    def fill(start: int) -> None:
+        rows = slice(start, start + _BATCH)
+        found.position[rows], roots = reach.roots(q[rows])
+        variances = principal_variances(roots @ np.swapaxes(roots, 1, 2))
+        found.mean[rows], found.p95[rows] = mean_distance(variances), distance_quantile(variances)
+
     with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
-        for number, part in enumerate(
-            pool.map(lambda start: _errors(reach, q[start : start + _BATCH]), starts), start=1
-        ):
-            parts.append(part)
+        for number, _ in enumerate(pool.map(fill, starts), start=1):
             progress("accuracy map", number / len(starts))
-    position, mean, p95 = (np.concatenate(values) for values in zip(*parts, strict=True))
-    return AccuracyMap(q, position, mean, p95)
-
-
-def _errors(reach: Propagation, q: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    position, roots = reach.roots(q)
-    variances = principal_variances(roots @ np.swapaxes(roots, 1, 2))
-    return position, mean_distance(variances), distance_quantile(variances)
+    return found
 
 
 def random_poses_in(

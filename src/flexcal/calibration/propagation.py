@@ -57,7 +57,7 @@ class Propagation:
         by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
         by_geometry = at.geometry_jacobian[:, :3]
         by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
-        twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q)[:, None]
+        twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, loads)[:, None]
         columns = (
             by_geometry,
             by_load * (-loads / stiffness)[:, None],
@@ -69,11 +69,10 @@ class Propagation:
         roots = stacked.reshape(-1, stacked.shape[2]) @ self.rows
         return at.position, roots.reshape(len(q), 3, -1)
 
-    def _twist(self, q: np.ndarray) -> np.ndarray:
-        """How far joints turn (N, T) with the twisting parameters."""
+    def _twist(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """How far joints turn (N, T) with the twisting parameters, springs being loaded by `loads` (N, d)."""
         columns = np.empty((len(q), len(self.twisting)))
-        loaded = any(kind in ("backlash", "gravity_compliance") for _, kind in self.twisting)
-        torque = gravity_torque(self.model, q, self.payload) if loaded else np.zeros(q.shape)
+        torque = self._torque(q, loads)
         for k, (joint, kind) in enumerate(self.twisting):
             if kind == "backlash":
                 columns[:, k] = -np.sign(torque[:, joint])
@@ -83,6 +82,19 @@ class Propagation:
                 order, wave = kind.split("_")[1:]
                 columns[:, k] = (np.sin if wave == "sin" else np.cos)(int(order) * q[:, joint])
         return columns
+
+    def _torque(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Gravity torque (N, n) on the joints with backlash or gravity compliance; that on drives with springs is among the `loads`."""
+        loaded = {joint for joint, kind in self.twisting if not kind.startswith("transmission")}
+        springs = {
+            joint: k for k, (joint, component) in enumerate(elastic_axes(self.model)) if component == 2
+        }
+        if not loaded <= springs.keys():
+            return gravity_torque(self.model, q, self.payload)
+        torque = np.zeros(q.shape)
+        for joint in loaded:
+            torque[:, joint] = loads[:, springs[joint]]
+        return torque
 
     def _by_station(self, position: np.ndarray) -> np.ndarray:
         """∂(point seen from the station, turned into the base frame)/∂(x, y, z, rx, ry, rz of the station), (N, 3, 6)."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.calibration import CYCLES, PoseRepeatability
 from flexcal.data import PoseSet
-from flexcal.report.figures.residual_order import residual_order
+from flexcal.report.figures.residual_trend import residual_trend
 from flexcal.report.notation import NOTHING, millimetres
 from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Table, Text, Verdict, worst
 from flexcal.report.render import write_page
@@ -128,7 +128,7 @@ def _order_section(study: RepeatabilityStudy) -> Section:
     block = FigureBlock(
         "figure-order",
         "Deviations from the barycentre, in the order of measuring",
-        residual_order(deviations[np.argsort(rows)]),
+        residual_trend(rows, deviations, "row of the file, in order", "measured minus barycentre"),
         "What goes with the order is drift: a robot that warms up, an instrument that settles.",
         "Components of the deviations in measuring order.",
     )

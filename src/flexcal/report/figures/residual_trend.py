@@ -12,8 +12,10 @@ from flexcal.units import MILLIMETRE
 _WINDOW = 25
 
 
-def residual_trend(values: np.ndarray, residuals: np.ndarray, title: str) -> go.Figure:
-    """Components x, y, z (mm) of residuals (N, 3) m against `values` (N,), with a running mean of 25 neighbours in them."""
+def residual_trend(
+    values: np.ndarray, residuals: np.ndarray, title: str, label: str = "measured minus predicted"
+) -> go.Figure:
+    """Components x, y, z (mm) of residuals (N, 3) m, what the `label` says, against `values` (N,), with a running mean of 25 neighbours."""
     figure = panels(3, 1, 500, ["x", "y", "z"], row_gap=0.08)
     order = np.argsort(values, kind="stable")
     values, residuals = values[order], residuals[order]
@@ -24,7 +26,7 @@ def residual_trend(values: np.ndarray, residuals: np.ndarray, title: str) -> go.
         components = residuals[:, k] / MILLIMETRE
         figure.add_trace(
             go.Scatter(
-                x=single(values), y=single(components), mode="markers", name="measured minus predicted",
+                x=single(values), y=single(components), mode="markers", name=label,
                 marker={"color": ELASTIC, "size": 4, "opacity": 0.6}, legendgroup="a", showlegend=k == 0,
                 hovertemplate="%{x}: %{y:+.3f} mm",
             ), row=k + 1, col=1,
