@@ -75,6 +75,9 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     assert any("no sigma" in remark for remark in document["remarks"])
     page = (ur5 / "map.html").read_text(encoding="utf-8")
     assert "accuracy map" in page and "figure-predicted" in page
+    seen = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "some.csv", "--json")
+    assert seen.document["verification"]["fitted"] == ["some.csv"]
+    assert "Were these poses unknown" in (ur5 / "map.html").read_text(encoding="utf-8")
     bare = run("map", ur5 / "robot.yaml", *arguments, "--json").document
     ratio = document["predicted"]["p95"]["worst_mm"] / bare["predicted"]["p95"]["worst_mm"]
     assert ratio == pytest.approx(check["factor"], rel=1e-9) and bare["verification"] is None
@@ -193,5 +196,9 @@ def test_certificate_needs_two_measurements_of_four_targets(run, ur5: Path) -> N
     pl.read_csv(ur5 / "after.csv").filter(pl.col("pose") < 3).write_csv(ur5 / "after.csv")
     few = certify(run, ur5)
     assert few.status == 2 and "3 targets were measured before and after; four or more" in few.err
+    swapped = run(
+        "certificate", ur5 / "robot.yaml", *given[:3], ur5 / "after.csv", "--after", ur5 / "random.csv"
+    )
+    assert swapped.status == 2 and "are --before and --after swapped?" in swapped.err
     odd = run("certificate", ur5 / "robot.yaml", *given[:-1], ur5 / "after.csv", "--out", ur5 / "page.pdf")
     assert odd.status == 2 and "page.pdf must end in .html" in odd.err

@@ -111,6 +111,9 @@ def _checks(study: MapStudy) -> tuple[Check, ...]:
         "cautious": f"It is cautious. {said} The numbers here were left as they are.",
     }[scale.verdict]
     checks = [Check(question, said, "care" if scale.verdict == "optimistic" else "good")]
+    if fitted := study.results["verification"]["fitted"]:
+        answer = f"No: it was fitted to {' and '.join(fitted)}. Verify on poses that it never saw."
+        checks.append(Check("Were these poses unknown to the calibration?", answer, "bad"))
     if not scale.noise_known:
         checks.append(
             Check(

@@ -167,6 +167,12 @@ def certify_robot(
     base = wanted_pose(model, calibrated.nominal, wanted).position
     sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
     rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
+    if wanted.q is not None:
+        off = {file: np.abs(poses.q - wanted.q[rows[file]]).max(axis=1) for file, poses in sets.items()}
+        if np.median(off[before]) > np.median(off[after]):
+            raise InputError(
+                f"{before} was measured farther from the nominal commands in {targets} than {after}; are --before and --after swapped?"
+            )
     common = np.intersect1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
     every = np.union1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
     visited = {}

@@ -105,6 +105,7 @@ class RobotMap:
                 "inside_95_percent": scale.inside,
                 "verdict": scale.verdict,
                 "applied": applied_factor(scale),
+                "fitted": list(self.fitted),
             },
             "remarks": list(self.remarks),
         }
@@ -139,11 +140,10 @@ def map_accuracy(
     model = calibrated.model
     stations = [s for s in model.stations if f"station.{s}.x" in model.posterior.parameters]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
+    scale, study = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
-    found = accuracy_map(reach, q, progress=progress)
-    scale, study = _verified(calibrated, verification)
-    found = found.scaled(applied_factor(scale))
+    found = accuracy_map(reach, q, progress=progress).scaled(applied_factor(scale))
     worst = _worst(found)
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
