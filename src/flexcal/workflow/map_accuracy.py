@@ -29,6 +29,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.accuracy_map import MapStudy, write_map_page
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_choice import box_corners, working_volume
 from flexcal.workflow.verify_robot import fitted_files, verification_poses
 
@@ -136,6 +137,7 @@ def map_accuracy(
     """
     if out.suffix not in (PAGE, ".csv", ".parquet"):
         raise InputError(f"{out} must end in .html, .csv or .parquet; give another --out.")
+    require_distinct(verification)
     calibrated = calibrated_robot(robot, estimates, "map")
     model = calibrated.model
     stations = [s for s in model.stations if f"station.{s}.x" in model.posterior.parameters]

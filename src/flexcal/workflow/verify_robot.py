@@ -102,6 +102,7 @@ def verify_robot(
     arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no
     calibration pose was measured, or a file does not fit.
     """
+    require_distinct(files)
     calibrated = calibrated_robot(robot, estimates, "verify")
     model, bare, blocks = calibrated.model, calibrated.nominal, calibrated.blocks
     poses = verification_poses(calibrated, files)
@@ -119,7 +120,6 @@ def verify_robot(
 
 def verification_poses(calibrated: CalibratedRobot, files: Sequence[Path]) -> PoseSet:
     """Measured points of the `files`, from stations that the calibration found; raises `FlexcalError` where they are not that."""
-    require_distinct(files)
     model = calibrated.model
     poses = read_poses(list(files), model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
