@@ -68,3 +68,23 @@ def test_working_points_and_working_poses(tmp_path: Path, tx90l: RobotModel) -> 
     points.write_text("x,y,height\n0.5,0,0.4\n")
     with pytest.raises(InputError, match="column 'pose' is missing"):
         read_working(points, tx90l)
+
+
+def test_commands_are_a_plan_that_keeps_their_numbers(tmp_path: Path) -> None:
+    commands = tmp_path / "commands.csv"
+    commands.write_text(
+        "pose,q1,target,unambiguous\n7,0.1,smr,true\n9,0.2,smr,false\n7,0.1,smr,true\n", "utf-8"
+    )
+    plan = read_plan(commands)
+    assert isinstance(plan, PosePlan) and plan.numbers.tolist() == [7, 9, 7]
+    for name in ("plan.yaml", "plan.csv"):
+        write_plan(tmp_path / name, plan)
+        again = read_plan(tmp_path / name)
+        assert isinstance(again, PosePlan) and again.numbers.tolist() == [7, 9, 7]
+        np.testing.assert_array_equal(again.q, plan.q)
+    commands.write_text("pose,q1,target\n1,0.1,smr\n2,0.2,tcp\n", "utf-8")
+    with pytest.raises(InputError, match="the poses are of several targets"):
+        read_plan(commands)
+    commands.write_text("pose,q1\n1.5,0.1\n", "utf-8")
+    with pytest.raises(InputError, match=r"line 2, column pose: 1\.5 is no whole number"):
+        read_plan(commands)
