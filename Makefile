@@ -28,11 +28,12 @@ demo: install
 	cp demo/report.html report.html
 	@echo "open report.html"
 
+# two processes, a file always in one of them: its fixtures are made once
 test: $(VENV)/.developer
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n 2 --dist loadfile
 
 test-all: $(VENV)/.developer
-	$(BIN)/python -m pytest -m ""
+	$(BIN)/python -m pytest -n 2 --dist loadfile -m ""
 
 check: $(VENV)/.developer docs
 	$(BIN)/ruff check .

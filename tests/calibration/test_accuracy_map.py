@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.calibration import (
+    ErrorScale,
     Verification,
     accuracy_map,
     error_scale,
@@ -156,6 +157,13 @@ def test_a_robot_of_which_nothing_was_estimated_has_no_map(tx90l: RobotModel) ->
         propagation(tx90l)
 
 
+def scale(
+    errors: np.ndarray, roots: np.ndarray, ambiguous: np.ndarray, noise: np.ndarray | None
+) -> ErrorScale:
+    rms = np.sqrt((roots**2).sum(axis=(1, 2)))
+    return error_scale(Verification(np.zeros_like(errors), errors, rms, ambiguous), roots, noise)
+
+
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.5])
 def test_the_interval_of_the_scale_covers_it(factor: float, rng: np.random.Generator) -> None:
     """Errors that share few parameters, drawn with a known scale: counting poses as independent would cover far less."""
@@ -164,7 +172,7 @@ def test_the_interval_of_the_scale_covers_it(factor: float, rng: np.random.Gener
     inside, verdicts, naive = 0, [], 0
     for _ in range(300):
         errors = factor * mixing @ rng.standard_normal(12) + noise * rng.standard_normal((40, 3))
-        found = error_scale(Verification(np.zeros((40, 3)), errors, mixing, np.zeros(40, dtype=bool)), noise)
+        found = scale(errors, mixing, np.zeros(40, dtype=bool), noise)
         inside += found.low <= factor <= found.high
         naive += abs(found.factor / factor - 1) < 1.96 / np.sqrt(2 * 120)
         verdicts.append(found.verdict)
@@ -178,7 +186,7 @@ def test_probabilities_are_uniform_where_the_prediction_is_right(rng: np.random.
     mixing = rng.standard_normal((2000, 3, 400))
     noise = np.abs(rng.standard_normal((2000, 3))) * 10
     errors = mixing @ rng.standard_normal(400) + noise * rng.standard_normal((2000, 3))
-    found = error_scale(Verification(np.zeros((2000, 3)), errors, mixing, np.zeros(2000, dtype=bool)), noise)
+    found = scale(errors, mixing, np.zeros(2000, dtype=bool), noise)
     shares = np.sort(found.probability)
     assert np.abs(shares - (np.arange(2000) + 0.5) / 2000).max() < 0.06
     assert found.inside == pytest.approx(0.95, abs=0.03)
@@ -188,6 +196,6 @@ def test_poses_with_an_uncertain_flank_are_left_out(rng: np.random.Generator) ->
     mixing, errors = rng.standard_normal((4, 3, 2)), rng.standard_normal((4, 3))
     errors[3] = 1e6
     unclear = np.array([False, False, False, True])
-    assert error_scale(Verification(errors, errors, mixing, unclear), None).factor < 100
+    assert scale(errors, mixing, unclear, None).factor < 100
     with pytest.raises(FlexcalError, match="1 of the 4 verification poses have a certain backlash flank"):
-        error_scale(Verification(errors, errors, mixing, np.arange(4) > 0), None)
+        scale(errors, mixing, np.arange(4) > 0, None)

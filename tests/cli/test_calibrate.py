@@ -81,8 +81,10 @@ def test_out_leaves_the_robots_folder_alone(run, ur5_folder: Path, some: Path, t
     assert snapshot(ur5_folder) == before
     assert sorted(p.name for p in out.iterdir()) == [
         ".flexcal",
+        "arm.npz",
         "estimates.npz",
         "estimates.yaml",
+        "points.csv",
         "report.html",
         "results.json",
     ]

@@ -48,7 +48,7 @@ def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None
     few = replace(
         v,
         errors=v.errors[:9],
-        roots=v.roots[:9],
+        parameter_rms=v.parameter_rms[:9],
         ambiguous=v.ambiguous[:9],
         position=v.position[:9],
     )

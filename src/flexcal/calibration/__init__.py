@@ -20,7 +20,7 @@ from flexcal.calibration.repeatability import (
 )
 from flexcal.calibration.term_selection import TermSelection, select_terms
 from flexcal.calibration.terms import geometric_parameters
-from flexcal.calibration.verification import Verification, verify
+from flexcal.calibration.verification import Verification, error_roots, verify
 
 __all__ = [
     "CYCLES",
@@ -38,6 +38,7 @@ __all__ = [
     "Verification",
     "accuracy_map",
     "calibrate",
+    "error_roots",
     "error_scale",
     "error_sources",
     "geometric_parameters",

@@ -39,8 +39,10 @@ class ErrorScale:
         return "optimistic" if self.low > 1 else "cautious" if self.high < 1 else "right"
 
 
-def error_scale(verification: Verification, noise: np.ndarray | None) -> ErrorScale:
-    """Compare the errors of a verification with their prediction; `noise` (N, 3) m is 1σ of the instrument, None where unknown.
+def error_scale(verification: Verification, roots: np.ndarray, noise: np.ndarray | None) -> ErrorScale:
+    """Compare the errors of a verification with their prediction: `roots` (N, 3, p) m as `error_roots` has them.
+
+    `noise` (N, 3) m is 1σ of the instrument, None where unknown.
 
     With the errors' covariance f² A Aᵀ + S, A the roots of all poses together and S the noise's, their squared size has the mean
     f² tr A Aᵀ + tr S, which gives f, and is taken as χ² distributed with ν = (tr V)² / tr V² degrees of freedom (Satterthwaite, 1946),
@@ -52,7 +54,7 @@ def error_scale(verification: Verification, noise: np.ndarray | None) -> ErrorSc
         raise FlexcalError(
             f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; measure two or more that have."
         )
-    roots, errors = verification.roots[clear], verification.errors[clear]
+    roots, errors = roots[clear], verification.errors[clear]
     sigma = np.zeros(errors.shape) if noise is None else noise[clear]
     stacked, spread = roots.reshape(-1, roots.shape[2]), sigma.ravel() ** 2
     gram = stacked.T @ stacked

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
-from flexcal.calibration.prediction import predict
+from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.propagation import covariance_root, moving_parameters
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
@@ -19,20 +19,15 @@ from flexcal.model import RobotModel
 class Verification:
     """Predicted and measured points of a set of poses.
 
-    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted; `roots` A (N, 3, p) m, with p independent errors of one
-    size behind all poses: A_i A_jᵀ is what the parameters' covariance says of the errors at poses i and j; noise of instrument and
-    encoders comes on top; `ambiguous` (N,) poses at which the flank of a backlash is not certain.
+    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted; `parameter_rms` (N,) m, the root mean square distance
+    error that the parameters' covariance alone predicts: noise of instrument and encoders comes on top; `ambiguous` (N,) poses at which
+    the flank of a backlash is not certain.
     """
 
     position: np.ndarray
     errors: np.ndarray
-    roots: np.ndarray
+    parameter_rms: np.ndarray
     ambiguous: np.ndarray
-
-    @property
-    def parameter_rms(self) -> np.ndarray:
-        """Root mean square distance error (N,) m that the parameters' covariance alone predicts."""
-        return np.sqrt((self.roots**2).sum(axis=(1, 2)))
 
     def expected_rms(self, noise: np.ndarray | None = None) -> np.ndarray:
         """Root mean square distance error (N,) m that is predicted, with 1σ `noise` (N, 3) m of the measured coordinates where given."""
@@ -59,6 +54,19 @@ def verify(model: RobotModel, poses: PoseSet, *, elastic: bool = True) -> Verifi
     """
     require_points(poses)
     at = predict(model, poses, elastic=elastic, jacobians=True)
+    rms = np.sqrt((_roots(model, at, elastic=elastic) ** 2).sum(axis=(1, 2)))
+    return Verification(at.position, poses.position - at.position, rms, ambiguous_poses(model, at))
+
+
+def error_roots(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """A (N, 3, p) m, with p independent errors of one size behind all poses.
+
+    A_i A_jᵀ is what the covariance of a calibrated robot's parameters says of the errors at the poses i and j. Raises `FlexcalError` as
+    `predict` does.
+    """
+    return _roots(model, predict(model, poses, jacobians=True), elastic=True)
+
+
+def _roots(model: RobotModel, at: Prediction, *, elastic: bool) -> np.ndarray:
     used = moving_parameters(model, elastic=elastic)
-    roots = at.jacobian(used) @ covariance_root(model, used)
-    return Verification(at.position, poses.position - at.position, roots, ambiguous_poses(model, at))
+    return at.jacobian(used) @ covariance_root(model, used)

@@ -16,6 +16,7 @@ from flexcal.calibration import (
     ErrorStatistics,
     PoseRepeatability,
     Verification,
+    error_roots,
     error_scale,
     repeatability,
     rigid_motion,
@@ -193,7 +194,7 @@ def certify_robot(
         _visited(visited[after][0], _laid(*visited[after])),
         len(every) - len(common),
         known,
-        error_scale(known, _noise(there)),
+        error_scale(known, error_roots(model, visited[after][0]), _noise(there)),
         _files(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},

@@ -15,6 +15,7 @@ from flexcal.calibration import (
     Propagation,
     Verification,
     accuracy_map,
+    error_roots,
     error_scale,
     error_sources,
     propagation,
@@ -195,7 +196,7 @@ def _verified(
     poses = verification_poses(calibrated, files)
     found = verify(calibrated.model, poses)
     noise = poses.sigma if poses.sigma_given else None
-    return error_scale(found, noise), (found, noise)
+    return error_scale(found, error_roots(calibrated.model, poses), noise), (found, noise)
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:
