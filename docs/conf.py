@@ -1,18 +1,43 @@
 """Sphinx configuration."""
 
+import hashlib
+import os
 import re
 from importlib.metadata import version as installed_version
+from pathlib import Path
 
+import plotly
 from sphinx.application import Sphinx
+
+HERE = Path(__file__).parent
 
 project = "flexcal"
 author = "The flexcal developers"
 copyright = "The flexcal developers, Apache-2.0"
 version = release = installed_version("flexcal")
 
-extensions = ["myst_parser", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
+
+
+
+def fingerprint() -> str:
+    """Of everything that the notebooks run, so that none keeps numbers of an older flexcal."""
+    digest = hashlib.sha256()
+    for folder in ("src", "kernels", "examples"):
+        for file in sorted((HERE.parent / folder).rglob("*")):
+            if file.is_file() and "__pycache__" not in file.parts:
+                digest.update(str(file).encode() + file.read_bytes())
+    return digest.hexdigest()[:16]
+
+
+nb_execution_mode = "cache"
+nb_execution_cache_path = str(HERE.parent / "build" / "notebooks" / fingerprint())
+nb_execution_timeout = 120
+nb_execution_raise_on_error = True
+nb_merge_streams = True
+os.environ["PYTHONSTARTUP"] = str(HERE / "figures.py")  # the kernels inherit it
 
 autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
@@ -25,6 +50,8 @@ MARKUP = re.compile(r"([\\*`|_<>:\[\]]|^[^\w\s])")
 
 html_theme = "furo"
 html_title = "flexcal"
+html_static_path = ["_static", str(Path(plotly.__file__).parent / "package_data" / "plotly.min.js")]
+html_js_files = ["figures.js"]
 exclude_patterns = ["README.md"]
 
 
