@@ -34,7 +34,7 @@ def fingerprint() -> str:
 
 nb_execution_mode = "cache"
 nb_execution_cache_path = str(HERE.parent / "build" / "notebooks" / fingerprint())
-nb_execution_timeout = 120
+nb_execution_timeout = 300  # seconds a cell, on a busy machine
 nb_execution_raise_on_error = True
 nb_merge_streams = True
 os.environ["PYTHONSTARTUP"] = str(HERE / "figures.py")  # the kernels inherit it
