@@ -21,7 +21,6 @@ myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 
 
-
 def fingerprint() -> str:
     """Of everything that the notebooks run, so that none keeps numbers of an older flexcal."""
     digest = hashlib.sha256()
@@ -52,6 +51,7 @@ html_theme = "furo"
 html_title = "flexcal"
 html_static_path = ["_static", str(Path(plotly.__file__).parent / "package_data" / "plotly.min.js")]
 html_js_files = ["figures.js"]
+html_css_files = ["notebooks.css"]
 exclude_patterns = ["README.md"]
 
 

@@ -1,7 +1,5 @@
 """Run in every notebook's kernel before its first cell: figures become data in the page, which `_static/figures.js` draws."""
 
-import json
-
 from plotly import io
 from plotly.io.base_renderers import MimetypeRenderer
 

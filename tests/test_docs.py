@@ -2,18 +2,30 @@
 
 from __future__ import annotations
 
+import ast
+import importlib
+import json
+import pkgutil
 import re
+import shlex
+import shutil
+from inspect import isclass, isroutine
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
+import polars as pl
 import pytest
 
+import flexcal
+from flexcal.cli.main import main
 from flexcal.dynamics.drive_gains import gain_name
 from flexcal.elasticity import stage_one_parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.frequency.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
+from flexcal.report import figures
 
 NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15}
 
@@ -99,3 +111,84 @@ def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
     page = (root / "docs" / "command-line.md").read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("| `flexcal ")]
     assert rows == [f"| `{verb.example}` | {verb.summary} |" for verb in VERBS]
+
+
+@pytest.fixture(scope="module")
+def api(root: Path) -> str:
+    return (root / "docs" / "api.md").read_text(encoding="utf-8")
+
+
+def listed(api: str, directive: str) -> set[str]:
+    return set(re.findall(rf"^\.\. {directive}:: (\S+)$", api, flags=re.MULTILINE))
+
+
+def packages_within(package: ModuleType) -> list[ModuleType]:
+    found = pkgutil.iter_modules(package.__path__, f"{package.__name__}.")
+    return [importlib.import_module(module.name) for module in found if module.ispkg]
+
+
+def test_every_public_name_is_in_the_library_page(api: str) -> None:
+    """Of what a package's `__all__` names, autodoc writes out classes and functions, and silently leaves out the rest."""
+    packages = [package for package in packages_within(flexcal) if package.__name__ != "flexcal.cli"]
+    assert listed(api, "automodule") == {"flexcal.errors"} | {package.__name__ for package in packages}
+    for package in packages:
+        objects = {name: getattr(package, name) for name in getattr(package, "__all__", ())}
+        data = {name for name, value in objects.items() if not isclass(value) and not isroutine(value)}
+        assert {f"{package.__name__}.{name}" for name in data} <= listed(api, "autodata")
+    assert [name for name in flexcal.__all__ if f"`{name}`" not in api] == []
+
+
+def test_every_figure_is_in_the_library_page(api: str) -> None:
+    modules = [module.name for module in pkgutil.iter_modules(figures.__path__)]
+    assert {f"flexcal.report.figures.{name}.{name}" for name in modules} <= listed(api, "autofunction")
+
+
+def test_notebooks_use_public_names_only(root: Path, api: str) -> None:
+    notebooks = sorted((root / "docs" / "examples").glob("*.md"))
+    assert {page.stem for page in notebooks} == {
+        folder.name for folder in (root / "examples").iterdir() if folder.is_dir()
+    }
+    apart = listed(api, "auto(?:function|class|data)")
+    for page in notebooks:
+        cells = blocks(page.read_text(encoding="utf-8"), r"\{code-cell\} python")
+        imports = [
+            node for cell in cells for node in ast.walk(ast.parse(cell)) if isinstance(node, ast.ImportFrom)
+        ]
+        for node in imports:
+            if node.module is None or not node.module.startswith("flexcal"):
+                continue
+            public = getattr(importlib.import_module(node.module), "__all__", ())
+            for name in (alias.name for alias in node.names):
+                assert name in public or f"{node.module}.{name}" in apart, (
+                    f"{page.name}: {node.module}.{name}"
+                )
+
+
+def blocks(text: str, language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", text, flags=re.MULTILINE | re.DOTALL)
+
+
+def test_own_data_take_four_commands(
+    root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, ur5: RobotModel
+) -> None:
+    """Those of the page, in order, with the UR5's data under the names that it uses."""
+    text = (root / "docs" / "start.md").read_text(encoding="utf-8")
+    (robot,) = blocks(text, "yaml")
+    commands = blocks(text, "sh")[-1].splitlines()
+    monkeypatch.chdir(tmp_path)
+    Path("robot.yaml").write_text(robot, encoding="utf-8")
+    shutil.copy(ur5.urdf, "my_robot.urdf")
+    data = root / "examples" / "ur5_tracker"
+    pl.read_csv(data / "grid.csv").gather_every(7).write_csv("poses.csv")
+    others = pl.read_csv(data / "random.csv")
+    others.write_csv("others.csv")
+    others.select("pose", *(f"q{i}" for i in range(1, 7))).write_csv("targets.csv")
+    assert len(commands) == 4
+    for command in commands:
+        program, *arguments = shlex.split(command)
+        assert program == "flexcal" and main(arguments) == 0, command
+    found = json.loads(Path("verification/results.json").read_text(encoding="utf-8"))
+    assert found["verification"]["measured"]["mean_mm"] < 0.2 < found["verification"]["nominal"]["mean_mm"]
+    assert Path("calibration/report.html").exists() and Path("verification/report.html").exists()
+    assert len(pl.read_csv("commands.csv")) == len(others)
+    assert 'link name="reflector"' in Path("calibrated.urdf").read_text(encoding="utf-8")
