@@ -1,6 +1,7 @@
 """Sphinx configuration."""
 
 import hashlib
+import logging
 import os
 import re
 from importlib.metadata import version as installed_version
@@ -23,7 +24,7 @@ myst_heading_anchors = 3
 
 def fingerprint() -> str:
     """Of everything that the notebooks run, so that none keeps numbers of an older flexcal."""
-    digest = hashlib.sha256()
+    digest = hashlib.sha256((HERE / "figures.py").read_bytes())
     for folder in ("src", "kernels", "examples"):
         for file in sorted((HERE.parent / folder).rglob("*")):
             if file.is_file() and "__pycache__" not in file.parts:
@@ -36,7 +37,14 @@ nb_execution_cache_path = str(HERE.parent / "build" / "notebooks" / fingerprint(
 nb_execution_timeout = 300  # seconds a cell, on a busy machine
 nb_execution_raise_on_error = True
 nb_merge_streams = True
-os.environ["PYTHONSTARTUP"] = str(HERE / "figures.py")  # the kernels inherit it
+
+# Kernels inherit these: nothing of the user's own Jupyter is read or written, and figures find their way into the page.
+KERNELS = HERE.parent / "build" / "kernels"
+(KERNELS / "profile_default").mkdir(parents=True, exist_ok=True)
+(KERNELS / "profile_default" / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
+os.environ["IPYTHONDIR"] = os.environ["JUPYTER_DATA_DIR"] = str(KERNELS)
+os.environ["PYTHONSTARTUP"] = str(HERE / "figures.py")
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 autodoc_default_options = {"members": True}
 autodoc_member_order = "bysource"
