@@ -121,6 +121,12 @@ def listed(api: str, directive: str) -> set[str]:
     return set(re.findall(rf"^\.\. {directive}:: (\S+)$", api, flags=re.MULTILINE))
 
 
+def listed_data(api: str) -> set[tuple[str, str]]:
+    """Module and name of what is neither class nor function."""
+    found = re.findall(r"^\.\. py:data:: (\w+)\n   :module: (\S+)$", api, flags=re.MULTILINE)
+    return {(module, name) for name, module in found}
+
+
 def packages_within(package: ModuleType) -> list[ModuleType]:
     found = pkgutil.iter_modules(package.__path__, f"{package.__name__}.")
     return [importlib.import_module(module.name) for module in found if module.ispkg]
@@ -133,8 +139,8 @@ def test_every_public_name_is_in_the_library_page(api: str) -> None:
     for package in packages:
         objects = {name: getattr(package, name) for name in getattr(package, "__all__", ())}
         data = {name for name, value in objects.items() if not isclass(value) and not isroutine(value)}
-        assert {f"{package.__name__}.{name}" for name in data} <= listed(api, "py:data")
-    for module, _, name in (entry.rpartition(".") for entry in listed(api, "py:data")):
+        assert {(package.__name__, name) for name in data} <= listed_data(api)
+    for module, name in listed_data(api):
         assert hasattr(importlib.import_module(module), name)
     assert [name for name in flexcal.__all__ if f"`{name}`" not in api] == []
 
@@ -150,7 +156,8 @@ def test_notebooks_use_public_names_only(root: Path, api: str) -> None:
     assert {page.stem for page in notebooks} == {
         folder.name for folder in (root / "examples").iterdir() if folder.is_dir()
     }
-    apart = listed(api, "auto(?:function|class)") | listed(api, "py:data")
+    whole = listed(api, "automodule")
+    apart = listed(api, "auto(?:function|class)") | {f"{module}.{name}" for module, name in listed_data(api)}
     for page in notebooks:
         cells = blocks(page.read_text(encoding="utf-8"), r"\{code-cell\} python")
         imports = [
@@ -159,7 +166,7 @@ def test_notebooks_use_public_names_only(root: Path, api: str) -> None:
         for node in imports:
             if node.module is None or not node.module.startswith("flexcal"):
                 continue
-            public = getattr(importlib.import_module(node.module), "__all__", ())
+            public = importlib.import_module(node.module).__all__ if node.module in whole else ()
             for name in (alias.name for alias in node.names):
                 assert name in public or f"{node.module}.{name}" in apart, (
                     f"{page.name}: {node.module}.{name}"
