@@ -13,8 +13,8 @@ from flexcal.calibration import AccuracyMap, ErrorScale, Verification
 from flexcal.model import RobotModel
 from flexcal.report.figures.accuracy_space import SHOWN, accuracy_space
 from flexcal.report.figures.accuracy_views import accuracy_views
-from flexcal.report.figures.error_sources import error_sources_figure
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
+from flexcal.report.figures.variance_shares import variance_shares
 from flexcal.report.notation import millimetres, scaled, significant
 from flexcal.report.page import (
     Block,
@@ -196,7 +196,7 @@ def _sources(study: MapStudy) -> Section:
     block = FigureBlock(
         "figure-sources",
         "What the error comes from",
-        error_sources_figure(results["sources"], results["worst"][0]["sources"]),
+        variance_shares(results["sources"], results["worst"][0]["sources"]),
         "By how much of itself the variance of the error would fall if all parameters of a kind were known exactly. Kinds that are "
         "correlated share, so the bars need not add up to 100 %. To bring the longest bar down, measure more poses, or better ones: "
         "flexcal design poses.",

@@ -10,7 +10,7 @@ from flexcal.report.figures.canvas import canvas
 from flexcal.report.palette import ELASTIC, RIGID
 
 
-def error_sources_figure(over_all: Mapping[str, float], worst: Mapping[str, float]) -> go.Figure:
+def variance_shares(over_all: Mapping[str, float], worst: Mapping[str, float]) -> go.Figure:
     """Shares of the variance (0 to 1) that knowing a kind of parameter would take away, over all poses and at the worst place."""
     figure = canvas(90 + 44 * len(over_all))
     for label, shares, colour in (
