@@ -28,7 +28,7 @@ def arm_side_logs(examples: Path) -> ArmSideLogs:
     ) -> tuple[Path, list[Path]]:
         text = (examples / "tx90l" / "robot.yaml").read_text()
         lines = [line for line in text.splitlines() if not line.startswith(("payload:", "dynamics:"))]
-        lines.append("dynamics: {friction: classic, cutoff_hz: 100, decimation: 200, tau: held}")
+        lines.append("dynamics: {friction: classic, decimation: 200, tau: held}")
         robot = folder / "robot.yaml"
         robot.write_text("\n".join(lines) + "\n")
         (folder / "tx90l.urdf").write_text((examples / "tx90l" / "tx90l.urdf").read_text())

@@ -71,7 +71,7 @@ def identify_robot_dynamics(
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
     springs = drive_springs(model, [*logs, *validate], estimator) if flexible else ()
-    treatment = treatment_of(model, logs)
+    treatment = treatment_of(model, logs, flexible=flexible)
 
     with TemporaryDirectory(prefix="flexcal_") as folder:
         divided = DividedLogs.read(

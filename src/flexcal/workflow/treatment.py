@@ -15,6 +15,8 @@ _PASSED = 20.0
 """Cut-off, and rows a second, over the bandwidth of the motion: ten times twice of it, as products of two velocities reach twice as far."""
 _HIGHEST = 0.4
 """Cut-off over the sampling rate, at most."""
+_REVERSALS = 0.1
+"""Cut-off over the sampling rate, at least, where springs are identified."""
 
 
 @dataclass(frozen=True)
@@ -27,11 +29,12 @@ class Treatment:
     proposed: tuple[str, ...] = ()
 
 
-def treatment_of(model: RobotModel, logs: Sequence[Path]) -> Treatment:
+def treatment_of(model: RobotModel, logs: Sequence[Path], *, flexible: bool = False) -> Treatment:
     """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
 
-    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities. Raises `InputError` where a log that is
-    needed for it shows no motion.
+    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities. For `flexible` drives it is a tenth of the
+    sampling rate, where that is more: a low-pass sees the motor reverse late, as its Coulomb friction brakes it before and after, and what
+    friction then lacks looks like more stiffness. Raises `InputError` where a log that is needed for it shows no motion.
     """
     declared = model.config.dynamics
     if declared.cutoff_hz is not None and declared.decimation is not None:
@@ -44,9 +47,10 @@ def treatment_of(model: RobotModel, logs: Sequence[Path]) -> Treatment:
             )
     rate = min(motion.rate_hz for motion in found)
     wanted = min(_PASSED * max(motion.frequency_hz for motion in found), _HIGHEST * rate)
+    cutoff = max(wanted, _REVERSALS * rate) if flexible else wanted
     proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
     return Treatment(
-        float(f"{wanted:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
+        float(f"{cutoff:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
         Decimation.near(rate / wanted) if declared.decimation is None else Decimation(declared.decimation),
         declared.mask_standstill,
         proposed,
