@@ -28,6 +28,7 @@ TEXTS = {
     "tabs.txt": "Nr\ta\tb\n1\t-12.5\t0.001\n2\t3.25\t7\n3\t4e-7\t8.125\n\n",
     "spaces.dat": "Nr    a   b\n 1  -12.5  0.001\n 2  3.25   7\n 3  4e-7  8.125\n",
     "notes.csv": "# made today\nReport, of three\n\nNr,a,b\n[-],[deg],[mm]\n1,-12.5,0.001\n2,3.25,7\n3,4e-7,8.125\n",
+    "protocol.csv": "Protokoll;;\nDatum: 03.11.2026;\nBediener: A, B\nNr;a;b\n1;-12,5;0,001\n2;3,25;7\n3;4e-7;8,125\n",
     "quoted.csv": '"Nr","a","b"\r\n"1","-12.5","0.001"\r\n"2","3.25","7"\r\n"3","4e-7","8.125"\r\n',
 }
 
@@ -50,6 +51,18 @@ def test_text(tmp_path: Path, name: str) -> None:
     assert foreign.table.first == line
     if name == "notes.csv":
         assert foreign.units == {"Nr": "[-]", "a": "[deg]", "b": "[mm]"}
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [(3, "line 4: there are 2 values, but 3 columns"), (5, "line 6: there are 2 values, but 3 columns")],
+)
+def test_the_one_row_of_another_length_is_named(tmp_path: Path, wrong: int, words: str) -> None:
+    lines = ["Nr;a;b", *(f"{i};{i},5;0,25" for i in range(1, 6))]
+    lines[wrong] = lines[wrong].rsplit(";", 1)[0]
+    (tmp_path / "a.csv").write_text("\n".join(lines))
+    with pytest.raises(InputError, match=words):
+        read(tmp_path / "a.csv")
 
 
 @pytest.mark.parametrize(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -22,14 +23,16 @@ _LOOKED_AT = 200
 def read_text(path: Path) -> ForeignTable:
     """Read a table of text; raises `InputError` where it is empty or its rows have different lengths.
 
-    The separator is the first of tab, semicolon, comma and space that splits the last rows into as many cells each.
+    The separator is the first of tab, semicolon, comma and space that splits the rows of the second half into as many cells each, else
+    most of them.
     """
     lines = _decoded(path).splitlines()
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
         raise InputError(f"{path} line 1: the file is empty; it needs a header and rows.")
-    last = [line for line in lines[-_LOOKED_AT:] if line.strip() and not line.startswith("#")][1:] or lines
+    half = lines[len(lines) // 2 :][-_LOOKED_AT:]
+    last = [line for line in half if line.strip() and not line.startswith("#")] or lines
     separator, width = _separator(path, last)
     header = find_header(path, [_cells(line, separator) for line in lines[:_LOOKED_AT]], width, "line")
     body = lines[header.first :]
@@ -96,10 +99,11 @@ def _cells(line: str, separator: str) -> list[str]:
 
 
 def _separator(path: Path, rows: Sequence[str]) -> tuple[str, int]:
-    for separator in _SEPARATORS:
-        widths = {len(_cells(row, separator)) for row in rows}
-        if len(widths) == 1 and (width := widths.pop()) > 1:
-            return separator, width
+    for share in (1.0, 0.5):
+        for separator in _SEPARATORS:
+            (width, count), *_ = Counter(len(_cells(row, separator)) for row in rows).most_common(1)
+            if width > 1 and count >= share * len(rows):
+                return separator, width
     raise InputError(
         f"{path}: its last rows are not separated into as many values each by commas, semicolons, tabs or spaces; "
         "export it again as CSV."
