@@ -102,7 +102,7 @@ def test_map_of_given_poses(run, ur5: Path) -> None:
         (["--working", "nowhere.csv"], "nowhere.csv cannot be read"),
         (["--count", "0"], "--count is 0; it must be at least 1"),
         (["--payload", "2"], "robot.yaml declares none"),
-        (["--verification", "targets.csv"], "the column 'x' is missing"),
+        (["--verification", "targets.csv"], "no measured points x, y, z"),
         (["--estimates", "elsewhere"], "elsewhere does not exist"),
     ],
 )

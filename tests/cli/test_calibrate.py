@@ -193,7 +193,9 @@ def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: P
     header, rows = read_csv(some)
     rows[:, header.index("q4")] *= -1
     write_csv(some, header, rows)
-    remarks = " ".join(run("calibrate", robot, some, *arguments).document["remarks"])
+    wrong = run("calibrate", robot, some, *arguments)
+    assert "flexcal verify" not in wrong.err and f"flexcal import {robot} {some} looks for it" in wrong.err
+    remarks = " ".join(wrong.document["remarks"])
     assert "implausibly far" in remarks and "wrist_1_joint.misalignment_" in remarks
     assert remarks.count("look for a column with a wrong sign") == 1
 

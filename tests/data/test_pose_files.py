@@ -117,7 +117,9 @@ def test_defaults(tmp_path: Path, robot: Any) -> None:
     [
         ("pose,q1,q2,x,y", GOOD, ["line 1", "'z'", "is missing"]),
         ("q1,q2,x,y,z", GOOD, ["line 1", "'pose'", "is missing"]),
-        ("pose,q1,q2", GOOD, ["line 1", "'x'", "is missing"]),
+        ("pose,q1,q2", GOOD, ["line 1", "no measured points x, y, z", "flexcal import"]),
+        ("Nr,J1,J2,X,Y,Z", GOOD, ["line 1", "no column pose, nor q1 … q2", "flexcal import"]),
+        ("Nr;J1;J2;X;Y;Z", GOOD, ["line 1", "not separated by commas", "flexcal import"]),
         (HEADER + ",colour", GOOD, ["line 1", "'colour' is not known"]),
         (HEADER + ",sigm_x", GOOD, ["line 1", "'sigm_x' is not known", "did you mean 'sigma_x'?"]),
         (HEADER + ",sigma_x", GOOD, ["line 1", "'sigma_y'", "is missing"]),

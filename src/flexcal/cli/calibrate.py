@@ -48,6 +48,7 @@ class Calibrate:
         """Calibrate, and print what was found."""
         from flexcal.cli.tables import dropped_table, error_table, weak_table
         from flexcal.workflow.calibrate_robot import calibrate_robot
+        from flexcal.workflow.calibration_remarks import hardly_fits
 
         require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
@@ -89,7 +90,11 @@ class Calibrate:
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        console.finish(
-            document,
-            f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw (flexcal design poses --random plans some)",
+        following = (
+            f"put right what is wrong in the data or in {self.robot}, and calibrate again; "
+            f"flexcal import {self.robot} {self.poses[0]} looks for it"
+            if hardly_fits(found.selected)
+            else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw "
+            "(flexcal design poses --random plans some)"
         )
+        console.finish(document, following)

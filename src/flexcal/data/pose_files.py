@@ -108,6 +108,7 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
     file = open_table(path)
     texts = tuple(name for name in _TEXTS if name in file.columns)
     place = _place(file, model)
+    _check_measured(file, model, place)
     signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)
     if "sigma" in signals and "sigma_xyz" in signals:
         raise file.error("sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
@@ -152,6 +153,24 @@ def _place(file: TableFile, model: RobotModel) -> str:
     if wire and {"x", "y", "z"} & set(file.columns):
         raise file.error("there are both 'length' and x, y, z; keep the columns of one instrument.")
     return "length" if wire else "xyz"
+
+
+def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
+    """Raise `InputError` where a file is evidently another program's, or a plan that is still to be measured."""
+
+    def there(quantity: str) -> bool:
+        mapped = model.config.signals
+        named = mapped[quantity].columns if quantity in mapped else ()
+        return not {*standard_columns(quantity, model.n), *named}.isdisjoint(file.columns)
+
+    if not there("q") and "pose" not in file.columns:
+        raise file.error(
+            f"there is no column pose, nor q1 … q{model.n}; 'flexcal import' makes such a file of one with other columns."
+        )
+    if there("q") and not there(place):
+        raise file.error(
+            "there are joint positions, but no measured points x, y, z; measure there, and bring what was measured with 'flexcal import'."
+        )
 
 
 def _first_station(model: RobotModel) -> str:

@@ -177,7 +177,7 @@ def _csv_header(path: Path, stream: BinaryIO) -> tuple[tuple[str, ...], int]:
         names = tuple(name.strip() for name in next(csv.reader([text])))
         if len(names) == 1 and any(mark in text for mark in ";\t"):
             raise InputError(
-                f"{path} line {number}: the columns are not separated by commas; save the file with commas."
+                f"{path} line {number}: the columns are not separated by commas; save it with commas, or let 'flexcal import' read it."
             )
         if all(_is_number(name) for name in names):
             raise InputError(
@@ -195,7 +195,9 @@ def _decoded(path: Path, raw: bytes, line: int) -> str:
     try:
         return raw.decode("utf-8")
     except UnicodeDecodeError as problem:
-        raise InputError(f"{path} line {line}: not UTF-8 text; save the file as UTF-8.") from problem
+        raise InputError(
+            f"{path} line {line}: not UTF-8 text; save the file as UTF-8, or let 'flexcal import' read it."
+        ) from problem
 
 
 def _whole_lines(stream: BinaryIO, size: int | None) -> Iterator[bytes]:

@@ -63,11 +63,16 @@ def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
         more = f" and {len(far) - _SHOWN} others" if len(far) > _SHOWN else ""
         remarks.append(f"implausibly far from where the fit began: {', '.join(named)}{more}")
-    if far or _noise_is_absurd(fit):
+    if hardly_fits(fit):
         remarks.append(_LOOK)
     if not fit.estimate.converged:
         remarks.append(f"the fit has not converged ({fit.estimate.status}); do not trust it")
     return tuple(remarks)
+
+
+def hardly_fits(fit: Calibration) -> bool:
+    """Whether data and robot can hardly belong together, so that nothing should be built on the fit."""
+    return bool(moved_far(fit)) or _noise_is_absurd(fit)
 
 
 def _nominal_springs(fit: Calibration) -> Sequence[str]:
