@@ -103,7 +103,27 @@ def test_points_that_are_left_out_are_named(run, ur5_folder: Path, foreign: Path
     foreign.write_text(foreign.read_text().replace("tracker y", "remark"))
     outcome = run("import", ur5_folder / "robot.yaml", foreign)
     assert outcome.status == 0 and "joint positions" in outcome.out
-    assert "left out: tracker x, remark, tracker z: not recognised" in outcome.out
+    assert "left out: tracker x, tracker z: no y was recognised beside them" in outcome.out
+    assert "left out: remark: not recognised" in outcome.out
+
+
+def test_the_instruments_noise_is_stated_where_the_file_does_not(run, ur5_folder: Path) -> None:
+    robot, grid, out = ur5_folder / "robot.yaml", ur5_folder / "grid.csv", ur5_folder / "poses.csv"
+    plan = write_csv(ur5_folder / "plan.csv", ["pose", *(f"q{i}" for i in range(1, 7))], np.eye(7))
+    assert "say it with --sigma MM" in run("import", robot, grid).out
+    page = run("import", robot, grid, "--sigma", "0.03", "--out", out)
+    assert page.status == 0 and "say it with" not in page.out
+    poses = read_poses(out, RobotModel.from_yaml(robot, estimates=False))
+    assert poses.sigma_given
+    np.testing.assert_allclose(poses.sigma, 3e-5)
+    for file, sigma, words in (
+        (out, "0.03", "says sigma itself"),
+        (grid, "0", "must be positive"),
+        (grid, "nan", "must be positive"),
+        (plan, "0.03", "has none"),
+    ):
+        refused = run("import", robot, file, "--sigma", sigma)
+        assert refused.status == 2 and words in refused.err and refused.err.count("\n") == 1
 
 
 def test_one_wild_value_is_named_with_its_line(run, ur5_folder: Path) -> None:

@@ -20,6 +20,7 @@ HEADERS = [
     ("Nr|Achse * [Grad]|X_ist|Y_ist|Z_ist|X_soll|Y_soll|Z_soll", {"pose": "Nr", "q": "Achse 1 [Grad]", "xyz": "X_ist"}),
     ("Point|Joint * (deg)|Measured X [mm]|Measured Y [mm]|Measured Z [mm]|Nominal X [mm]|Nominal Y [mm]|Nominal Z [mm]",
      {"pose": "Point", "q": "Joint 1 (deg)", "xyz": "Measured X [mm]"}),
+    ("Punktnr|Achse * [°]|X-Ist (mm)|Y-Ist (mm)|Z-Ist (mm)", {"pose": "Punktnr", "q": "Achse 1 [°]", "xyz": "X-Ist (mm)"}),
     ("t|q*|dq*|tau*|qa*|tau_ext*", {"t": "t", "q": "q1", "dq": "dq1", "tau": "tau1", "qa": "qa1", "tau_ext": "tau_ext1"}),
     ("Time [s]|J* [deg]|V* [deg/s]|M* [Nm]", {"t": "Time [s]", "q": "J1 [deg]", "dq": "V1 [deg/s]", "tau": "M1 [Nm]"}),
     ("shoulder_pan_joint [deg]|shoulder_lift_joint [deg]|elbow_joint [deg]|wrist_1_joint [deg]|wrist_2_joint [deg]|wrist_3_joint [deg]",
@@ -52,7 +53,7 @@ def written_out(header: str) -> list[str]:
 def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
     header = written_out(header)
     columns = {name: rng.uniform(-2, 2, 30) for name in header}
-    columns |= {name: np.arange(30.0) for name in ("pose", "Nr", "Point") if name in header}
+    columns |= {name: np.arange(30.0) for name in ("pose", "Nr", "Punktnr", "Point") if name in header}
     guess = guess_columns(made(columns), ur5)
     assert {quantity: placed.columns[0] for quantity, placed in guess.placed.items()} == expected
     used = [column for placed in guess.placed.values() for column in placed.columns]

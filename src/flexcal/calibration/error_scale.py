@@ -35,8 +35,12 @@ class ErrorScale:
 
     @property
     def verdict(self) -> str:
-        """Whether the prediction is "optimistic", "cautious", or "right" within chance."""
-        return "optimistic" if self.low > 1 else "cautious" if self.high < 1 else "right"
+        """Whether the prediction is "optimistic", "cautious", or "right" within chance; "unknown" where noise that is not known may be
+        what makes errors larger.
+        """
+        if self.low > 1:
+            return "optimistic" if self.noise_known else "unknown"
+        return "cautious" if self.high < 1 else "right"
 
 
 def error_scale(verification: Verification, roots: np.ndarray, noise: np.ndarray | None) -> ErrorScale:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Optional
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybePath, Robot, Texts, require_robot
+from flexcal.cli.options import Json, MaybeNumber, MaybePath, Robot, Texts, require_robot
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
 
@@ -37,6 +37,10 @@ class Import:
     """What columns are, over the guess: q2=-J2[deg]+90 x=X[mm] tau1=12.5*I1[A] temperature=none, in quotes where there are spaces."""
     out: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show the guess)")] = None
     """The file to write, CSV or Parquet."""
+    sigma: Annotated[
+        MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as the file says, else unknown)")
+    ] = None
+    """The instrument's 1σ a coordinate, mm, for a file that does not say it."""
     sheet: Annotated[
         Optional[str],  # noqa: UP045
         arg(metavar="NAME", help_behavior_hint="(default: the first)"),
@@ -66,6 +70,7 @@ class Import:
             self.file,
             mapped=self.map,
             out=self.out,
+            sigma=None if self.sigma is None else self.sigma * MILLIMETRE,
             sheet=self.sheet,
             topic=self.topic,
             unchecked=self.unchecked,

@@ -43,11 +43,10 @@ def first_rows_table(found: ImportedFile) -> Table:
                 *_first(found, name),
                 placed.why if not i else "″",
             )
+    given = {"pose": "rows are numbered", "sigma": "--sigma"}
     for name in found.columns:
         if name not in listed:
-            table.add_row(
-                name, "", "", *_first(found, name), "rows are numbered" if name == "pose" else "its name"
-            )
+            table.add_row(name, "", "", *_first(found, name), given.get(name, "its name"))
     return table
 
 

@@ -89,5 +89,6 @@ class Map:
 _VERDICTS = {
     "right": "the prediction holds",
     "optimistic": "it was too optimistic, and the map is larger by this factor",
+    "unknown": "the instrument's noise is in them, so they judge nothing; the map is larger by this factor all the same",
     "cautious": "it is cautious, and the map was left as it is",
 }

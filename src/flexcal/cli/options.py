@@ -13,7 +13,8 @@ from flexcal.errors import InputError
 
 MaybePath = Optional[Path]  # noqa: UP045
 MaybeText = Optional[str]  # noqa: UP045
-"""Of `Path | None` tyro would ask a type checker, which takes longer to load than some fits; not so of this, nor of `Paths` below."""
+MaybeNumber = Optional[float]  # noqa: UP045
+"""Of `Path | None` tyro would ask a type checker, which takes longer to load than some fits; not so of these, nor of `Paths` below."""
 Robot = Annotated[Positional[Path], arg(metavar="ROBOT", help="robot.yaml")]
 
 

@@ -42,7 +42,11 @@ class Verify:
         rows = {label: blocks[key] for key, label in labels.items() if key in blocks}
         console.show(error_table("distance to the measured points", rows))
         rms = document["rms_mm"]
-        noise = "" if rms["expected"] is None else f", {rms['expected']:.3f} mm with the instrument's sigma"
+        noise = (
+            ", without the instrument's noise, which the files do not state"
+            if rms["expected"] is None
+            else f", {rms['expected']:.3f} mm with the instrument's sigma"
+        )
         console.say(
             f"root mean square: {rms['measured']:.3f} mm; the parameters' uncertainty predicts {rms['parameters']:.3f} mm{noise}"
         )

@@ -136,6 +136,14 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
                 reasons |= dict.fromkeys(
                     of_it[rest].values(), f"{found[quantity][0]} … are taken as {quantity}"
                 )
+        else:
+            for axes in of_it.values():
+                missing = " and ".join(axis for axis in wanted if axis not in axes)
+                reasons |= (
+                    dict.fromkeys(axes.values(), f"no {missing} was recognised beside them")
+                    if len(axes) > 1
+                    else {}
+                )
     return found
 
 

@@ -29,7 +29,9 @@ TURN = _words("orientation quaternion quat rotation rot")
 SIGMA = _words("sigma σ std sd uncertainty stddev")
 SINGLE = {
     "t": _words("t time timestamp stamp zeit seconds secs"),
-    "pose": _words("pose poses no nr id number index idx measurement point punkt sample row"),
+    "pose": _words(
+        "pose poses no nr id number index idx measurement point punkt punktnr messpunkt nummer lfd sample row"
+    ),
     "payload": _words("payload load"),
     "temperature": _words("temperature temp temperatur"),
     "length": _words("length wire distance"),

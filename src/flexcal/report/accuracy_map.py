@@ -108,9 +108,10 @@ def _checks(study: MapStudy) -> tuple[Check, ...]:
     said = {
         "right": f"Yes. {said}",
         "optimistic": f"No, it was too optimistic. {said} All numbers here are multiplied by {scale.factor:.2f}.",
+        "unknown": f"Not known: the instrument's noise is in the errors. {said} All numbers here are multiplied by {scale.factor:.2f}.",
         "cautious": f"It is cautious. {said} The numbers here were left as they are.",
     }[scale.verdict]
-    checks = [Check(question, said, "care" if scale.verdict == "optimistic" else "good")]
+    checks = [Check(question, said, "care" if scale.low > 1 else "good")]
     if fitted := study.results["verification"]["fitted"]:
         answer = f"No: it was fitted to {' and '.join(fitted)}. Verify on poses that it never saw."
         checks.append(Check("Were these poses unknown to the calibration?", answer, "bad"))
@@ -118,7 +119,7 @@ def _checks(study: MapStudy) -> tuple[Check, ...]:
         checks.append(
             Check(
                 "Is the instrument's noise known?",
-                "No: the files state no sigma, so it counts as the robot's.",
+                "No: the files state no sigma, so it counts as the robot's. State it with flexcal import --sigma.",
                 "care",
             )
         )

@@ -103,11 +103,13 @@ def _judgement(results: Mapping[str, Any]) -> str:
     words = {
         "right": "The predicted uncertainty holds.",
         "optimistic": "The predicted uncertainty was too small.",
+        "unknown": "It cannot be judged: the instrument's noise is not known, and is in these numbers.",
         "cautious": "The predicted uncertainty was larger than needed.",
     }[found["verdict"]]
+    beyond = "" if found["verdict"] == "unknown" else "beyond what measurements scatter, "
     return (
         f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % "
-        f"of them; beyond what measurements scatter, errors are {found['factor']:.2f} times as large as the calibration predicts (95 % "
+        f"of them; {beyond}errors are {found['factor']:.2f} times as large as the calibration predicts (95 % "
         f"interval {found['low']:.2f} to {found['high']:.2f})."
     )
 

@@ -110,7 +110,9 @@ class RobotCertificate:
                 f"the calibration was fitted to {' and '.join(self.fitted)}, so this says little about other targets"
             )
         if not self.after.poses.sigma_given and self.after.visits is None:
-            remarks.append("the files state no sigma, so the instrument's noise counts as the robot's")
+            remarks.append(
+                "the files state no sigma, so the instrument's noise counts as the robot's; 'flexcal import --sigma' states it"
+            )
         return tuple(remarks)
 
     def document(self) -> dict[str, Any]:

@@ -104,14 +104,16 @@ def import_file(
     *,
     mapped: Sequence[str] = (),
     out: Path | None = None,
+    sigma: float | None = None,
     sheet: str | None = None,
     topic: str | None = None,
     unchecked: bool = False,
 ) -> ImportedFile:
     """Recognise the columns of `file`, with `mapped` over the guess, and write them as flexcal has them to `out`.
 
-    Nothing is written without `out`, nor, unless `unchecked`, where the nominal robot cannot go with the points. Raises `InputError`
-    where the file cannot be read, joint positions are not recognised, or a value is missing or cannot be.
+    `sigma` (m) is the instrument's 1σ a coordinate where the file does not say it. Nothing is written without `out`, nor, unless
+    `unchecked`, where the nominal robot cannot go with the points. Raises `InputError` where the file cannot be read, joint positions are
+    not recognised, or a value is missing or cannot be, and for a `sigma` that is not positive or has no place.
     """
     model = RobotModel.from_yaml(robot, estimates=False)
     foreign = read_foreign(file, model.joint_names, sheet=sheet, topic=topic)
@@ -121,6 +123,14 @@ def import_file(
     kind, guess = _kind(foreign, guess, model)
     columns, values = _converted(foreign, guess, model)
     remarks = list(foreign.notes)
+    stated = {"sigma", "sigma_xyz"} & guess.placed.keys()
+    if sigma is not None:
+        _check_sigma(sigma, file, kind, stated)
+        columns["sigma"] = np.full(len(foreign), sigma)
+    elif kind == "poses" and not stated:
+        remarks.append(
+            "the instrument's noise is not in it: say it with --sigma MM (1σ a coordinate), or it will count as the robot's"
+        )
     if kind == "log" and "tau" not in guess.placed:
         remarks.append("there are no torques: 'identify dynamics' needs tau1 and so on")
     misfit = _misfit(guess, model, columns, values) if kind == "poses" else None
@@ -241,6 +251,17 @@ def _check_poses(
         length=None if "length" not in values else values["length"][:, 0],
     )
     check_metres(poses, model, table, guess.placed[place].signal())
+
+
+def _check_sigma(sigma: float, file: Path, kind: str, stated: set[str]) -> None:
+    if not 0 < sigma < np.inf:
+        raise InputError(f"--sigma is {sigma / MILLIMETRE:g}; it must be positive, in mm.")
+    if kind != "poses":
+        raise InputError(f"--sigma is of measured points, but {file} has none; leave it out.")
+    if stated:
+        raise InputError(
+            f"{file} says sigma itself; leave --sigma out, or take its own back with --map {min(stated)}=none."
+        )
 
 
 def _check_time(foreign: ForeignTable, guess: Guess, t: np.ndarray) -> None:

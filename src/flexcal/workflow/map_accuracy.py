@@ -68,7 +68,7 @@ class RobotMap:
             )
         elif not self.scale.noise_known:
             remarks.append(
-                "the verification files state no sigma, so the instrument's noise counts as the robot's"
+                "the verification files state no sigma, so the instrument's noise counts as the robot's; 'flexcal import --sigma' states it"
             )
         if self.fitted:
             remarks.append(
@@ -115,7 +115,7 @@ class RobotMap:
 
 def applied_factor(scale: ErrorScale | None) -> float:
     """What the map is multiplied by: the factor where errors are larger than chance allows; never less than one."""
-    return scale.factor if scale is not None and scale.verdict == "optimistic" else 1.0
+    return scale.factor if scale is not None and scale.low > 1 else 1.0
 
 
 def map_accuracy(
