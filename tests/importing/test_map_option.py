@@ -83,6 +83,7 @@ def test_a_guess_is_taken_back(ur5, foreign) -> None:
     ("entry", "words"),
     [
         ("q7=J1", "there is no 'q7'"),
+        ("J1=q1", "flexcal's name comes first, then the file's column, as in q1=J1"),
         ("q1=J9", "no column 'J9'; did you mean"),
         ("q1", "it is written NAME=COLUMN"),
         ("q1=J1[kg]", "the unit 'kg' does not fit; possible are rad, deg"),

@@ -61,7 +61,7 @@ MISTAKES = [
     (GRAVITY, "gravity: [0, -9.81]", ["gravity", "3 items are expected, not 2"]),
     (POINT, "smr: {frame: flange, xyz: [0.10, 0.15]}", ["xyz", "3 items are expected, not 2"]),
     # names
-    (POINT, "smr: {frame: flansh, xyz: [0.10, 0.00, 0.15]}", ["lacks the frame 'flansh'", "flange"]),
+    (POINT, "smr: {frame: flansh, xyz: [0.10, 0.00, 0.15]}", ["lacks the frame 'flansh'", "did you mean 'flange'?"]),
     (TERMS, "geometry: {backlash: [joint_7]}", ["no movable joint 'joint_7'", "joint_6"]),
     (TERMS, "geometry: {terms: [kinematik]}", ["unknown geometry term 'kinematik'"]),
     (RATIO, "coupling: [{motor: joint_6, joint: joint_7, ratio: 1}]", ["no movable joint 'joint_7'"]),

@@ -81,5 +81,6 @@ class Compensate:
         where = "" if self.estimates is None else f" --estimates {self.estimates}"
         console.finish(
             document,
-            f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} MEASURED.csv{where}",
+            f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} MEASURED.csv{where}; with the nominal commands "
+            f"measured too, flexcal certificate {self.robot} --targets {self.targets} --before NOMINAL.csv --after MEASURED.csv{where}",
         )

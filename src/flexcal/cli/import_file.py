@@ -113,7 +113,8 @@ class Import:
             f"{self.file}: the points are not this robot's as the columns are read: it misses them by {share}"
         )
         if not fit.proposal:
-            return f"{what}; check the order, units and signs of the columns, or write them with --unchecked."
+            check = f"check the order, units and signs of the columns, and the point's frame in {self.robot}"
+            return f"{what}; {check}, or write them with --unchecked."
         options = "".join(f" '{option}'" for option in fit.options)
         return (
             f"{what}; {fit.proposal}"

@@ -55,4 +55,8 @@ class Verify:
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         where = "" if self.estimates is None else f" --estimates {self.estimates}"
-        console.finish(document, f"flexcal export urdf {self.robot}{where} --out calibrated.urdf")
+        console.finish(
+            document,
+            f"flexcal export urdf {self.robot}{where} --out calibrated.urdf, or flexcal compensate {self.robot} TARGETS.csv{where}; "
+            f"flexcal map {self.robot}{where} --verification {self.poses[0]} says how accurate it is elsewhere",
+        )

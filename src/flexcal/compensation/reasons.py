@@ -61,7 +61,8 @@ def _at_limits(model: RobotModel, q: np.ndarray) -> list[list[int]]:
 
 def _nearest(away: np.ndarray) -> str:
     turn = f" and {np.linalg.norm(away[3:]):.3g} rad" if len(away) > 3 else ""
-    return f"the tool comes no nearer than {np.linalg.norm(away[:3]) / MILLIMETRE:.3g} mm{turn}"
+    distance = np.linalg.norm(away[:3]) / MILLIMETRE
+    return f"the tool comes no nearer than {distance:{'.0f' if distance >= 1000 else '.3g'}} mm{turn}"
 
 
 def _past_limit(model: RobotModel, q: np.ndarray, verb: str) -> str | None:

@@ -138,12 +138,9 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
                 )
         else:
             for axes in of_it.values():
-                missing = " and ".join(axis for axis in wanted if axis not in axes)
-                reasons |= (
-                    dict.fromkeys(axes.values(), f"no {missing} was recognised beside them")
-                    if len(axes) > 1
-                    else {}
-                )
+                if len(axes) > 1:
+                    missing = " and ".join(axis for axis in wanted if axis not in axes)
+                    reasons |= dict.fromkeys(axes.values(), f"no {missing} was recognised beside them")
     return found
 
 

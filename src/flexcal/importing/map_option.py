@@ -47,6 +47,10 @@ def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: 
                 raise _no_column(entry, source, foreign)
             continue
         quantity = next((q for q, columns in names.items() if name in columns or name == q), None)
+        if quantity is None and name in foreign.table.columns:
+            raise InputError(
+                f"--map {entry}: flexcal's name comes first, then the file's column, as in q1={name}."
+            )
         if quantity is None:
             known = [column for columns in names.values() for column in columns]
             near = (

@@ -15,6 +15,7 @@ from flexcal.model.point import Payload, Point
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
 from flexcal.model.urdf import Description, Frame, read_urdf
+from flexcal.structuring import suggestion
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 
 HARMONICS = (1, 2, 3)
@@ -119,8 +120,9 @@ def _joint(file: YamlFile, keys: tuple[str | int, ...], names: list[str], name: 
 def _frame(file: YamlFile, keys: tuple[str | int, ...], description: Description, name: str) -> Frame:
     frame = description.frames.get(name)
     if frame is None:
-        known = ", ".join(f for f in description.frames if f != "universe")
-        raise file.error(keys, f"the URDF lacks the frame '{name}'; it has {known}.")
+        known = [f for f in description.frames if f != "universe"]
+        near = suggestion(name, known) or f"; it has {', '.join(known)}."
+        raise file.error(keys, f"the URDF lacks the frame '{name}'{near}")
     if frame.joint < 0:
         raise file.error(
             keys, f"the frame '{name}' does not move with any joint; name one beyond the first joint."

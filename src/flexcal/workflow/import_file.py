@@ -159,7 +159,7 @@ def _kind(
     """What the file holds, and the guess with what belongs to that only, in the order of the columns to write."""
     unsure = [left for left in guess.left_out if "could both be" in left.why]
     if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
-        left = "; ".join(reasons_of(guess.left_out))
+        left = "; ".join(reasons_of(guess.left_out)) or "every column is something else"
         what = (
             f"the joint positions q1 … q{model.n}"
             if "q" not in guess.placed
