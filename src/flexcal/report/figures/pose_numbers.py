@@ -7,10 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
+from flexcal.report.figures.calibration_errors import millimetre_axis
 from flexcal.report.figures.canvas import canvas, positive, single
 from flexcal.report.palette import AXIS, ELASTIC, NOMINAL, QUIET, RIGID
 
 _COLOURS = (ELASTIC, NOMINAL, QUIET)
+_NUMBERS = [m * 10**e for e in range(5) for m in (1, 2, 5)]
 
 
 def pose_numbers(
@@ -29,6 +31,6 @@ def pose_numbers(
     figure.add_vline(x=plan, line={"color": AXIS, "width": 1.5, "dash": "dash"})
     if wanted is not None:
         figure.add_hline(y=wanted, line={"color": RIGID, "width": 1.5, "dash": "dot"})
-    figure.update_xaxes(type="log", title_text="poses", dtick="D2")
-    figure.update_yaxes(type="log", title_text="predicted tool error / mm", dtick="D2")
+    figure.update_xaxes(type="log", title_text="poses", tickvals=_NUMBERS)
+    millimetre_axis(figure, title="predicted tool error / mm")
     return figure
