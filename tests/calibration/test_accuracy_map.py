@@ -192,20 +192,6 @@ def test_probabilities_are_uniform_where_the_prediction_is_right(rng: np.random.
     assert found.inside == pytest.approx(0.95, abs=0.03)
 
 
-def test_errors_with_noise_that_is_not_known_do_not_condemn_a_prediction(rng: np.random.Generator) -> None:
-    mixing = rng.standard_normal((40, 3, 12))
-    noisy = mixing @ rng.standard_normal(12) + 20 * rng.standard_normal((40, 3))
-    sure = np.zeros(40, dtype=bool)
-    for errors, noise, verdict in (
-        (noisy, None, "unknown"),
-        (noisy, np.full((40, 3), 20.0), "right"),
-        (noisy, np.full((40, 3), 1e-3), "optimistic"),
-        (0.01 * noisy, None, "cautious"),
-    ):
-        found = error_scale(Verification(np.zeros((40, 3)), errors, mixing, sure), noise)
-        assert found.verdict == verdict
-
-
 def test_poses_with_an_uncertain_flank_are_left_out(rng: np.random.Generator) -> None:
     mixing, errors = rng.standard_normal((4, 3, 2)), rng.standard_normal((4, 3))
     errors[3] = 1e6
