@@ -202,3 +202,13 @@ def test_certificate_needs_two_measurements_of_four_targets(run, ur5: Path) -> N
     assert swapped.status == 2 and "are --before and --after swapped?" in swapped.err
     odd = run("certificate", ur5 / "robot.yaml", *given[:-1], ur5 / "after.csv", "--out", ur5 / "page.pdf")
     assert odd.status == 2 and "page.pdf must end in .html" in odd.err
+
+
+def test_a_certificate_without_sigma_and_visits_judges_nothing(run, ur5: Path) -> None:
+    once = pl.read_csv(ur5 / "after.csv").unique("pose", maintain_order=True)
+    wander = pl.Series(5e-4 * np.random.default_rng(3).standard_normal(len(once)))
+    once.with_columns(pl.col("x") + wander).drop("^sigma.*$").write_csv(ur5 / "after.csv")
+    done = certify(run, ur5, "--json")
+    assert done.document["prediction"]["verdict"] == "unknown"
+    assert "flexcal import --sigma" in " ".join(done.document["remarks"])
+    assert "It cannot be judged" in (ur5 / "certificate.html").read_text(encoding="utf-8")

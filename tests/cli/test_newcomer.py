@@ -51,6 +51,7 @@ def test_from_a_urdf_to_a_calibrated_urdf(run, tmp_path: Path, monkeypatch: pyte
     verified = run("verify", robot, "others.csv", "--json")
     assert verified.document["verification"]["measured"]["mean_mm"] < 0.1
     assert "next: flexcal export urdf robot.yaml" in verified.err
+    assert "flexcal compensate robot.yaml" in verified.err and "flexcal map robot.yaml" in verified.err
 
     Path("targets.csv").write_text("pose,q1,q2,q3,q4,q5,q6\n1,0.2,-0.3,0.4,0.5,-0.6,0.7\n")
     assert "run commands.csv on the robot" in following(
