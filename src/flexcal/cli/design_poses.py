@@ -12,7 +12,16 @@ from tyro.conf import arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring, on_the_robot
-from flexcal.cli.options import Json, Paths, Robot, require_at_least, require_robot
+from flexcal.cli.options import (
+    Json,
+    MaybeNumber,
+    MaybePath,
+    MaybeText,
+    Paths,
+    Robot,
+    require_at_least,
+    require_robot,
+)
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
 
@@ -34,12 +43,12 @@ class DesignPoses:
     out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
     """File for the plan, YAML or CSV."""
     working: Annotated[
-        str | None,
+        MaybeText,
         arg(metavar="BOX|FILE", help_behavior_hint="(default: as robot.yaml declares, else anywhere)"),
     ] = None
     """Where the robot will work: ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a CSV of points x, y, z or of poses."""
     wanted: Annotated[
-        float | None,
+        MaybeNumber,
         arg(
             metavar="MM",
             help_behavior_hint="(default: --count poses; with --measured until more only average)",
@@ -49,7 +58,7 @@ class DesignPoses:
     measured: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
     """Measured poses, to choose the next ones, best first."""
     pool: Annotated[
-        Path | None, arg(name="from", metavar="FILE", help_behavior_hint="(default: random poses)")
+        MaybePath, arg(name="from", metavar="FILE", help_behavior_hint="(default: random poses)")
     ] = None
     """CSV or Parquet with pose, q1, q2 and so on to choose from: poses taught on the robot, or measured before."""
     random: bool = False
@@ -59,7 +68,7 @@ class DesignPoses:
     candidates: Annotated[int, arg(metavar="N")] = 4000
     """Random poses to choose from, without --from; 100000 take seconds more."""
     payload: Annotated[
-        float | None, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
     """Payload held in the poses, kg."""
     seed: Annotated[int, arg(metavar="N")] = 0

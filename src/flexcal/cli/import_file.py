@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Optional
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Json, MaybeNumber, MaybePath, Robot, Texts, require_robot
+from flexcal.cli.options import Json, MaybeNumber, MaybePath, MaybeText, Robot, Texts, require_robot
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
 
@@ -42,12 +42,12 @@ class Import:
     ] = None
     """The instrument's 1σ a coordinate, mm, for a file that does not say it."""
     sheet: Annotated[
-        Optional[str],  # noqa: UP045
+        MaybeText,
         arg(metavar="NAME", help_behavior_hint="(default: the first)"),
     ] = None
     """Sheet of an Excel file."""
     topic: Annotated[
-        Optional[str],  # noqa: UP045
+        MaybeText,
         arg(metavar="NAME", help_behavior_hint="(default: the only one)"),
     ] = None
     """Topic of the measured points in a ROS recording."""

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Optional
+from typing import Annotated
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Folder, Json
+from flexcal.cli.options import Folder, Json, MaybeText
 
 
 @dataclass(frozen=True)
@@ -24,7 +24,7 @@ class Init:
     out: Folder = Path(".")
     """Folder for robot.yaml."""
     tip: Annotated[
-        Optional[str],  # noqa: UP045
+        MaybeText,
         arg(metavar="LINK", help_behavior_hint="(default: the end of the one long chain)"),
     ] = None
     """The link where the arm ends, for a URDF with several arms."""

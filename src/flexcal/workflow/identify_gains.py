@@ -28,7 +28,6 @@ from flexcal.progress import Progress, silent
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
-from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.treatment import treatment_of
 
@@ -101,6 +100,8 @@ def identify_gains(
         drive_gains(data, payloads), declared, tuple(payloads), model.name, origin, command
     )
     if out is not None:
+        from flexcal.workflow.report_folder import report_folder
+
         write_results(out, result.document())
         report_folder(out)
     return result

@@ -14,7 +14,6 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -82,6 +81,8 @@ def identify_robot_inertials(
     others = read_estimates(source, without="dynamics") if source.exists() else {}
     store_block(source, target, others, "dynamics", estimate)
     if out is not None:
+        from flexcal.workflow.report_folder import report_folder
+
         write_results(out, found.document())
         report_folder(out)
     return found

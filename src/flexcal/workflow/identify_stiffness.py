@@ -27,7 +27,6 @@ from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
-from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -134,6 +133,8 @@ def identify_robot_stiffness(
     found = RobotStiffness(result, plan is not None, estimate, target, command)
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
+        from flexcal.workflow.report_folder import report_folder
+
         write_results(out, found.document())
         report_folder(out)
     return found
