@@ -91,12 +91,7 @@ class StoredEstimates:
 
     def block(self, name: Block) -> StoredBlock | None:
         """One block, where it is there."""
-        return {
-            "dynamics": self.dynamics,
-            "stiffness": self.stiffness,
-            "calibration": self.calibration,
-            "payload": self.payload,
-        }[name]
+        return getattr(self, name)
 
 
 def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Block, Estimate]:

@@ -20,7 +20,7 @@ from flexcal.calibration.repeatability import (
 )
 from flexcal.calibration.term_selection import TermSelection, select_terms
 from flexcal.calibration.terms import geometric_parameters
-from flexcal.calibration.verification import Verification, error_roots, verify
+from flexcal.calibration.verification import Verification, verify, verify_jointly
 
 __all__ = [
     "CYCLES",
@@ -38,7 +38,6 @@ __all__ = [
     "Verification",
     "accuracy_map",
     "calibrate",
-    "error_roots",
     "error_scale",
     "error_sources",
     "geometric_parameters",
@@ -53,4 +52,5 @@ __all__ = [
     "rigid_motion",
     "select_terms",
     "verify",
+    "verify_jointly",
 ]

@@ -33,6 +33,16 @@ class ErrorScale:
         """Share of the poses that lie within the bound predicted for 95 % of them."""
         return float((self.probability <= 0.95).mean())
 
+    def document(self) -> dict[str, float | str]:
+        """For JSON documents."""
+        return {
+            "factor": self.factor,
+            "low": self.low,
+            "high": self.high,
+            "inside_95_percent": self.inside,
+            "verdict": self.verdict,
+        }
+
     @property
     def verdict(self) -> str:
         """Whether the prediction is "optimistic", "cautious", or "right" within chance; "unknown" where noise that is not known may be
@@ -44,7 +54,7 @@ class ErrorScale:
 
 
 def error_scale(verification: Verification, roots: np.ndarray, noise: np.ndarray | None) -> ErrorScale:
-    """Compare the errors of a verification with their prediction: `roots` (N, 3, p) m as `error_roots` has them.
+    """Compare the errors of a verification with their prediction: `roots` (N, 3, p) m as `verify_jointly` gives them.
 
     `noise` (N, 3) m is 1σ of the instrument, None where unknown.
 

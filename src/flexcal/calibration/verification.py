@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
-from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.prediction import predict
 from flexcal.calibration.propagation import covariance_root, moving_parameters
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
@@ -52,21 +52,19 @@ def verify(model: RobotModel, poses: PoseSet, *, elastic: bool = True) -> Verifi
     The instrument must stand where it stood during calibration: `model` holds its place. Raises `FlexcalError` for measured lengths and
     orientations, and as `predict` does.
     """
+    return verify_jointly(model, poses, elastic=elastic)[0]
+
+
+def verify_jointly(
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True
+) -> tuple[Verification, np.ndarray]:
+    """As `verify`, and A (N, 3, p) m, with p independent errors of one size behind all poses.
+
+    A_i A_jᵀ is what the covariance of a calibrated robot's parameters says of the errors at the poses i and j.
+    """
     require_points(poses)
     at = predict(model, poses, elastic=elastic, jacobians=True)
-    rms = np.sqrt((_roots(model, at, elastic=elastic) ** 2).sum(axis=(1, 2)))
-    return Verification(at.position, poses.position - at.position, rms, ambiguous_poses(model, at))
-
-
-def error_roots(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """A (N, 3, p) m, with p independent errors of one size behind all poses.
-
-    A_i A_jᵀ is what the covariance of a calibrated robot's parameters says of the errors at the poses i and j. Raises `FlexcalError` as
-    `predict` does.
-    """
-    return _roots(model, predict(model, poses, jacobians=True), elastic=True)
-
-
-def _roots(model: RobotModel, at: Prediction, *, elastic: bool) -> np.ndarray:
     used = moving_parameters(model, elastic=elastic)
-    return at.jacobian(used) @ covariance_root(model, used)
+    roots = at.jacobian(used) @ covariance_root(model, used)
+    rms = np.sqrt((roots**2).sum(axis=(1, 2)))
+    return Verification(at.position, poses.position - at.position, rms, ambiguous_poses(model, at)), roots

@@ -9,6 +9,7 @@ from tyro.conf import arg
 
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import (
     Json,
     MaybePath,
@@ -86,7 +87,7 @@ class Calibrate:
         )
         for remark in document["remarks"]:
             console.say(remark)
-        where = "" if self.out is None else f" --estimates {self.out}"
+        where = with_estimates(self.out)
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")

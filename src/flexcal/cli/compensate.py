@@ -9,6 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import Estimates, Json, Numbers, Robot, require_robot
 
 _LISTED = 10
@@ -78,7 +79,7 @@ class Compensate:
         console.say(
             f"wrote {self.out}: commands for {document['compensated']} of {document['targets']} targets"
         )
-        where = "" if self.estimates is None else f" --estimates {self.estimates}"
+        where = with_estimates(self.estimates)
         console.finish(
             document,
             f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} MEASURED.csv{where}; with the nominal commands "

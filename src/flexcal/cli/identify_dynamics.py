@@ -10,6 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
@@ -147,7 +148,7 @@ class IdentifyDynamics:
             return f"{verb} --validate other.parquet{kept}"
         if found.bodiless:
             return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
-        where = "" if self.out is None else f" --estimates {self.out}"
+        where = with_estimates(self.out)
         return f"flexcal export urdf {self.robot}{where} --out identified.urdf"
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.next_step import reading_elsewhere
+from flexcal.cli.next_step import reading_elsewhere, with_estimates
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 
 if TYPE_CHECKING:
@@ -79,7 +79,7 @@ class IdentifyPayload:
         console.finish(document, self._next(found))
 
     def _next(self, found: RobotPayload) -> str:
-        where = "" if self.out is None else f" --estimates {self.out}"
+        where = with_estimates(self.out)
         if "calibration" in found.blocks:
             return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
         return f"flexcal design poses {self.robot} --count 40 --out poses.yaml"

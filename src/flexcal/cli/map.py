@@ -9,7 +9,17 @@ from typing import Annotated
 from tyro.conf import arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Estimates, Json, Paths, Robot, require_at_least, require_robot
+from flexcal.cli.next_step import with_estimates
+from flexcal.cli.options import (
+    Estimates,
+    Json,
+    MaybeNumber,
+    MaybeText,
+    Paths,
+    Robot,
+    require_at_least,
+    require_robot,
+)
 
 
 @dataclass(frozen=True)
@@ -25,7 +35,7 @@ class Map:
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("map.html")
     """The page (.html), or a table of the poses (.csv, .parquet) with the page beside it."""
     working: Annotated[
-        str | None,
+        MaybeText,
         arg(metavar="BOX|FILE", help_behavior_hint="(default: as robot.yaml declares, else anywhere)"),
     ] = None
     """Ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a file of points x, y, z, or of pose, q1, q2 and so on."""
@@ -34,7 +44,7 @@ class Map:
     count: Annotated[int, arg(metavar="N")] = 20_000
     """Number of random poses; those of a file all count."""
     payload: Annotated[
-        float | None, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
     """Payload held, kg."""
     estimates: Estimates = None
@@ -45,6 +55,7 @@ class Map:
     def run(self) -> None:
         """Map, and print how accurate the tool is, where it is worst, and why."""
         from flexcal.cli.tables import map_table
+        from flexcal.data import page_beside
         from flexcal.workflow.map_accuracy import map_accuracy
 
         require_robot(self.robot)
@@ -77,9 +88,9 @@ class Map:
             )
         for remark in document["remarks"]:
             console.say(remark)
-        pages = dict.fromkeys([self.out, self.out.with_suffix(".html")])
+        pages = dict.fromkeys([self.out, page_beside(self.out)])
         console.say(f"wrote {' and '.join(str(path) for path in pages)}: {document['poses']} poses")
-        where = "" if self.estimates is None else f" --estimates {self.estimates}"
+        where = with_estimates(self.estimates)
         console.finish(
             document,
             f"flexcal compensate {self.robot} TARGETS.csv{where}, for the commands that make the tool so accurate",

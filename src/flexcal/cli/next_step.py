@@ -25,6 +25,11 @@ def on_the_robot(robot: Path, poses: str) -> str:
     return f"; or measure them on the robot, and flexcal import {robot} FILE --out {poses}"
 
 
+def with_estimates(place: Path | None) -> str:
+    """The option by which another verb finds estimates that are not beside robot.yaml; empty where they are."""
+    return "" if place is None else f" --estimates {place}"
+
+
 def reading_elsewhere(robot: Path, estimates: Path) -> str:
     """How the verbs that come next find estimates that are not beside robot.yaml."""
     return f"for the next verbs to start from it, write 'estimates: {relpath(estimates, robot.parent)}' into {robot}"

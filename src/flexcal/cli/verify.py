@@ -9,6 +9,7 @@ from tyro.conf import arg
 
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
+from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, require_files, require_robot
 
 
@@ -54,7 +55,7 @@ class Verify:
             console.say(remark)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-        where = "" if self.estimates is None else f" --estimates {self.estimates}"
+        where = with_estimates(self.estimates)
         console.finish(
             document,
             f"flexcal export urdf {self.robot}{where} --out calibrated.urdf, or flexcal compensate {self.robot} TARGETS.csv{where}; "

@@ -58,11 +58,11 @@ def check_positive(table: Table, signal: Signal, values: np.ndarray, *, zero: bo
         )
 
 
-def whole_numbers(table: Table, signal: Signal, values: np.ndarray) -> np.ndarray:
-    """Numbers (N,) of poses as integers; raises `InputError` at the first that is none."""
+def whole_numbers(table: Table, column: str, values: np.ndarray) -> np.ndarray:
+    """Numbers (N,) of poses, which stand in `column`, as integers; raises `InputError` at the first that is none."""
     if (values != np.rint(values)).any():
         row = int(np.argmax(values != np.rint(values)))
-        raise table.error(row, signal.columns[0], f"{values[row]:g} is no whole number; number the poses.")
+        raise table.error(row, column, f"{values[row]:g} is no whole number; number the poses.")
     return values.astype(np.int64)
 
 

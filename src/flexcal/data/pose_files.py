@@ -65,7 +65,7 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     check_joint_units(model, table, signals["q"], q)
     columns = [signals["q"].column_of(joint) for joint in range(model.n)]
     check_joint_limits(model, table, np.arange(len(q)), columns, q)
-    pose = whole_numbers(table, signals["pose"], signals["pose"].values(table)[:, 0])
+    pose = whole_numbers(table, signals["pose"].columns[0], signals["pose"].values(table)[:, 0])
     check_same_pose(pose, q, table)
     first = np.sort(np.unique(pose, return_index=True)[1])
     held = payload_column(table, signals, model)
@@ -133,7 +133,7 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
         station=station,
         temperature=found["temperature"][:, 0] if "temperature" in found else None,
         time=found["t"][:, 0] if "t" in found else None,
-        pose=whole_numbers(table, signals["pose"], found["pose"][:, 0]),
+        pose=whole_numbers(table, signals["pose"].columns[0], found["pose"][:, 0]),
         quaternion_wxyz=unit_quaternions(table, signals["quaternion"], found["quaternion"])
         if "quaternion" in found
         else None,

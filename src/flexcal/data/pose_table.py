@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flexcal.data.pose_columns import whole_numbers
 from flexcal.data.pose_plan import PosePlan
 from flexcal.data.table import Table, open_table, write_table
 from flexcal.errors import FlexcalError, InputError
@@ -55,10 +56,5 @@ def read_pose_table(path: Path) -> PosePlan:
 
 def _numbers(table: Table) -> np.ndarray | None:
     """The numbers (N,) of the poses; None where they only count from 1."""
-    values = table.columns["pose"]
-    broken = np.flatnonzero(values != np.rint(values))
-    if len(broken):
-        row = int(broken[0])
-        raise table.error(row, "pose", f"{values[row]:g} is no whole number; number the poses.")
-    numbers = values.astype(np.int64)
+    numbers = whole_numbers(table, "pose", table.columns["pose"])
     return None if np.array_equal(numbers, np.arange(1, len(numbers) + 1)) else numbers

@@ -49,7 +49,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
         _check_metres(table, signals["xyz"].columns, found["xyz"], model.reach)
     if "station" in texts:
         _check_stations(table, model)
-    pose = whole_numbers(table, signals["pose"], found["pose"][:, 0])
+    pose = whole_numbers(table, signals["pose"].columns[0], found["pose"][:, 0])
     quaternion = (
         unit_quaternions(table, signals["quaternion"], found["quaternion"]) if "quaternion" in found else None
     )
@@ -94,7 +94,7 @@ def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
     table = file.read(texts)
     q = signals["q"].values(table)
     check_joint_units(model, table, signals["q"], q)
-    pose = whole_numbers(table, signals["pose"], signals["pose"].values(table)[:, 0])
+    pose = whole_numbers(table, signals["pose"].columns[0], signals["pose"].values(table)[:, 0])
     _check_once(table, pose)
     return ToolTargets(pose, _points(file, table, model), q, payload=payload_column(table, signals, model))
 

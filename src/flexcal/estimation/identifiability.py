@@ -13,6 +13,8 @@ from flexcal.estimation.estimate import Dropped
 
 RANK_TOLERANCE = 1e-9
 """Relative size of a diagonal of R that counts as zero: exact derivatives leave 1e-15, finite differences about 1e-8."""
+_WEAK, _NAMED = 3, 0.2
+"""So many weak combinations are shown; members below this share of the largest are not named."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,6 +50,20 @@ class Identifiability:
         weakest = range(len(self.names) - 1, max(-1, len(self.names) - 1 - number), -1)
         return tuple(
             (float(self.singular_values[i]), name_direction(self.directions[i], self.names)) for i in weakest
+        )
+
+    def weak_seen_directions(self) -> tuple[tuple[str, float], ...]:
+        """The three weakest combinations that are still seen: (name, singular value relative to the largest), the weakest first.
+
+        Members below a fifth of the largest are not named.
+        """
+        weakest = range(self.rank - 1, max(-1, self.rank - 1 - _WEAK), -1)
+        return tuple(
+            (
+                name_direction(self.directions[i], self.names, threshold=_NAMED),
+                float(self.singular_values[i]),
+            )
+            for i in weakest
         )
 
 

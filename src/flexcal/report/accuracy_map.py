@@ -15,7 +15,7 @@ from flexcal.report.figures.accuracy_space import SHOWN, accuracy_space
 from flexcal.report.figures.accuracy_views import accuracy_views
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.variance_shares import variance_shares
-from flexcal.report.notation import millimetres, scaled, significant
+from flexcal.report.notation import document_millimetres, scaled, significant
 from flexcal.report.page import (
     Block,
     Check,
@@ -30,7 +30,6 @@ from flexcal.report.page import (
 )
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
-from flexcal.units import MILLIMETRE
 
 _FEW = 20
 
@@ -62,12 +61,13 @@ def map_page(study: MapStudy) -> Page:
     leading = max(results["sources"], key=results["sources"].__getitem__)
     verdict = Verdict(
         worst(checks),
-        f"The tool is within {_mm(p95['p90_mm'])} mm",
+        f"The tool is within {document_millimetres(p95['p90_mm'])} mm",
         f"At nine of ten of {results['poses']} poses, {_where(study)}, the point '{results['target']}' is within "
-        f"{_mm(p95['p90_mm'])} mm of where the calibrated model says, in 95 of 100 cases; at the worst within {_mm(p95['worst_mm'])} mm.",
+        f"{document_millimetres(p95['p90_mm'])} mm of where the calibrated model says, in 95 of 100 cases; "
+        f"at the worst within {document_millimetres(p95['worst_mm'])} mm.",
         (
-            Fact("How far off is it on average?", _mm(mean["median_mm"]), "mm", "Mean error, at the median pose."),
-            Fact("How far off at most?", _mm(p95["worst_mm"]), "mm", "95 % stay below this at the worst pose."),
+            Fact("How far off is it on average?", document_millimetres(mean["median_mm"]), "mm", "Mean error, at the median pose."),
+            Fact("How far off at most?", document_millimetres(p95["worst_mm"]), "mm", "95 % stay below this at the worst pose."),
             Fact("What does it come from?", _percent(results["sources"][leading]), "%", f"of the variance would go, were {leading} known."),
         ),
         (),
@@ -137,7 +137,13 @@ def _checks(study: MapStudy) -> tuple[Check, ...]:
 def _numbers(study: MapStudy) -> Section:
     results = study.results
     rows = tuple(
-        (label, *(_mm(results["predicted"][key][column]) for column in ("median_mm", "p90_mm", "worst_mm")))
+        (
+            label,
+            *(
+                document_millimetres(results["predicted"][key][column])
+                for column in ("median_mm", "p90_mm", "worst_mm")
+            ),
+        )
         for label, key in (("mean error", "mean"), ("95 % of errors are below", "p95"))
     )
     places = []
@@ -145,7 +151,13 @@ def _numbers(study: MapStudy) -> Section:
         leading = max(item["sources"], key=item["sources"].__getitem__)
         place = ", ".join(f"{value:.3f}" for value in item["position_m"])
         places.append(
-            (place, _mm(item["mean_mm"]), _mm(item["p95_mm"]), leading, _joints(study.model, item["q"]))
+            (
+                place,
+                document_millimetres(item["mean_mm"]),
+                document_millimetres(item["p95_mm"]),
+                leading,
+                _joints(study.model, item["q"]),
+            )
         )
     blocks: list[Block] = [
         Table(
@@ -244,7 +256,3 @@ def _joints(model: RobotModel, q: np.ndarray) -> str:
 
 def _percent(share: float) -> str:
     return f"{100 * share:.0f}"
-
-
-def _mm(value: float) -> str:
-    return millimetres(value * MILLIMETRE)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.atomic import write_text
-from flexcal.report.notation import NOTHING, millimetres, significant
+from flexcal.report.notation import NOTHING, document_millimetres, significant
 from flexcal.report.palette import LIGHT
 from flexcal.report.render import templates
 from flexcal.units import MILLIMETRE
@@ -64,8 +64,14 @@ def accuracy_rows(results: Mapping[str, Any]) -> list[tuple[str, ...]]:
     rows = []
     for key, label in labels.items():
         block = results[key]
-        repeated = NOTHING if block["rp"] is None else _mm(block["rp"]["max_mm"])
-        rows.append((label, *(_mm(block["ap"][name]) for name in ("mean_mm", "p90_mm", "max_mm")), repeated))
+        repeated = NOTHING if block["rp"] is None else document_millimetres(block["rp"]["max_mm"])
+        rows.append(
+            (
+                label,
+                *(document_millimetres(block["ap"][name]) for name in ("mean_mm", "p90_mm", "max_mm")),
+                repeated,
+            )
+        )
     return rows
 
 
@@ -77,7 +83,7 @@ def limiting_parts(results: Mapping[str, Any]) -> list[tuple[str, str]]:
         "instrument": "noise of the instrument, stated",
         "visit_to_visit": "from visit to visit, instrument included, measured",
     }
-    return [(label, _mm(results["rms_mm"].get(key))) for key, label in labels.items()]
+    return [(label, document_millimetres(results["rms_mm"].get(key))) for key, label in labels.items()]
 
 
 def _conditions(results: Mapping[str, Any]) -> list[tuple[str, str]]:
@@ -87,7 +93,7 @@ def _conditions(results: Mapping[str, Any]) -> list[tuple[str, str]]:
     return [
         ("point", ", ".join(results["points"])),
         ("instrument's place", ", ".join(results["stations"])),
-        ("instrument, 1σ an axis", "not stated" if sigma is None else f"{_mm(sigma)} mm"),
+        ("instrument, 1σ an axis", "not stated" if sigma is None else f"{document_millimetres(sigma)} mm"),
         ("payload", ", ".join(f"{significant(mass, 4)} kg" for mass in results["payload_kg"])),
         (
             "temperature",
@@ -132,7 +138,3 @@ def error_strip(before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
         "ticks": list(zip(place(10.0**powers), [f"{10.0**p:g}" for p in powers], strict=True)),
         "rows": [("before", place(distances[0]), "rigid"), ("after", place(distances[1]), "elastic")],
     }
-
-
-def _mm(value: float | None) -> str:
-    return NOTHING if value is None else millimetres(value * MILLIMETRE)

@@ -52,7 +52,7 @@ def inertials_page(study: InertialsStudy) -> Page:
 
 _LEAD = (
     "The recordings move every parameter as far as they speak of it; what they do not show keeps value and tolerance of robot.yaml. The "
-    " last column says how much narrower the interval became."
+    "last column says how much narrower the interval became."
 )
 
 

@@ -28,6 +28,11 @@ def millimetres(value: float | None) -> str:
     return f"{size:.3f}" if abs(size) < 1 else f"{size:.2f}"
 
 
+def document_millimetres(value: float | None) -> str:
+    """A length that a document has in millimetres, as `millimetres` writes it."""
+    return millimetres(None if value is None else value * MILLIMETRE)
+
+
 def statistics_cells(statistics: ErrorStatistics | None) -> tuple[str, str, str]:
     """Mean, 90th percentile and maximum in millimetres, dashes where unknown."""
     if statistics is None:

@@ -12,11 +12,10 @@ import numpy as np
 from flexcal.calibration import CYCLES, PoseRepeatability
 from flexcal.data import PoseSet
 from flexcal.report.figures.residual_trend import residual_trend
-from flexcal.report.notation import NOTHING, millimetres
+from flexcal.report.notation import document_millimetres
 from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Table, Text, Verdict, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
-from flexcal.units import MILLIMETRE
 
 KINDS = {"nominal": "AP as delivered", "calibrated": "AP calibrated"}
 
@@ -42,22 +41,30 @@ def repeatability_page(study: RepeatabilityStudy) -> Page:
     results = study.results
     checks = _checks(study)
     rp = results["rp_mm"]
-    facts = [Fact("How well does it repeat?", _mm(rp["max"]), "mm", "RP at the worst pose (ISO 9283).")]
+    facts = [
+        Fact(
+            "How well does it repeat?",
+            document_millimetres(rp["max"]),
+            "mm",
+            "RP at the worst pose (ISO 9283).",
+        )
+    ]
     for kind, label in KINDS.items():
         if f"ap_{kind}_mm" in results:
             block = results[f"ap_{kind}_mm"]
             facts.append(
                 Fact(
                     f"{label}?",
-                    _mm(block["mean"]),
+                    document_millimetres(block["mean"]),
                     "mm",
-                    f"Mean over the poses; worst {_mm(block['max'])} mm.",
+                    f"Mean over the poses; worst {document_millimetres(block['max'])} mm.",
                 )
             )
     verdict = Verdict(
         worst(checks),
-        f"The robot repeats within {_mm(rp['max'])} mm",
-        f"{results['poses']} poses were visited {results['visits']['total']} times in all; RP is {_mm(rp['mean'])} mm on average.",
+        f"The robot repeats within {document_millimetres(rp['max'])} mm",
+        f"{results['poses']} poses were visited {results['visits']['total']} times in all; "
+        f"RP is {document_millimetres(rp['mean'])} mm on average.",
         tuple(facts),
         (),
         "",
@@ -82,9 +89,15 @@ def repeatability_table(results: Mapping[str, Any]) -> Table:
     columns = ("pose", "visits", *(f"{KINDS[kind]} / mm" for kind in kinds), "RP / mm", "vAP / mm")
     rows = []
     for item in results["each"]:
-        accuracy = [_mm(item[f"ap_{kind}_mm"]) for kind in kinds]
+        accuracy = [document_millimetres(item[f"ap_{kind}_mm"]) for kind in kinds]
         rows.append(
-            (str(item["pose"]), str(item["visits"]), *accuracy, _mm(item["rp_mm"]), _mm(item["vap_mm"]))
+            (
+                str(item["pose"]),
+                str(item["visits"]),
+                *accuracy,
+                document_millimetres(item["rp_mm"]),
+                document_millimetres(item["vap_mm"]),
+            )
         )
     return Table("table-poses", "Pose by pose", columns, tuple(rows))
 
@@ -104,7 +117,8 @@ def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
         checks.append(Check(question, "The files state no sigma, so this cannot be judged.", "unknown"))
     else:
         seen = study.results["rp_mm"]["mean"]
-        answer = f"The instrument's noise alone would show an RP of {_mm(noise)} mm; {_mm(seen)} mm are seen on average."
+        answer = f"The instrument's noise alone would show an RP of {document_millimetres(noise)} mm; "
+        answer += f"{document_millimetres(seen)} mm are seen on average."
         checks.append(Check(question, answer, "good" if seen > 1.5 * noise else "care"))
     return tuple(checks)
 
@@ -133,7 +147,3 @@ def _order_section(study: RepeatabilityStudy) -> Section:
         "Components of the deviations in measuring order.",
     )
     return Section("order", "In the order of measuring", "", (block,))
-
-
-def _mm(value: float | None) -> str:
-    return NOTHING if value is None else millimetres(value * MILLIMETRE)

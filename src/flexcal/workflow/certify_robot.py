@@ -16,11 +16,10 @@ from flexcal.calibration import (
     ErrorStatistics,
     PoseRepeatability,
     Verification,
-    error_roots,
     error_scale,
     repeatability,
     rigid_motion,
-    verify,
+    verify_jointly,
 )
 from flexcal.compensation import wanted_pose
 from flexcal.data import PoseSet, ToolTargets, read_targets, sha256_of
@@ -136,13 +135,7 @@ class RobotCertificate:
             "before": self.before.block(),
             "after": self.after.block(),
             "after_refitted": self.refitted.block(),
-            "prediction": {
-                "factor": self.scale.factor,
-                "low": self.scale.low,
-                "high": self.scale.high,
-                "inside_95_percent": self.scale.inside,
-                "verdict": self.scale.verdict,
-            },
+            "prediction": self.scale.document(),
             "rms_mm": {name: value / MILLIMETRE for name, value in self.rms.items()},
             "files": self.files,
             "remarks": list(self.remarks),
@@ -187,7 +180,7 @@ def certify_robot(
         raise InputError(
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
         )
-    known = verify(model, visited[after][0])
+    known, roots = verify_jointly(model, visited[after][0])
     there = _visited(visited[after][0], _placed(model, *visited[after]))
     result = RobotCertificate(
         calibrated,
@@ -196,7 +189,7 @@ def certify_robot(
         _visited(visited[after][0], _laid(*visited[after])),
         len(every) - len(common),
         known,
-        error_scale(known, error_roots(model, visited[after][0]), _noise(there)),
+        error_scale(known, roots, _noise(there)),
         _files(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},

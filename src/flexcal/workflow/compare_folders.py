@@ -6,8 +6,6 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import polars as pl
-
 from flexcal.calibration import ErrorStatistics
 from flexcal.data import read_estimates
 from flexcal.data.pose_set import DEFAULT_SIGMA
@@ -17,7 +15,10 @@ from flexcal.report.runs import Comparison, Run
 from flexcal.report.two_runs import write_comparison
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.point_files import read_points
+from flexcal.workflow.report_folder import OF_CALIBRATION, OF_VERIFICATION, lacking
 from flexcal.workflow.results import RESULTS, read_results
+from flexcal.workflow.stored_block import ESTIMATES
+from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
 
 COMPARISON = "comparison.html"
 _DECLARED = (".yaml", ".yml", ".urdf", ".xml")
@@ -58,9 +59,7 @@ def _run(folder: Path, name: str) -> Run:
     try:
         return _left(folder, name)
     except KeyError as problem:
-        raise InputError(
-            f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had left it; run the verb that leaves it again."
-        ) from problem
+        raise lacking(folder, problem) from problem
 
 
 def _left(folder: Path, name: str) -> Run:
@@ -69,12 +68,12 @@ def _left(folder: Path, name: str) -> Run:
             f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo left with --out."
         )
     results = read_results(folder)
-    path = folder / "estimates.yaml"
+    path = folder / ESTIMATES
     estimates = read_estimates(path) if path.is_file() else {}
     origin: dict[str, str] = {"command": results.get("command", "")}
-    if "rms_mm" in results or "term_selection" in results:
+    if OF_VERIFICATION in results or OF_CALIBRATION in results:
         points = read_points(folder, sigma=DEFAULT_SIGMA)
-        verified = "rms_mm" in results
+        verified = OF_VERIFICATION in results
         found = results["provenance"] if verified else _provenance(estimates)
         return Run(
             name=name,
@@ -89,9 +88,9 @@ def _left(folder: Path, name: str) -> Run:
             data=_data(found),
             origin=origin | found,
         )
-    if "plan" in results and (folder / "verification.csv").is_file():
+    if "plan" in results and (folder / VERIFICATION).is_file():
         found = _provenance(estimates)
-        q, truth, errors = _two_stage(folder / "verification.csv")
+        fresh = read_verification(folder / VERIFICATION)
         before = results["verification"]["nominal"]
         sizes = [before[key] * MILLIMETRE for key in ("mean_mm", "p90_mm", "max_mm")]
         statistics = ErrorStatistics(before["poses"], *sizes)
@@ -99,9 +98,9 @@ def _left(folder: Path, name: str) -> Run:
             name=name,
             kind="demo",
             robot=results["robot"],
-            q=q,
-            points=truth,
-            errors=errors,
+            q=fresh.q,
+            points=fresh.truth,
+            errors=fresh.errors["elastic"],
             fresh=True,
             before=statistics,
             estimates=estimates,
@@ -109,19 +108,6 @@ def _left(folder: Path, name: str) -> Run:
             origin=origin | found,
         )
     raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
-
-
-def _two_stage(path: Path) -> tuple[Any, Any, Any]:
-    """Joint positions (N, n), true points and errors of the elastic model (N, 3), m."""
-    try:
-        table = pl.read_csv(path)
-        q = table.select([name for name in table.columns if name[0] == "q"]).to_numpy()
-        truth = table.select("x", "y", "z").to_numpy()
-        return q, truth, truth - table.select("elastic_x", "elastic_y", "elastic_z").to_numpy()
-    except (pl.exceptions.PolarsError, TypeError) as problem:
-        raise InputError(
-            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
-        ) from problem
 
 
 def _provenance(estimates: Mapping[Any, Any]) -> dict[str, str]:

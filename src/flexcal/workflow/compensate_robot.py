@@ -18,7 +18,7 @@ from flexcal.model.joint_space import joint_limits
 from flexcal.model.tool_at_rest import points_kinematics
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.calibrated_robot import calibrated_robot
+from flexcal.workflow.calibrated_robot import calibrated_robot, found_station
 
 _FAR = 0.25
 """Of the reach: points that are farther than this from the joint positions beside them do not belong to them."""
@@ -89,7 +89,7 @@ def compensate_robot(
     model, nominal = calibrated.model, calibrated.nominal
     targets = read_targets(file, model)
     for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
-        if f"station.{station}.x" not in model.posterior.parameters:
+        if not found_station(model, station):
             raise InputError(
                 f"{file}: the station '{station}' was not calibrated, so its place is unknown; give points in the base frame."
             )

@@ -18,6 +18,7 @@ from flexcal.export.sdf import render_sdf
 from flexcal.export.urdf import render_urdf
 from flexcal.model import RobotModel
 from flexcal.model.stored import apply_estimates
+from flexcal.workflow.calibrated_robot import stored_estimates
 
 Render = Callable[[RobotModel, RobotModel], Rendered]
 """The calibrated and the nominal robot to the text of a file."""
@@ -111,8 +112,7 @@ def export_offsets(
 
 def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> ExportedRobot:
     nominal = RobotModel.from_yaml(robot, estimates=False)
-    path = nominal.path.parent / nominal.config.estimates if estimates is None else estimates
-    path = path / "estimates.yaml" if path.is_dir() else path
+    path = stored_estimates(nominal, estimates)
     for own, what in ((nominal.urdf, "nominal URDF"), (robot, "robot.yaml"), (path, "estimates file")):
         if out.exists() and own.exists() and out.samefile(own):
             raise InputError(f"{out} is the {what} of {robot}, which is never changed; give another --out.")

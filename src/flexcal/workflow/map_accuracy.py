@@ -15,26 +15,24 @@ from flexcal.calibration import (
     Propagation,
     Verification,
     accuracy_map,
-    error_roots,
     error_scale,
     error_sources,
     propagation,
     random_poses_in,
-    verify,
+    verify_jointly,
 )
-from flexcal.data import provenance
+from flexcal.data import page_beside, provenance
 from flexcal.data.table import write_table
 from flexcal.design import CollisionChecker
 from flexcal.errors import InputError
 from flexcal.progress import Progress, silent
 from flexcal.report.accuracy_map import MapStudy, write_map_page
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_choice import box_corners, working_volume
 from flexcal.workflow.verify_robot import fitted_files, verification_poses
 
-PAGE = ".html"
 _WORST = 5
 _APART = 0.1
 """Of the extent of all points: worst places are at least so far from each other."""
@@ -101,11 +99,7 @@ class RobotMap:
             if scale is None
             else {
                 "poses": len(scale.probability),
-                "factor": scale.factor,
-                "low": scale.low,
-                "high": scale.high,
-                "inside_95_percent": scale.inside,
-                "verdict": scale.verdict,
+                **scale.document(),
                 "applied": applied_factor(scale),
                 "fitted": list(self.fitted),
             },
@@ -136,12 +130,12 @@ def map_accuracy(
     `out` is a page (.html), or a table (.csv, .parquet) with the page beside it. `payload` in kg, None for the declared one. Raises
     `FlexcalError` where there is no calibration, files do not fit, or the robot does not reach.
     """
-    if out.suffix not in (PAGE, ".csv", ".parquet"):
+    if out.suffix not in (".html", ".csv", ".parquet"):
         raise InputError(f"{out} must end in .html, .csv or .parquet; give another --out.")
     require_distinct(verification)
     calibrated = calibrated_robot(robot, estimates, "map")
     model = calibrated.model
-    stations = [s for s in model.stations if f"station.{s}.x" in model.posterior.parameters]
+    stations = [s for s in model.stations if found_station(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
     scale, study = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
@@ -159,9 +153,9 @@ def map_accuracy(
         tuple(calibrated.blocks),
     )
     page = MapStudy(model, found, box, result.document(), scale, study, origin)
-    if out.suffix != PAGE:
+    if out != page_beside(out):
         _write_table(out, found)
-    write_map_page(out.with_suffix(PAGE), page)
+    write_map_page(page_beside(out), page)
     return result
 
 
@@ -194,9 +188,9 @@ def _verified(
     if not files:
         return None, None
     poses = verification_poses(calibrated, files)
-    found = verify(calibrated.model, poses)
+    found, roots = verify_jointly(calibrated.model, poses)
     noise = poses.sigma if poses.sigma_given else None
-    return error_scale(found, error_roots(calibrated.model, poses), noise), (found, noise)
+    return error_scale(found, roots, noise), (found, noise)
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:

@@ -17,12 +17,16 @@ from flexcal.calibration import (
     repeatability,
 )
 from flexcal.data import PoseSet, provenance, read_poses
-from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.report.repeatability import RepeatabilityStudy, write_repeatability_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
-from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.calibrated_robot import (
+    CalibratedRobot,
+    calibrated_robot,
+    found_station,
+    stored_estimates,
+)
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.results import write_results
@@ -109,7 +113,7 @@ def repeat_robot(
     errors: dict[str, np.ndarray] = {}
     if registrable(poses):
         errors["nominal"] = nominal_errors(nominal, poses)
-    if calibrated is not None and _placed(calibrated.model, poses):
+    if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
         errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
     result = RobotRepeatability(poses, visited, errors)
     if out is not None:
@@ -125,16 +129,9 @@ def repeat_robot(
 
 def _calibrated(robot: Path, estimates: Path | None, nominal: RobotModel) -> CalibratedRobot | None:
     """The calibrated robot; None where none was named and there is none beside robot.yaml."""
-    try:
-        return calibrated_robot(robot, estimates, "compare with")
-    except InputError:
-        if estimates is not None or (nominal.path.parent / nominal.config.estimates).exists():
-            raise
+    if estimates is None and not stored_estimates(nominal, None).exists():
         return None
-
-
-def _placed(model: RobotModel, poses: PoseSet) -> bool:
-    return all(f"station.{station}.x" in model.posterior.parameters for station in poses.stations)
+    return calibrated_robot(robot, estimates, "compare with")
 
 
 def _spread(values: Sequence[float]) -> dict[str, float] | None:

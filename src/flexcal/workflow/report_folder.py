@@ -5,9 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import polars as pl
-
 from flexcal.data import read_estimates
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
@@ -25,11 +22,12 @@ from flexcal.workflow.point_files import POINTS, read_arm, read_points
 from flexcal.workflow.prediction_files import read_predictions
 from flexcal.workflow.results import RESULTS, read_results
 from flexcal.workflow.stored_block import ESTIMATES
+from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
 
 REPORT = "report.html"
 _REPORTED = ("calibration", "verification", "stage1")
 _DYNAMICS, _INERTIALS, _GAINS = "base_parameters", "trajectories", "declared_gains"
-_CALIBRATION, _VERIFICATION = "term_selection", "rms_mm"
+OF_CALIBRATION, OF_VERIFICATION = "term_selection", "rms_mm"
 """What results.json of `identify dynamics`, `inertials` and `gains`, of `calibrate` and of `verify` holds, and no other."""
 
 
@@ -55,18 +53,23 @@ def report_folder(folder: Path) -> Path:
         elif _DYNAMICS in results:
             dynamics = DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder))
             write_dynamics_report(path, dynamics)
-        elif _VERIFICATION in results:
+        elif OF_VERIFICATION in results:
             points = read_points(folder, sigma=DEFAULT_SIGMA)
             write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
-        elif _CALIBRATION in results:
+        elif OF_CALIBRATION in results:
             write_calibration_report(path, calibration_study(folder))
         else:
             write_stored_report(path, _stored_study(folder, results))
     except KeyError as problem:
-        raise InputError(
-            f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had left it; run the verb that leaves it again."
-        ) from problem
+        raise lacking(folder, problem) from problem
     return path
+
+
+def lacking(folder: Path, problem: KeyError) -> InputError:
+    """Of a results.json that lacks a key."""
+    return InputError(
+        f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had left it; run the verb that leaves it again."
+    )
 
 
 def calibration_study(folder: Path) -> CalibrationStudy:
@@ -86,30 +89,13 @@ def _block(folder: Path, block: Block) -> Estimate:
 
 def _stored_study(folder: Path, results: dict[str, Any]) -> StoredStudy:
     path = folder / ESTIMATES
-    measured = (folder / POINTS).is_file()
+    measured, fresh = (folder / POINTS).is_file(), folder / VERIFICATION
     return StoredStudy(
         name=folder.resolve().name,
         results=results,
         estimates=read_estimates(path) if path.is_file() else {},
         responses=read_responses(sorted(folder.glob("response_pose_*.npz")))[1],
-        errors=_verification_errors(folder / "verification.csv"),
+        errors=read_verification(fresh).errors if fresh.is_file() else {},
         points=read_points(folder, sigma=DEFAULT_SIGMA) if measured else None,
         arms=read_arm(folder) if measured else None,
     )
-
-
-def _verification_errors(path: Path) -> dict[str, np.ndarray]:
-    """Errors (N, 3) m of the elastic and the rigid model, from the table that a two-stage run leaves."""
-    if not path.is_file():
-        return {}
-    try:
-        table = pl.read_csv(path)
-        truth = table.select("x", "y", "z").to_numpy()
-        return {
-            kind: truth - table.select(f"{kind}_x", f"{kind}_y", f"{kind}_z").to_numpy()
-            for kind in ("elastic", "rigid")
-        }
-    except (pl.exceptions.PolarsError, TypeError) as problem:
-        raise InputError(
-            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
-        ) from problem

@@ -12,13 +12,10 @@ import numpy as np
 
 from flexcal.atomic import write_text
 from flexcal.errors import InputError
-from flexcal.estimation import Dropped, Estimate, Identifiability, name_direction
+from flexcal.estimation import Dropped, Estimate, Identifiability
 
 RESULTS = "results.json"
 
-_WEAK_DIRECTIONS = 3
-_SHOWN = 0.2
-"""Members of a combination below this share of its largest are not named."""
 _ROUNDING = 1e-9
 """A coefficient below this, in SI units, is what rounding leaves of zero."""
 
@@ -63,18 +60,14 @@ def dropped_parameters(dropped: Iterable[Dropped]) -> list[dict[str, Any]]:
 
 def identifiability_block(found: Identifiability) -> dict[str, Any]:
     """Number of parameters, rank, dropped parameters, decades of the gap, and the weakest of the directions that are seen."""
-    weakest = range(found.rank - 1, max(-1, found.rank - 1 - _WEAK_DIRECTIONS), -1)
     return {
         "parameters": len(found.names),
         "rank": found.rank,
         "gap_decades": found.gap,
         "dropped": dropped_parameters(found.dropped),
         "weak_directions": [
-            {
-                "relative_singular_value": float(found.singular_values[i]),
-                "direction": name_direction(found.directions[i], found.names, threshold=_SHOWN),
-            }
-            for i in weakest
+            {"relative_singular_value": value, "direction": direction}
+            for direction, value in found.weak_seen_directions()
         ],
     }
 

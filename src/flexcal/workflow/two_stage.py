@@ -31,7 +31,7 @@ from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
-from flexcal.workflow.two_stage_results import two_stage_document, write_verification
+from flexcal.workflow.two_stage_results import VERIFICATION, two_stage_document, write_verification
 from flexcal.yaml_reader import read_yaml
 
 CALIBRATION_POSES, QUICK_POSES = 40, 25
@@ -190,7 +190,7 @@ def run_two_stage(
     study = replace(study, results=two_stage_document(study, exported))
     with watch.stage("report"):
         progress("report", 0.0)
-        write_verification(out / "verification.csv", study)
+        write_verification(out / VERIFICATION, study)
         errors = {NOMINAL: study.nominal_at_calibration.errors, CALIBRATED: calibration.residuals}
         write_points(out, MeasuredPoints(measured, errors, calibration.ambiguous))
         write_arm(out, arms_at(calibration.model, measured, errors))

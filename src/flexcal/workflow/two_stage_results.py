@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import polars as pl
 
 from flexcal.atomic import write_text
 from flexcal.calibration import ErrorStatistics
+from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.export import Exported
 from flexcal.model.names import SPRINGS
 from flexcal.report.study import CadAlone, TwoStageStudy
 from flexcal.workflow.results import identifiability_block, quantities
+
+VERIFICATION = "verification.csv"
 
 
 def two_stage_document(study: TwoStageStudy, exported: Exported) -> dict[str, Any]:
@@ -95,6 +100,32 @@ def wrong_flanks(study: TwoStageStudy) -> int:
     poses = study.calibration.poses
     true = static_equilibrium(study.nominal.with_values(study.truth), poses.q, poses.payload).flank
     return int((true != study.calibration.flank).any(axis=1).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class StoredVerification:
+    """Joint positions `q` (N, n), true points `truth` (N, 3) m, and the `errors` (N, 3) m of the elastic and the rigid model."""
+
+    q: np.ndarray
+    truth: np.ndarray
+    errors: dict[str, np.ndarray]
+
+
+def read_verification(path: Path) -> StoredVerification:
+    """What `write_verification` left; raises `InputError` where it cannot be read."""
+    try:
+        table = pl.read_csv(path)
+        q = table.select([name for name in table.columns if name[0] == "q"]).to_numpy()
+        truth = table.select("x", "y", "z").to_numpy()
+        errors = {
+            kind: truth - table.select(f"{kind}_x", f"{kind}_y", f"{kind}_z").to_numpy()
+            for kind in ("elastic", "rigid")
+        }
+        return StoredVerification(q, truth, errors)
+    except (pl.exceptions.PolarsError, TypeError) as problem:
+        raise InputError(
+            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
+        ) from problem
 
 
 def write_verification(path: Path, study: TwoStageStudy) -> None:

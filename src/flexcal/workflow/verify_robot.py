@@ -17,7 +17,7 @@ from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
-from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.pose_remarks import unused_columns
@@ -124,7 +124,7 @@ def verification_poses(calibrated: CalibratedRobot, files: Sequence[Path]) -> Po
     poses = read_poses(list(files), model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
     for station in poses.stations:
-        if f"station.{station}.x" not in model.posterior.parameters:
+        if not found_station(model, station):
             raise FlexcalError(
                 f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
             )

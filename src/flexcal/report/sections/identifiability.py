@@ -8,15 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.estimation import Dropped, Identifiability, name_direction
+from flexcal.estimation import Dropped, Identifiability
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.page import Block, FigureBlock, Table, Text
 from flexcal.report.publication import Publication
 
 _MOST = 4
-_WEAK = 3
-_SHOWN = 0.2
-"""Members of a combination below this share of its largest are not named."""
 
 _NOTHING = 1e-9
 """Amounts (SI) below this are rounding errors of a column that is zero."""
@@ -41,14 +38,6 @@ class Determined:
     @classmethod
     def of(cls, found: Identifiability) -> Determined:
         """From an analysis."""
-        weak = range(found.rank - 1, max(-1, found.rank - 1 - _WEAK), -1)
-        named = tuple(
-            (
-                name_direction(found.directions[i], found.names, threshold=_SHOWN),
-                float(found.singular_values[i]),
-            )
-            for i in weak
-        )
         return cls(
             len(found.names),
             found.rank,
@@ -56,7 +45,7 @@ class Determined:
             found.singular_values,
             found.diagonal,
             found.dropped,
-            named,
+            found.weak_seen_directions(),
         )
 
     @classmethod
