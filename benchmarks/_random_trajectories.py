@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flexcal.design import CollisionChecker, joint_ranges
+from flexcal.design import CollisionChecker
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
+from flexcal.model.joint_space import joint_ranges
 
 INSTANTS = 200
 SHARE = 0.95

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration import accuracy_map, calibrate, predict, propagation, random_poses_in
-from flexcal.calibration.propagation import covariance_root, moving_parameters
+from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
 from flexcal.data import PoseSet
 from flexcal.estimation.gaussian_distance import distance_quantile, principal_variances
 from flexcal.model import RobotModel

@@ -24,7 +24,7 @@ from flexcal.design import (
     random_poses,
     visiting_order,
 )
-from flexcal.design.pose_candidates import tool_weight
+from flexcal.design.feasible_poses import tool_weight
 from flexcal.design.poses import criterion_named
 from flexcal.design.shortlist import choose
 from flexcal.estimation import Sensitivity

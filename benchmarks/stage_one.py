@@ -14,18 +14,13 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.elasticity import (
-    CovarianceWeighting,
-    MultiStart,
-    ResponseModel,
-    spring_names,
-    stage_one_parameters,
-)
+from flexcal.elasticity import CovarianceWeighting, MultiStart, ResponseModel, stage_one_parameters
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.estimation import Problem, solve
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.linearisation import linearise
+from flexcal.model.names import spring_names
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "tx90l"
 PEER_SECONDS = 200.0

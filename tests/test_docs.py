@@ -19,7 +19,7 @@ import pytest
 
 import flexcal
 from flexcal.cli.main import main
-from flexcal.dynamics.drive_gains import gain_name
+from flexcal.dynamics.gain_fit import gain_name
 from flexcal.elasticity import stage_one_parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.frequency.response import POOLED_LINES, SMALLEST_FREEDOM

@@ -22,6 +22,13 @@ def test_every_public_name_resolves(name: str) -> None:
     assert [item for item in public if not hasattr(module, item)] == []
 
 
+@pytest.mark.parametrize("name", ["flexcal", *LAYERS])
+def test_no_module_stands_before_a_public_name_that_is_imported_late(name: str) -> None:
+    package = importlib.import_module(name)
+    modules = {module.name for module in pkgutil.iter_modules(package.__path__)}
+    assert modules.isdisjoint(getattr(package, "__all__", ()))
+
+
 @pytest.mark.parametrize("name", LAYERS)
 def test_every_public_object_has_a_docstring(name: str) -> None:
     module = importlib.import_module(name)

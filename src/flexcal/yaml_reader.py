@@ -17,18 +17,19 @@ from flexcal.structuring import Keys, MisfitError, structure
 from flexcal.yaml_writer import write_yaml
 
 if TYPE_CHECKING:
-    from ruamel.yaml.nodes import Node, ScalarNode
+    from yaml import Node, ScalarNode
 
 __all__ = ["YamlFile", "read_yaml", "read_yaml_file", "write_yaml"]
 
 T = TypeVar("T")
 
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
-_TAG = "tag:yaml.org,2002:"
-_TAGS = {
-    _TAG + name
-    for name in ["null", "bool", "int", "float", "str", "timestamp", "seq", "map", "value", "merge"]
+_NO_NUMBER = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+_NULL = {"", "~", "null", "Null", "NULL"}
+_TRUTH = {
+    word: value for value in (True, False) for word in (str(value), str(value).lower(), str(value).upper())
 }
+_TAGS = {f"tag:yaml.org,2002:{name}" for name in ["null", "bool", "int", "float", "str", "seq", "map"]}
 
 
 @dataclass(frozen=True)
@@ -86,11 +87,14 @@ def read_yaml_file(path: str | Path) -> YamlFile:
 
 
 def _compose(path: Path, text: str) -> Node | None:
-    from ruamel.yaml import YAML
-    from ruamel.yaml.error import MarkedYAMLError, YAMLError
+    from yaml import CSafeLoader, MarkedYAMLError, YAMLError
 
+    loader = None
     try:
-        return YAML(typ="safe", pure=True).compose(text)
+        loader = CSafeLoader(text)
+        # plain scalars stay texts, for `_scalar`: PyYAML would read them by YAML 1.1, where `no` is false and 1e3 a text
+        loader.yaml_implicit_resolvers = {}
+        return loader.get_single_node()
     except MarkedYAMLError as problem:
         mark = problem.problem_mark or problem.context_mark
         place = f"line {mark.line + 1}, column {mark.column + 1}" if mark else "somewhere"
@@ -99,10 +103,13 @@ def _compose(path: Path, text: str) -> Node | None:
     except YAMLError as problem:
         what = " ".join(str(problem).split())
         raise InputError(f"{path}: not valid YAML ({what}); correct it.") from None
+    finally:
+        if loader is not None:
+            loader.dispose()
 
 
 def _construct(path: Path, node: Node, keys: Keys, lines: dict[Keys, int], above: tuple[int, ...]) -> Any:
-    from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+    from yaml import MappingNode, ScalarNode, SequenceNode
 
     line = node.start_mark.line + 1
     if id(node) in above:
@@ -136,18 +143,19 @@ def _construct(path: Path, node: Node, keys: Keys, lines: dict[Keys, int], above
 
 def _scalar(node: ScalarNode) -> Any:
     """A scalar by the core schema of YAML 1.2."""
-    text, tag = str(node.value), str(node.tag).removeprefix(_TAG)
-    if tag == "null":
+    text = str(node.value)
+    if node.style:
+        return text
+    if text in _NULL:
         return None
-    if tag == "bool":
-        return text.lower() == "true"
-    plain = node.style in (None, "")
-    if plain and re.fullmatch(r"[-+]?[0-9]+", text):
+    if text in _TRUTH:
+        return _TRUTH[text]
+    if re.fullmatch(r"[-+]?[0-9]+", text):
         return int(text)
-    if plain and re.fullmatch(r"0[xo][0-9a-fA-F]+", text) and tag == "int":
+    if re.fullmatch(r"0[xo][0-9a-fA-F]+", text):
         return int(text, 0)
-    if plain and _FLOAT.fullmatch(text):
+    if _FLOAT.fullmatch(text):
         return float(text)
-    if plain and tag == "float" and text.lower().lstrip("+-") in (".nan", ".inf"):
-        return float(text.lower().replace(".", ""))
+    if _NO_NUMBER.fullmatch(text):
+        return float(text.replace(".", ""))
     return text

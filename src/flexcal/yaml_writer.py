@@ -7,13 +7,17 @@ import math
 import re
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from flexcal.atomic import write_text
 from flexcal.errors import FlexcalError
 from flexcal.structuring import Keys, dotted, file_key
+
+if TYPE_CHECKING:
+    from yaml import ScalarNode
+    from yaml.cyaml import CSafeDumper
 
 _WORDS = re.compile(r"[A-Za-z_/]([A-Za-z0-9_./()-]| (?=[A-Za-z0-9_./(-]))*")
 
@@ -28,16 +32,20 @@ def write_yaml(path: str | Path, value: Any) -> None:
 
 def yaml_text(value: Any) -> str:
     """`value` as the YAML text that `write_yaml` writes."""
-    from io import StringIO
+    import yaml
 
-    from ruamel.yaml import YAML
+    class Dumper(yaml.CSafeDumper):
+        """Writes texts of more than plain words in double quotes."""
 
-    yaml = YAML(typ="rt", pure=True)
-    yaml.default_flow_style = None
-    yaml.width = 110
-    stream = StringIO()
-    yaml.dump(_quoted(to_plain(value)), stream)
-    return stream.getvalue()
+    Dumper.add_representer(str, _text)
+    return yaml.dump(
+        to_plain(value),
+        Dumper=Dumper,
+        default_flow_style=None,
+        width=110,
+        sort_keys=False,
+        allow_unicode=True,
+    )
 
 
 def to_plain(value: Any) -> Any:
@@ -45,15 +53,10 @@ def to_plain(value: Any) -> Any:
     return _plain(value, ())
 
 
-def _quoted(value: Any) -> Any:
-    """Plain data whose texts stand in double quotes unless they are plain words, read alike everywhere."""
-    from ruamel.yaml.scalarstring import DoubleQuotedScalarString
-
-    if isinstance(value, str):
-        return value if _WORDS.fullmatch(value) else DoubleQuotedScalarString(value)
-    if isinstance(value, dict):
-        return {_quoted(key): _quoted(item) for key, item in value.items()}
-    return [_quoted(item) for item in value] if isinstance(value, list) else value
+def _text(dumper: CSafeDumper, text: str) -> ScalarNode:
+    """A text, in double quotes unless it is plain words, read alike everywhere."""
+    style = None if _WORDS.fullmatch(text) else '"'
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style)
 
 
 def _plain(value: Any, keys: Keys) -> Any:

@@ -17,8 +17,8 @@ from flexcal.calibration import (
     propagation,
     random_poses_in,
 )
-from flexcal.calibration.error_sources import source_of
-from flexcal.calibration.propagation import covariance_root, moving_parameters
+from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
+from flexcal.calibration.sources import source_of
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters

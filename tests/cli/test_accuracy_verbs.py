@@ -14,7 +14,8 @@ from cli_files import copied, read_csv, snapshot, write_csv
 
 from flexcal.calibration import predict
 from flexcal.cli.main import main
-from flexcal.data import read_poses, sha256_of, write_poses
+from flexcal.data import read_poses, write_poses
+from flexcal.estimates_file import sha256_of
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.report.notation import millimetres
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from cli_files import FLEXCAL, read_csv, snapshot, write_csv
 
-from flexcal.data import PoseSet, read_estimates, write_estimates, write_poses
+from flexcal.data import PoseSet, write_poses
+from flexcal.estimates_file import read_estimates, write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model import RobotModel, point_kinematics, static_equilibrium
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data import PosePlan, read_estimates, read_plan_of
+from flexcal.data import PosePlan, read_plan_of
+from flexcal.estimates_file import read_estimates
 from flexcal.model import RobotModel, point_kinematics
 
 

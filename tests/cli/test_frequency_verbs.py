@@ -19,8 +19,9 @@ from test_bad_input import refused
 from flexcal.cell import read_truth, write_truth
 from flexcal.cli.main import main
 from flexcal.cli.verbs import find_verb
-from flexcal.data import MultisinePlan, read_estimates, read_plan_of, write_plan
+from flexcal.data import MultisinePlan, read_plan_of, write_plan
 from flexcal.elasticity import PopulationSearch
+from flexcal.estimates_file import read_estimates
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel

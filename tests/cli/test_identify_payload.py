@@ -10,9 +10,9 @@ import pytest
 from conftest import Run
 from two_links import GAINS, HELD, swings, two_links
 
-from flexcal.data import read_estimates
 from flexcal.dynamics import CLASSIC, Observation
 from flexcal.errors import InputError
+from flexcal.estimates_file import read_estimates
 from flexcal.model import RobotModel, gravity_torque
 
 ROBOT = "dynamics: {cutoff_hz: 20, decimation: 1, friction: classic}\n"

@@ -16,7 +16,8 @@ from test_bad_input import refused
 
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth
 from flexcal.cli.main import main
-from flexcal.data import FourierPaths, TrajectoryPlan, read_estimates, read_plan_of, write_plan
+from flexcal.data import FourierPaths, TrajectoryPlan, read_plan_of, write_plan
+from flexcal.estimates_file import read_estimates
 from flexcal.model import RobotModel
 from flexcal.progress import silent
 from flexcal.report.notation import significant

@@ -1,18 +1,11 @@
 import numpy as np
 import pytest
 
-from flexcal.design import (
-    CollisionChecker,
-    MeasuringSetup,
-    joint_ranges,
-    preloaded,
-    random_candidates,
-    visible,
-)
+from flexcal.design import CollisionChecker, MeasuringSetup, preloaded, random_candidates, visible
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
 from flexcal.model.config import AcceptanceConfig
-from flexcal.model.joint_space import LIMIT_MARGIN
+from flexcal.model.joint_space import LIMIT_MARGIN, joint_ranges
 from flexcal.units import DEGREE
 
 

@@ -8,7 +8,7 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from flexcal.design import CollisionChecker, exchange, joint_ranges
+from flexcal.design import CollisionChecker, exchange
 from flexcal.design.amplitude import MOST, ROOM, shaped
 from flexcal.design.frequency_candidates import ExcitablePoses
 from flexcal.design.frequency_poses import choose_frequency_poses, stiffness_curve
@@ -22,6 +22,7 @@ from flexcal.errors import FlexcalError
 from flexcal.frequency import leave_out_detection_lines, multisine
 from flexcal.model import gravity_torque
 from flexcal.model.closed_loop import closed_loop_motion, drive_pull
+from flexcal.model.joint_space import joint_ranges
 from flexcal.model.linearisation import linearise
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from flexcal.data import PoseSet
 from flexcal.design import next_poses, pose_candidates, random_poses
-from flexcal.design.pose_sensitivity import pose_sensitivity
+from flexcal.design.geometry_sensitivity import pose_sensitivity
 from flexcal.errors import FlexcalError
 
 

@@ -10,7 +10,7 @@ from flexcal.design import (
     geometry_jacobian,
     pose_sensitivity,
 )
-from flexcal.design.pose_candidates import tool_weight
+from flexcal.design.feasible_poses import tool_weight
 from flexcal.design.poses import tool_error
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity

@@ -12,7 +12,6 @@ from flexcal.design import (
     base_sensitivity,
     design_poses,
     exchange,
-    joint_ranges,
     observability,
     pose_curve,
     pose_sensitivity,
@@ -23,6 +22,7 @@ from flexcal.design import (
 from flexcal.design.poses import tool_error
 from flexcal.errors import FlexcalError
 from flexcal.model import gravity_torque
+from flexcal.model.joint_space import joint_ranges
 
 POOL = Path(__file__).parent / "pose_pool.csv"
 
@@ -58,7 +58,7 @@ def test_29_directions_are_kept(design):
 
 
 def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design, rng):
-    from flexcal.design.pose_candidates import tool_weight
+    from flexcal.design.feasible_poses import tool_weight
 
     fresh = tool_weight(design.base, tx90l, random_poses(tx90l, 400, rng).q)
     chosen = tool_error(design.base, fresh, design.selection.chosen)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flexcal.design import CollisionChecker, visiting_order
-from flexcal.design.visiting_order import blocked, move_seconds
+from flexcal.design.visits import blocked, move_seconds
 from flexcal.model import RobotModel
 
 LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>{}</link>'

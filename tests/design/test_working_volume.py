@@ -6,16 +6,16 @@ from flexcal.design import (
     base_sensitivity,
     design_poses,
     geometry_jacobian,
-    joint_ranges,
     pose_sensitivity,
     random_poses,
     working_box,
     working_points,
 )
-from flexcal.design.pose_candidates import tool_weight
+from flexcal.design.feasible_poses import tool_weight
 from flexcal.design.poses import tool_error
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
+from flexcal.model.joint_space import joint_ranges
 
 LOWER, UPPER = np.array([0.5, -0.2, 0.3]), np.array([0.9, 0.2, 0.7])
 

@@ -19,7 +19,7 @@ from flexcal.dynamics import (
     observe,
     weighted_least_squares,
 )
-from flexcal.dynamics.experiment_system import BATCHES, batch_length, batched
+from flexcal.dynamics.batched_equations import BATCHES, batch_length, batched
 from flexcal.dynamics.rows import rows
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])

@@ -9,7 +9,7 @@ from two_links import GAINS, HELD, PAYLOAD, swings, two_links
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import CLASSIC, BaseParameters, Observation, RegressionData, drive_gains, observe
-from flexcal.dynamics.experiment_system import Batch
+from flexcal.dynamics.batched_equations import Batch
 from flexcal.dynamics.instrumental_fit import instrumental_fit
 from flexcal.errors import FlexcalError
 

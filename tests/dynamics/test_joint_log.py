@@ -19,7 +19,7 @@ from flexcal.dynamics import (
     observe,
     weighted_least_squares,
 )
-from flexcal.dynamics.column_errors import NoisyLog
+from flexcal.dynamics.noisy_columns import NoisyLog
 from flexcal.dynamics.rows import rows
 from flexcal.errors import FlexcalError, InputError
 from flexcal.progress import silent

@@ -10,7 +10,6 @@ import pytest
 from recovery import driven
 from two_links import true_values, two_links
 
-from flexcal.data import write_estimates
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
@@ -27,6 +26,7 @@ from flexcal.dynamics import (
     write_learned_residual,
 )
 from flexcal.errors import FlexcalError, InputError
+from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate
 
 SHARES = np.array([[1.0, 0.0], [0.5, 1.0]])

@@ -21,8 +21,8 @@ from flexcal.dynamics import (
     total_least_squares,
     weighted_least_squares,
 )
-from flexcal.dynamics.column_errors import position_noise
 from flexcal.dynamics.linear_fit import Unknowns, weighted_system
+from flexcal.dynamics.noisy_columns import position_noise
 from flexcal.dynamics.wls import noise_levels
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.elasticity import spring_names
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.linearisation import linearise
+from flexcal.model.names import spring_names
 from flexcal.model.transfer import transfer_matrix
 
 Synthesis = Callable[..., list[FrequencyResponse]]

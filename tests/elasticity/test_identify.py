@@ -18,13 +18,13 @@ from flexcal.elasticity import (
     UniformWeighting,
     identify_stiffness,
     reference_shift,
-    spring_names,
 )
 from flexcal.elasticity.gap import gap_compliance
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
 from flexcal.estimation import Parameters
 from flexcal.model.declared import declared, uncertain_inertials
+from flexcal.model.names import spring_names
 from flexcal.model.posterior import Posterior
 
 VISCOUS = np.array([1.6, 1.3, 1.8])

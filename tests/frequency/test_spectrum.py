@@ -5,7 +5,7 @@ import pytest
 
 from flexcal.errors import FlexcalError
 from flexcal.frequency import noise_lines, spectrum
-from flexcal.frequency.spectrum import noise_in_half_sum, torque_hold
+from flexcal.frequency.line_spectra import noise_in_half_sum, torque_hold
 
 
 def test_spectrum_finds_phasors_on_whole_and_half_lines(rng):

@@ -14,7 +14,7 @@ import polars as pl
 import pytest
 from outline import Outline
 
-from flexcal.data import read_estimates
+from flexcal.estimates_file import read_estimates
 from flexcal.report import DynamicsStudy
 from flexcal.report.dynamics import dynamics_checks, dynamics_verdict
 from flexcal.report.notation import significant

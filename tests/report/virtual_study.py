@@ -8,12 +8,12 @@ import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, verify
 from flexcal.data import MultisinePlan, PoseSet
-from flexcal.elasticity import StiffnessResult, spring_names
+from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.linearisation import linearise
-from flexcal.model.names import GEOMETRY, SPRINGS
+from flexcal.model.names import GEOMETRY, SPRINGS, spring_names
 from flexcal.model.transfer import transfer_matrix
 from flexcal.report import TX90L_PAPER, TwoStageStudy
 from flexcal.units import DEGREE

@@ -14,8 +14,7 @@ import pytest
 
 from flexcal.calibration import ErrorStatistics
 from flexcal.cell import read_truth
-from flexcal.data import read_estimates, sha256_of
-from flexcal.estimates_file import block_sha256
+from flexcal.estimates_file import block_sha256, read_estimates, sha256_of
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.workflow import two_stage
 from flexcal.workflow.frequency_plans import frequency_plan

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.calibrate import Calibration
+from flexcal.calibration.geometric_calibration import Calibration
 from flexcal.calibration.geometry_fit import columns_of
 from flexcal.calibration.prediction import predict
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.calibrate import Calibration, calibrate
 from flexcal.calibration.folds import order_folds, workspace_folds
+from flexcal.calibration.geometric_calibration import Calibration, calibrate
 from flexcal.calibration.prediction import predict
 from flexcal.calibration.terms import geometric_parameters, tolerances
 from flexcal.data import PoseSet

@@ -10,7 +10,7 @@ from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.prediction import predict
-from flexcal.calibration.propagation import covariance_root, moving_parameters
+from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 

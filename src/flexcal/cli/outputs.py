@@ -8,8 +8,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from flexcal.data import page_beside, sha256_of
+from flexcal.data import page_beside
 from flexcal.errors import InputError
+from flexcal.estimates_file import sha256_of
 
 LEDGER = ".flexcal"
 """In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it; of a name the last line counts."""

@@ -1,7 +1,5 @@
 """Calibrated model and tool targets to the motor commands that put the real tool there."""
 
-from flexcal.compensation.compensate import Compensation, compensate
-from flexcal.compensation.postures import best_posture
-from flexcal.compensation.wanted import wanted_pose
+import lazy_loader
 
-__all__ = ["Compensation", "best_posture", "compensate", "wanted_pose"]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.model import PointKinematics, RobotModel
+from flexcal.model.resting_tool import points_kinematics
 from flexcal.model.rotations import rotation_vector
-from flexcal.model.tool_at_rest import points_kinematics
 
 _NEAR = 1e-9
 """A pose is reached where every coordinate of its point (m) and of its rotation (rad) is nearer than this."""

@@ -8,8 +8,8 @@ from flexcal.compensation.aim import Aim
 from flexcal.data import ToolTargets
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
+from flexcal.model.resting_tool import points_kinematics
 from flexcal.model.rotations import vector_rotation
-from flexcal.model.tool_at_rest import points_kinematics
 
 _POSE = 6
 

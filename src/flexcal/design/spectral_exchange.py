@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from flexcal.design.criteria import DOptimal, SpectralCriterion, TraceOptimal
-from flexcal.design.exchange import CHOOSING, Selection, exchange, greedy
+from flexcal.design.exchange_algorithm import CHOOSING, Selection, exchange, greedy
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 

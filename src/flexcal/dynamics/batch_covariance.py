@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.experiment_system import Batch
+from flexcal.dynamics.batched_equations import Batch
 from flexcal.dynamics.regression import RegressionData
 
 _LEVERAGE = 0.9

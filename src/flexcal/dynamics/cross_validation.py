@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.experiment_system import ExperimentSystem, reduced
+from flexcal.dynamics.batched_equations import ExperimentSystem, reduced
 from flexcal.dynamics.triangle import Triangle, widened
 from flexcal.errors import FlexcalError
 

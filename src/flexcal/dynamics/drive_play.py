@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from flexcal.dynamics.base_parameters import BaseParameters
-from flexcal.dynamics.experiment_system import ExperimentSystem
+from flexcal.dynamics.batched_equations import ExperimentSystem
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.wls import weighted_least_squares

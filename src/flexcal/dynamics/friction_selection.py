@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.batched_equations import ExperimentSystem
 from flexcal.dynamics.cross_validation import folds
 from flexcal.dynamics.drive_terms import CLASSIC, DriveTerm
-from flexcal.dynamics.experiment_system import ExperimentSystem
 from flexcal.dynamics.friction_choice import (
     Candidate,
     Trial,

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.dynamics.batched_equations import ExperimentSystem
 from flexcal.dynamics.drive_terms import Coulomb, Coupling, DriveTerm, RotorInertia, TorqueOffset, Viscous
-from flexcal.dynamics.experiment_system import ExperimentSystem
 from flexcal.dynamics.friction_choice import Candidate
 from flexcal.dynamics.friction_library import (
     AsymmetricCoulomb,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.batch_covariance import BatchCovariance, rows_of, score_covariance
-from flexcal.dynamics.experiment_system import Batch
+from flexcal.dynamics.batched_equations import Batch
 from flexcal.dynamics.triangle import triangular
 from flexcal.errors import FlexcalError
 

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.dynamics.arm_yield import YIELD, error_column
-from flexcal.dynamics.experiment_system import Batch
+from flexcal.dynamics.batched_equations import Batch
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.robot_prior import FRICTION, RobotPrior
 from flexcal.dynamics.triangle import triangular

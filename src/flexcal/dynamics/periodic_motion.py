@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.data import Recording, TrajectoryPlan
 from flexcal.errors import FlexcalError
-from flexcal.frequency.spectrum import torque_hold
+from flexcal.frequency.line_spectra import torque_hold
 
 _FOLLOWS = 0.1
 """A motion farther than this from its planned one (rad or m) is another motion."""

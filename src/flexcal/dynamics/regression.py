@@ -10,8 +10,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
+from flexcal.dynamics.batched_equations import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
 from flexcal.dynamics.equations import Equations
-from flexcal.dynamics.experiment_system import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
 from flexcal.dynamics.rows import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model.regressor import INERTIAL

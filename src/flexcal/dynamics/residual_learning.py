@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.dynamics.batched_equations import ExperimentSystem
 from flexcal.dynamics.cross_validation import fold_numbers, folds, solutions
-from flexcal.dynamics.experiment_system import ExperimentSystem
 from flexcal.dynamics.gaussian_process import GaussianProcess
 from flexcal.dynamics.learned_residual import LearnedMotor, LearnedResidual, motor_inputs
 from flexcal.dynamics.motor_axis import motor_shares

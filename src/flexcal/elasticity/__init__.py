@@ -1,29 +1,5 @@
 """Stage 1: from frequency responses to the stiffness and damping of drives and bearings, with true uncertainties."""
 
-from flexcal.elasticity.identify import StiffnessResult, identify_stiffness
-from flexcal.elasticity.model_error import Tolerances
-from flexcal.elasticity.parameters import stage_one_parameters
-from flexcal.elasticity.periodic_response import reference_shift
-from flexcal.elasticity.prediction import ResponseModel
-from flexcal.elasticity.reference_motion import ReferenceMotion
-from flexcal.elasticity.search import MultiStart, PopulationSearch, Search
-from flexcal.elasticity.weighting import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
-from flexcal.model.names import spring_names
+import lazy_loader
 
-__all__ = [
-    "CovarianceWeighting",
-    "MultiStart",
-    "PaperWeighting",
-    "PopulationSearch",
-    "ReferenceMotion",
-    "ResponseModel",
-    "Search",
-    "StiffnessResult",
-    "Tolerances",
-    "UniformWeighting",
-    "Weighting",
-    "identify_stiffness",
-    "reference_shift",
-    "spring_names",
-    "stage_one_parameters",
-]
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

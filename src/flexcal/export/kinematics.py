@@ -84,9 +84,9 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
 
 
 def _tool_map(text: str, root: np.ndarray, tool: np.ndarray) -> ToolMap:
-    from ruamel.yaml import YAML
+    import yaml
 
-    read = YAML(typ="safe", pure=True).load(text)["kinematics"]
+    read = yaml.safe_load(text)["kinematics"]
     links = [from_six(read[name]) for name in LINKS]
 
     def positions(q: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import Literal, get_args
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.frequency.spectrum import ExperimentSpectra
+from flexcal.frequency.line_spectra import ExperimentSpectra
 
 Average = Literal["arithmetic", "logarithmic", "harmonic", "h1", "joint_input_output", "errors_in_variables"]
 

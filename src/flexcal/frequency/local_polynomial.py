@@ -14,10 +14,10 @@ import numpy as np
 from flexcal.data import MultisinePlan, Recording
 from flexcal.errors import FlexcalError
 from flexcal.frequency import covariance as cov
+from flexcal.frequency.line_spectra import has_reference, kept_samples
 from flexcal.frequency.periods import column_factor
 from flexcal.frequency.records import PoseRecords, by_pose
 from flexcal.frequency.response import SMALLEST_FREEDOM, FrequencyResponse, axis_names
-from flexcal.frequency.spectrum import has_reference, kept_samples
 
 ORDER = 2
 LEAST_LINES, MOST_LINES = 3, 7

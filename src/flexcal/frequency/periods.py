@@ -5,8 +5,7 @@ import numpy as np
 from flexcal.data import MultisinePlan, Recording
 from flexcal.frequency import covariance as cov
 from flexcal.frequency import multisine
-from flexcal.frequency.records import PoseRecords
-from flexcal.frequency.spectrum import (
+from flexcal.frequency.line_spectra import (
     ExperimentSpectra,
     kept_samples,
     noise_in_half_sum,
@@ -14,6 +13,7 @@ from flexcal.frequency.spectrum import (
     spectrum,
     torque_hold,
 )
+from flexcal.frequency.records import PoseRecords
 
 
 def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray, ...]:

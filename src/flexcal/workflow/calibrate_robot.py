@@ -21,8 +21,9 @@ from flexcal.calibration import (
     select_terms,
 )
 from flexcal.calibration.geometry_fit import LossName
-from flexcal.data import PoseSet, provenance, read_estimates, read_poses
+from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
+from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks

@@ -6,9 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexcal.data import read_estimates
 from flexcal.errors import InputError
-from flexcal.estimates_file import Block
+from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks

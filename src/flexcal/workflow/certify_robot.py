@@ -22,8 +22,9 @@ from flexcal.calibration import (
     verify_jointly,
 )
 from flexcal.compensation import wanted_pose
-from flexcal.data import PoseSet, ToolTargets, read_targets, sha256_of
+from flexcal.data import PoseSet, ToolTargets, read_targets
 from flexcal.errors import InputError
+from flexcal.estimates_file import sha256_of
 from flexcal.model import RobotModel, carried_mass
 from flexcal.model.rotations import vector_rotation
 from flexcal.report.certificate import CertificateStudy, write_certificate

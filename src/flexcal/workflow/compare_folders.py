@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.calibration import ErrorStatistics
-from flexcal.data import read_estimates
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
+from flexcal.estimates_file import read_estimates
 from flexcal.report.measured_points import NOMINAL
 from flexcal.report.runs import Comparison, Run
 from flexcal.report.two_runs import write_comparison

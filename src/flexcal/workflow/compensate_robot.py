@@ -15,7 +15,7 @@ from flexcal.data.table import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
 from flexcal.model.joint_space import joint_limits
-from flexcal.model.tool_at_rest import points_kinematics
+from flexcal.model.resting_tool import points_kinematics
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import calibrated_robot, found_station

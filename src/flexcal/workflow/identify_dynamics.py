@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from flexcal.data import provenance, read_estimates
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
@@ -20,6 +19,7 @@ from flexcal.dynamics import (
     with_play,
 )
 from flexcal.errors import InputError
+from flexcal.estimates_file import provenance, read_estimates
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent

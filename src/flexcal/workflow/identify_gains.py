@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import provenance
 from flexcal.data.signals import mapped_signals
 from flexcal.dynamics import (
     CLASSIC,
@@ -22,6 +21,7 @@ from flexcal.dynamics import (
     drive_gains,
 )
 from flexcal.errors import InputError
+from flexcal.estimates_file import provenance
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from flexcal.data import FolderCell, Recording, TrajectoryPlan, labels, provenance, read_estimates
+from flexcal.data import FolderCell, Recording, TrajectoryPlan, labels
 from flexcal.data.experiment_folder import PLAN, existing_file
 from flexcal.dynamics import LogFaults, identify_with_prior, trajectory_error
 from flexcal.errors import InputError
+from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent

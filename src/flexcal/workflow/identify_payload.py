@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.data import provenance, read_estimates, sha256_of
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
@@ -29,7 +28,7 @@ from flexcal.dynamics import (
     log_blocks,
 )
 from flexcal.errors import InputError
-from flexcal.estimates_file import Block
+from flexcal.estimates_file import Block, provenance, read_estimates, sha256_of
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.held_payload import holding, last_frame

@@ -9,7 +9,6 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.data import provenance, read_estimates
 from flexcal.elasticity import (
     CovarianceWeighting,
     MultiStart,
@@ -21,6 +20,7 @@ from flexcal.elasticity import (
     Weighting,
     identify_stiffness,
 )
+from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY

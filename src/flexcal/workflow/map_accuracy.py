@@ -21,10 +21,11 @@ from flexcal.calibration import (
     random_poses_in,
     verify_jointly,
 )
-from flexcal.data import page_beside, provenance
+from flexcal.data import page_beside
 from flexcal.data.table import write_table
 from flexcal.design import CollisionChecker
 from flexcal.errors import InputError
+from flexcal.estimates_file import provenance
 from flexcal.progress import Progress, silent
 from flexcal.report.accuracy_map import MapStudy, write_map_page
 from flexcal.units import MILLIMETRE

@@ -12,7 +12,7 @@ from flexcal.calibration import ErrorStatistics
 from flexcal.data import ToolTargets, read_commands, write_targets
 from flexcal.model import carried_mass, tool_at_rest
 from flexcal.model.flank import certain_flank
-from flexcal.model.tool_at_rest import points_kinematics
+from flexcal.model.resting_tool import points_kinematics
 from flexcal.workflow.calibrated_robot import calibrated_robot
 
 

@@ -16,7 +16,8 @@ from flexcal.calibration import (
     predict,
     repeatability,
 )
-from flexcal.data import PoseSet, provenance, read_poses
+from flexcal.data import PoseSet, read_poses
+from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
 from flexcal.report.repeatability import RepeatabilityStudy, write_repeatability_report
 from flexcal.units import MILLIMETRE

@@ -5,10 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from flexcal.data import read_estimates
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
-from flexcal.estimates_file import Block
+from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report

@@ -6,7 +6,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from flexcal.cell import VirtualCell
-from flexcal.data import provenance, write_estimates, write_plan
+from flexcal.data import write_plan
+from flexcal.estimates_file import provenance, write_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress

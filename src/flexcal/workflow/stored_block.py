@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from flexcal.data import write_estimates
-from flexcal.estimates_file import Block
+from flexcal.estimates_file import Block, write_estimates
 from flexcal.estimation import Estimate
 
 ESTIMATES = "estimates.yaml"

@@ -12,10 +12,10 @@ import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, register, verify
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
-from flexcal.data import MultisinePlan, Recording, provenance, write_estimates, write_plan, write_poses
+from flexcal.data import MultisinePlan, Recording, write_plan, write_poses
 from flexcal.design import MeasuringSetup, design_poses, random_poses
 from flexcal.elasticity import StiffnessResult, identify_stiffness
-from flexcal.estimates_file import Block
+from flexcal.estimates_file import Block, provenance, write_estimates
 from flexcal.estimation import Estimate
 from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses

@@ -10,8 +10,9 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, Verification, require_points, verify
-from flexcal.data import PoseSet, provenance, read_poses, sha256_of
+from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
+from flexcal.estimates_file import provenance, sha256_of
 from flexcal.model import RobotModel
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.dynamics.experiment_system import Batch, ExperimentSystem, reduced
+from flexcal.dynamics.batched_equations import Batch, ExperimentSystem, reduced
 from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion, filtered_motion
 from flexcal.dynamics.recorded_rows import RecordedRows

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.calibration.prediction import predict
-from flexcal.calibration.propagation import Propagation, covariance_root, moving_parameters
+from flexcal.calibration.propagated_covariance import Propagation, covariance_root, moving_parameters
 from flexcal.data import PoseSet
 
 SOURCES = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")

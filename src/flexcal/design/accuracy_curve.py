@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.design.criteria import TraceOptimal
-from flexcal.design.exchange import greedy
+from flexcal.design.exchange_algorithm import greedy
 from flexcal.design.poses import PoseDesign, tool_error
 from flexcal.errors import FlexcalError
 from flexcal.progress import Progress, silent

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.data import PosePool
 from flexcal.design.candidates import random_candidates
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.pose_sensitivity import (
+from flexcal.design.geometry_sensitivity import (
     BaseSensitivity,
     base_sensitivity,
     geometry_jacobian,

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.propagation import Propagation
+from flexcal.calibration.propagated_covariance import Propagation
 from flexcal.errors import FlexcalError
 from flexcal.estimation.gaussian_distance import distance_quantile, mean_distance, principal_variances
 from flexcal.model import point_kinematics

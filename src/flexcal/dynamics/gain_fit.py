@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.dynamics.experiment_system import Batch
+from flexcal.dynamics.batched_equations import Batch
 from flexcal.dynamics.instrumental_fit import InstrumentalFit, instrumental_fit
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.triangle import Triangle, triangular

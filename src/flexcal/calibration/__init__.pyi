@@ -1,0 +1,49 @@
+from .drift import Drift
+from .elastic_prior import ElasticPrior
+from .error_statistics import ErrorStatistics
+from .geometric_calibration import Calibration, calibrate
+from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
+from .measured_points import require_points
+from .plausibility import Moved, moved_far
+from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
+from .prediction import Prediction, predict
+from .propagated_covariance import Propagation, propagation
+from .registration import register, rigid_motion
+from .scaled_errors import ErrorScale, error_scale
+from .sources import error_sources
+from .term_selection import TermSelection, select_terms
+from .terms import geometric_parameters
+from .verification import Verification, verify, verify_jointly
+
+__all__ = [
+    "CYCLES",
+    "AccuracyMap",
+    "Calibration",
+    "Drift",
+    "ElasticPrior",
+    "ErrorScale",
+    "ErrorStatistics",
+    "Moved",
+    "PoseRepeatability",
+    "Prediction",
+    "Propagation",
+    "TermSelection",
+    "Verification",
+    "accuracy_map",
+    "calibrate",
+    "error_scale",
+    "error_sources",
+    "geometric_parameters",
+    "moved_far",
+    "noise_repeatability",
+    "predict",
+    "propagation",
+    "random_poses_in",
+    "register",
+    "repeatability",
+    "require_points",
+    "rigid_motion",
+    "select_terms",
+    "verify",
+    "verify_jointly",
+]

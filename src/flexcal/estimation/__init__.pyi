@@ -1,0 +1,26 @@
+from .estimate import Dropped, Estimate
+from .identifiability import Identifiability, analyse, name_direction
+from .loss import Cauchy, Huber, Loss, Squares
+from .parameter import Parameter, Parameters
+from .problem import Problem
+from .profile import profile_rise
+from .sensitivity import Sensitivity
+from .solver import solve
+
+__all__ = [
+    "Cauchy",
+    "Dropped",
+    "Estimate",
+    "Huber",
+    "Identifiability",
+    "Loss",
+    "Parameter",
+    "Parameters",
+    "Problem",
+    "Sensitivity",
+    "Squares",
+    "analyse",
+    "name_direction",
+    "profile_rise",
+    "solve",
+]
