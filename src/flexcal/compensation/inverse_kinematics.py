@@ -8,6 +8,7 @@ import numpy as np
 
 from flexcal.compensation.aim import Aim
 from flexcal.model import RobotModel
+from flexcal.model.inverse_kinematics import damped_step
 from flexcal.model.joint_space import joint_limits
 
 Forward = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
@@ -69,11 +70,3 @@ def nearest_positions(
             better, np.maximum(damping[rows] / 4, _LEAST_DAMPING * model.reach), damping[rows] * 4
         )
     return q, residual
-
-
-def damped_step(jacobian: np.ndarray, residual: np.ndarray, damping: np.ndarray | float) -> np.ndarray:
-    """Jᵀ (J Jᵀ + λ²)⁻¹ r (N, n) for Jacobians (N, m, n), residuals (N, m) and dampings (N,)."""
-    square = np.matmul(jacobian, np.swapaxes(jacobian, 1, 2))
-    square += np.eye(jacobian.shape[1]) * np.square(np.broadcast_to(damping, len(residual)))[:, None, None]
-    solved = np.linalg.solve(square, residual[:, :, None])
-    return np.matmul(np.swapaxes(jacobian, 1, 2), solved)[:, :, 0]

@@ -7,8 +7,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from flexcal.compensation.aim import Aim
-from flexcal.compensation.inverse_kinematics import NEAR, damped_step, nearest_positions
+from flexcal.compensation.inverse_kinematics import NEAR, nearest_positions
 from flexcal.model import RobotModel, ToolAtRest, tool_at_rest
+from flexcal.model.inverse_kinematics import damped_step
 from flexcal.model.joint_space import joint_limits
 
 LARGEST_CORRECTION = 0.2

@@ -37,9 +37,16 @@ def reach_points(
             :, :3, : 6 * model.n : 6
         ]  # by the joint's offset, which moves it like q
         missing = position - motion.position
-        square = columns @ np.swapaxes(columns, 1, 2) + DAMPING**2 * np.eye(3)
-        step = np.einsum("sij,si->sj", columns, np.linalg.solve(square, missing[:, :, None])[:, :, 0])
+        step = damped_step(columns, missing, DAMPING)
         largest = np.abs(step).max(axis=1, initial=1e-12)
         q = np.clip(q + step * np.minimum(1.0, LONGEST / largest)[:, None], lower, upper)
     reached = point_kinematics(model, q, point=point, jacobians=False).position
     return q, np.linalg.norm(reached - position, axis=1) < REACHED
+
+
+def damped_step(jacobian: np.ndarray, residual: np.ndarray, damping: np.ndarray | float) -> np.ndarray:
+    """Jᵀ (J Jᵀ + λ²)⁻¹ r (N, n) for Jacobians (N, m, n), residuals (N, m) and dampings (N,)."""
+    square = np.matmul(jacobian, np.swapaxes(jacobian, 1, 2))
+    square += np.eye(jacobian.shape[1]) * np.square(np.broadcast_to(damping, len(residual)))[:, None, None]
+    solved = np.linalg.solve(square, residual[:, :, None])
+    return np.matmul(np.swapaxes(jacobian, 1, 2), solved)[:, :, 0]
