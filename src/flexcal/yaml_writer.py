@@ -35,17 +35,20 @@ def yaml_text(value: Any) -> str:
     import yaml
 
     class Dumper(yaml.CSafeDumper):
-        """Writes texts of more than plain words in double quotes."""
+        """Writes texts of more than plain words in double quotes, and what holds nothing but scalars on one line."""
+
+        def represent_sequence(self, tag, sequence, flow_style=None):
+            node = super().represent_sequence(tag, sequence, flow_style)
+            node.flow_style = all(isinstance(item, yaml.ScalarNode) for item in node.value)
+            return node
+
+        def represent_mapping(self, tag, mapping, flow_style=None):
+            node = super().represent_mapping(tag, mapping, flow_style)
+            node.flow_style = all(isinstance(item, yaml.ScalarNode) for _, item in node.value)
+            return node
 
     Dumper.add_representer(str, _text)
-    return yaml.dump(
-        to_plain(value),
-        Dumper=Dumper,
-        default_flow_style=None,
-        width=110,
-        sort_keys=False,
-        allow_unicode=True,
-    )
+    return yaml.dump(to_plain(value), Dumper=Dumper, width=110, sort_keys=False, allow_unicode=True)
 
 
 def to_plain(value: Any) -> Any:
