@@ -4,6 +4,7 @@ import hashlib
 import logging
 import os
 import re
+import sys
 from importlib.metadata import version as installed_version
 from pathlib import Path
 
@@ -11,13 +12,16 @@ import plotly
 from sphinx.application import Sphinx
 
 HERE = Path(__file__).parent
+sys.path.insert(0, str(HERE))
+
+from mathml import FONT  # noqa: E402
 
 project = "flexcal"
 author = "The flexcal developers"
 copyright = "The flexcal developers, Apache-2.0"
 version = release = installed_version("flexcal")
 
-extensions = ["myst_nb", "sphinx.ext.autodoc", "sphinx.ext.mathjax"]
+extensions = ["myst_nb", "sphinx.ext.autodoc", "mathml"]
 myst_enable_extensions = ["dollarmath", "amsmath", "deflist"]
 myst_heading_anchors = 3
 
@@ -57,9 +61,13 @@ MARKUP = re.compile(r"([\\*`|_<>:\[\]]|^[^\w\s])")
 
 html_theme = "furo"
 html_title = "flexcal"
-html_static_path = ["_static", str(Path(plotly.__file__).parent / "package_data" / "plotly.min.js")]
+html_static_path = [
+    "_static",
+    str(Path(plotly.__file__).parent / "package_data" / "plotly.min.js"),
+    str(FONT),
+]
 html_js_files = ["figures.js"]
-html_css_files = ["notebooks.css"]
+html_css_files = ["notebooks.css", "equations.css"]
 exclude_patterns = ["README.md"]
 
 

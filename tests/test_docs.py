@@ -9,6 +9,8 @@ import pkgutil
 import re
 import shlex
 import shutil
+import subprocess
+import sys
 from inspect import isclass, isroutine
 from pathlib import Path
 from types import ModuleType
@@ -110,6 +112,28 @@ def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
     page = (root / "docs" / "command-line.md").read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("| `flexcal ")]
     assert rows == [f"| `{verb.example}` | {verb.summary} |" for verb in VERBS]
+
+
+def test_pages_and_their_equations_need_no_network(root: Path, tmp_path: Path) -> None:
+    """Those without notebooks, built: whatever they load lies beside them, and every equation is MathML."""
+    options = ["-D", "nb_execution_mode=off", "-D", "exclude_patterns=api.md,examples", "-b", "html"]
+    command = [sys.executable, "-m", "sphinx", "-q", *options, str(root / "docs"), str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0 and "equation" not in done.stderr, done.stderr
+    pages = {page.stem: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
+    for name, page in pages.items():
+        loaded = re.findall(r"<(?:script|img|iframe)\b[^>]*?\bsrc=\"([^\"]*)", page)
+        loaded += re.findall(r"<link\b(?=[^>]*stylesheet)[^>]*?\bhref=\"([^\"]*)", page)
+        assert len(loaded) > 5, name
+        for address in loaded:
+            assert (tmp_path / address.split("?")[0]).is_file(), f"{name}: {address}"
+    styles = [sheet.read_text(encoding="utf-8") for sheet in tmp_path.glob("_static/**/*.css")]
+    assert [sheet for sheet in styles if re.search(r"(@import|url\()\s*[\"']?(https?:)?//", sheet)] == []
+    assert (tmp_path / "_static" / "STIXTwoMath-Regular.ttf").stat().st_size > 1e6
+    for name in ("methods", "conventions", "exporting"):
+        text = re.sub(r"`[^`]*`", "", (root / "docs" / f"{name}.md").read_text(encoding="utf-8"))
+        written = re.findall(r"\$\$.+?\$\$|\$[^$]+?\$", text, flags=re.DOTALL)
+        assert len(written) > 1 and pages[name].count("<math") == len(written), name
 
 
 @pytest.fixture(scope="module")
