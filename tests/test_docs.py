@@ -33,7 +33,8 @@ NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 1
 
 @pytest.fixture(scope="module")
 def methods(root: Path) -> str:
-    return (root / "docs" / "methods.md").read_text(encoding="utf-8")
+    pages = sorted((root / "docs" / "methods").glob("*.md"))
+    return "\n".join(page.read_text(encoding="utf-8") for page in pages)
 
 
 def documented(root: Path) -> dict[str, str]:
@@ -120,20 +121,31 @@ def test_pages_and_their_equations_need_no_network(root: Path, tmp_path: Path) -
     command = [sys.executable, "-m", "sphinx", "-q", *options, str(root / "docs"), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
     assert done.returncode == 0 and "equation" not in done.stderr, done.stderr
-    pages = {page.stem: page.read_text(encoding="utf-8") for page in tmp_path.glob("*.html")}
-    for name, page in pages.items():
+    pages = {page: page.read_text(encoding="utf-8") for page in tmp_path.rglob("*.html")}
+    for path, page in pages.items():
         loaded = re.findall(r"<(?:script|img|iframe)\b[^>]*?\bsrc=\"([^\"]*)", page)
         loaded += re.findall(r"<link\b(?=[^>]*stylesheet)[^>]*?\bhref=\"([^\"]*)", page)
-        assert len(loaded) > 5, name
+        assert len(loaded) > 5, path
         for address in loaded:
-            assert (tmp_path / address.split("?")[0]).is_file(), f"{name}: {address}"
+            assert (path.parent / address.split("?")[0]).is_file(), f"{path}: {address}"
     styles = [sheet.read_text(encoding="utf-8") for sheet in tmp_path.glob("_static/**/*.css")]
     assert [sheet for sheet in styles if re.search(r"(@import|url\()\s*[\"']?(https?:)?//", sheet)] == []
     assert (tmp_path / "_static" / "STIXTwoMath-Regular.ttf").stat().st_size > 1e6
-    for name in ("methods", "conventions", "exporting"):
-        text = re.sub(r"`[^`]*`", "", (root / "docs" / f"{name}.md").read_text(encoding="utf-8"))
-        written = re.findall(r"\$\$.+?\$\$|\$[^$]+?\$", text, flags=re.DOTALL)
-        assert len(written) > 1 and pages[name].count("<math") == len(written), name
+    written = {
+        source: len(
+            re.findall(
+                r"\$\$.+?\$\$|\$[^$]+?\$",
+                re.sub(r"`[^`]*`", "", source.read_text(encoding="utf-8")),
+                re.DOTALL,
+            )
+        )
+        for source in [*(root / "docs").glob("*.md"), *(root / "docs" / "methods").glob("*.md")]
+        if source.name != "api.md"
+    }
+    assert sum(written.values()) > 300
+    for source, count in written.items():
+        built = tmp_path / source.relative_to(root / "docs").with_suffix(".html")
+        assert pages[built].count("<math") == count, source
 
 
 @pytest.fixture(scope="module")
