@@ -115,6 +115,18 @@ def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
     assert rows == [f"| `{verb.example}` | {verb.summary} |" for verb in VERBS]
 
 
+def test_the_page_on_files_has_those_that_verbs_leave(root: Path) -> None:
+    from flexcal.cli.verbs import VERBS
+
+    page = (root / "docs" / "file-formats.md").read_text(encoding="utf-8")
+    table = page[page.index("## What verbs leave") :].split("\n\n")[1].splitlines()[2:]
+    assert table == [
+        f"| `{verb.name}` | {', '.join(f'`{name}`' for name in verb.leaves)} |"
+        for verb in VERBS
+        if verb.leaves
+    ]
+
+
 def test_pages_and_their_equations_need_no_network(root: Path, tmp_path: Path) -> None:
     """Those without notebooks, built: whatever they load lies beside them, and every equation is MathML."""
     options = ["-D", "nb_execution_mode=off", "-D", "exclude_patterns=api.md,examples", "-b", "html"]
