@@ -67,7 +67,38 @@ def test_never_writes_over_a_file(run, tmp_path: Path) -> None:
     (tmp_path / "robot.yaml").write_text("mine\n")
     before = snapshot(tmp_path)
     outcome = run("init", urdf, "--out", tmp_path)
-    assert outcome.status == 2 and "never changed" in outcome.err and snapshot(tmp_path) == before
+    assert outcome.status == 2 and snapshot(tmp_path) == before
+    assert f"go on with 'flexcal design poses {tmp_path / 'robot.yaml'}" in outcome.err
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "sentence"),
+    [
+        ("arm.urdf", "solid arm\n", "arm.urdf: this is no XML, so no URDF; name the robot's URDF."),
+        ("arm.urdf", "<mujoco/>", "the root element is <mujoco>, not <robot>"),
+        ("robot.yaml", "mine\n", "robot.yaml: this is no XML, so no URDF"),
+        ("missing.urdf", None, "missing.urdf: there is no such file; name the robot's URDF."),
+        (".", None, "is a folder; name the robot's URDF in it."),
+    ],
+)
+def test_a_wrong_urdf_beside_a_robot_yaml(
+    run, tmp_path: Path, name: str, content: str | None, sentence: str
+) -> None:
+    """The sentence is about the file that was named, whatever else is there."""
+    (tmp_path / "robot.yaml").write_text("mine\n")
+    if content is not None:
+        (tmp_path / name).write_text(content)
+    before = snapshot(tmp_path)
+    outcome = run("init", tmp_path / name, "--out", tmp_path)
+    assert outcome.status == 2 and sentence in outcome.err and "there already" not in outcome.err
+    assert snapshot(tmp_path) == before
+
+
+def test_a_urdf_that_cannot_be_loaded_leaves_no_folder(run, tmp_path: Path) -> None:
+    """A joint and a link of one name show only when robot.yaml is read back."""
+    urdf = robot(tmp_path, chain("left", 6).replace("left_joint_2", "left_4"))
+    outcome = run("init", urdf, "--out", tmp_path / "deep" / "cell")
+    assert outcome.status == 2 and "left_4" in outcome.err and list(tmp_path.iterdir()) == [urdf]
 
 
 def test_two_arms_ask_for_the_tip(run, tmp_path: Path) -> None:

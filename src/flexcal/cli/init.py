@@ -9,7 +9,7 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
-from flexcal.cli.options import Folder, Json, MaybeText
+from flexcal.cli.options import Json, MaybeText
 
 
 @dataclass(frozen=True)
@@ -21,7 +21,7 @@ class Init:
     """
 
     urdf: Annotated[Positional[Path], arg(metavar="URDF", help="the robot's URDF, not xacro")]
-    out: Folder = Path(".")
+    folder: Annotated[Path, arg(name="out", metavar="DIR")] = Path(".")
     """Folder for robot.yaml."""
     tip: Annotated[
         MaybeText,
@@ -30,12 +30,17 @@ class Init:
     """The link where the arm ends, for a URDF with several arms."""
     json: Json = False
 
+    @property
+    def out(self) -> None:
+        """None: it never writes over a file, not even its own, and looks at the URDF before it looks there."""
+        return None
+
     def run(self) -> None:
         """Write it, and say what was guessed."""
         from flexcal.workflow.init_robot import init_robot
 
         console = Console(self.json)
-        found = init_robot(self.urdf, self.out, tip=self.tip)
+        found = init_robot(self.urdf, self.folder, tip=self.tip)
         arm, model = found.arm, found.model
         console.say(
             f"{model.name}: {model.n} joints ({', '.join(model.joint_names)}), reach {model.reach:.2f} m"
@@ -51,5 +56,5 @@ class Init:
         console.finish(
             found.document(),
             f"put the place of the reflector under `points:` in {found.file}, then flexcal design poses {found.file} "
-            f"--out {self.out / 'poses.yaml'}; or, with measurements at hand, flexcal import {found.file} FILE",
+            f"--out {self.folder / 'poses.yaml'}; or, with measurements at hand, flexcal import {found.file} FILE",
         )

@@ -74,7 +74,6 @@ STEPS = (
                 "Init",
                 "a robot.yaml for its URDF, with comments on what to complete",
                 "flexcal init robot.urdf",
-                ("robot.yaml",),
             ),
             Verb(
                 ("import",),

@@ -46,6 +46,8 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
         raise InputError(
             f"{path}: this is xacro, not URDF; expand it first: xacro {path.name} > {path.stem.removesuffix('.urdf')}.urdf."
         )
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name the robot's URDF in it.")
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; name the robot's URDF.")
     root = read_elements(path)

@@ -52,7 +52,7 @@ class Element:
 
 
 def read_elements(path: Path) -> Element:
-    """The root element of an XML file; raises `InputError` with line and column where it is not well-formed."""
+    """The root element of an XML file; raises `InputError` where it is none, with line and column where it is not well-formed."""
     parser = expat.ParserCreate()
     above: list[Element] = []
     roots: list[Element] = []
@@ -65,10 +65,14 @@ def read_elements(path: Path) -> Element:
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda tag: above.pop()
     try:
-        parser.Parse(path.read_bytes(), True)
+        content = path.read_bytes()
     except OSError as problem:
         raise InputError(f"{path} cannot be read ({problem.strerror}); check the file.") from problem
+    try:
+        parser.Parse(content, True)
     except expat.ExpatError as problem:
+        if not content.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n").startswith(b"<"):
+            raise InputError(f"{path}: this is no XML, so no URDF; name the robot's URDF.") from problem
         raise InputError(
             f"{path} line {problem.lineno}, column {problem.offset + 1}: not well-formed XML "
             f"({expat.ErrorString(problem.code)}); correct it there."

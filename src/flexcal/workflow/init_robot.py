@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from os.path import relpath
 from pathlib import Path
@@ -47,12 +48,16 @@ class InitialisedRobot:
 def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedRobot:
     """Write `out`/robot.yaml for a URDF, read it back, and look at masses and collision shapes.
 
-    Raises `InputError` as `find_arm` and reading a robot do, and where there is a robot.yaml already; nothing is written then.
+    Raises `InputError` as `find_arm` and reading a robot do, and then where there is a robot.yaml already; nothing is written then.
     """
     arm = find_arm(urdf, tip)
     file = out / "robot.yaml"
     if file.exists():
-        raise InputError(f"{file} is there already and is never changed; give another folder with --out.")
+        raise InputError(
+            f"{file} is there already and stays as it is: go on with 'flexcal design poses {file} --out {out / 'poses.yaml'}', "
+            f"or give --out DIR for a new one of {urdf}."
+        )
+    made = [folder for folder in (out, *out.parents) if not folder.exists()]
     link = relpath(urdf, out)
     write_text(file, _minimal(link, arm))
     try:
@@ -62,6 +67,9 @@ def init_robot(urdf: Path, out: Path, *, tip: str | None = None) -> InitialisedR
         return InitialisedRobot(file, model, arm, tuple(_remarks(model)))
     except BaseException:
         file.unlink(missing_ok=True)
+        for folder in made:
+            with suppress(OSError):
+                folder.rmdir()
         raise
 
 
