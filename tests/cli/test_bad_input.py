@@ -285,6 +285,35 @@ def test_verify_before_calibrate(run, ur5_folder: Path) -> None:
     assert "estimates.yaml" in sentence and "flexcal calibrate" in sentence
 
 
+@pytest.mark.parametrize(
+    ("verb", "named", "what"),
+    [
+        (("verify", "random.csv"), "random.csv", "random.csv is no estimates.yaml"),
+        (("verify", "random.csv"), "estimates.npz", "estimates.npz is no estimates.yaml"),
+        (
+            ("compensate", "random.csv", "--out", "commands.csv"),
+            "robot.yaml",
+            "robot.yaml holds no estimates",
+        ),
+        (("export", "urdf", "--out", "new.urdf"), "ur5.urdf", "ur5.urdf is no estimates.yaml"),
+        (("map", "--out", "map.html"), "empty", "empty holds no estimates.yaml"),
+        (("repeatability", "random.csv"), "random.csv", "random.csv is no estimates.yaml"),
+    ],
+)
+def test_estimates_that_are_another_file(
+    run, ur5_folder: Path, monkeypatch: pytest.MonkeyPatch, verb: tuple[str, ...], named: str, what: str
+) -> None:
+    monkeypatch.chdir(ur5_folder)
+    Path("empty").mkdir()
+    if verb[0] == "repeatability":  # it needs a pose twice before it looks for estimates
+        lines = Path("random.csv").read_text().splitlines()
+        Path("random.csv").write_text("\n".join([*lines, lines[1]]) + "\n")
+    at = 2 if verb[0] == "export" else 1
+    sentence = refused(run, ur5_folder, *verb[:at], "robot.yaml", *verb[at:], "--estimates", named)
+    assert what in sentence
+    assert "takes the estimates.yaml that 'flexcal calibrate' wrote, or the folder with it" in sentence
+
+
 def test_verify_from_a_station_that_was_not_calibrated(run, ur5_folder: Path) -> None:
     robot = ur5_folder / "robot.yaml"
     assert run("calibrate", robot, ur5_folder / "grid.csv", "--terms", "kinematic").status == 0

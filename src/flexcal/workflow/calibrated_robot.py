@@ -7,11 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.errors import InputError
-from flexcal.estimates_file import Block, read_estimates
+from flexcal.estimates_file import BLOCKS, Block, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.workflow.stored_block import ESTIMATES
+from flexcal.yaml_reader import read_yaml_file
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,9 +26,24 @@ class CalibratedRobot:
 
 
 def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
-    """The estimates.yaml of a robot: that named or in the folder named, else that beside robot.yaml."""
-    stored = nominal.path.parent / nominal.config.estimates if estimates is None else estimates
-    return stored / ESTIMATES if stored.is_dir() else stored
+    """The estimates.yaml of a robot: that named or in the folder named, else that beside robot.yaml.
+
+    Raises `InputError` where what is named is another kind of file, or a folder without one.
+    """
+    if estimates is None:
+        return nominal.path.parent / nominal.config.estimates
+    expected = f"--estimates takes the {ESTIMATES} that 'flexcal calibrate' wrote, or the folder with it"
+    if estimates.is_dir():
+        if not (estimates / ESTIMATES).is_file():
+            raise InputError(f"{estimates} holds no {ESTIMATES}; {expected}.")
+        return estimates / ESTIMATES
+    if estimates.suffix not in ("", ".yaml", ".yml"):
+        raise InputError(f"{estimates} is no {ESTIMATES}; {expected}.")
+    if estimates.is_file():
+        blocks = read_yaml_file(estimates).data
+        if not isinstance(blocks, dict) or not set(BLOCKS) & set(blocks):
+            raise InputError(f"{estimates} holds no estimates; {expected}.")
+    return estimates
 
 
 def found_station(model: RobotModel, station: str) -> bool:
