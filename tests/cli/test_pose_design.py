@@ -26,6 +26,7 @@ def test_a_working_volume_a_csv_plan_and_its_page(run, tx90l_folder: Path) -> No
     assert document["least_possible_mm"] <= document["tool_error_mm"]
     assert document["moves_s"] > 0 and all(b == a + 1 for a, b in document["blocked_moves"])
     page = (tx90l_folder / "plan.html").read_text()
+    assert document["seed"] == 0 and "Plan plan.csv, seed 0" in page
     assert json.loads(re.search(r'id="results">(.*?)</script>', page).group(1))["poses"] == 14
     for figure in ("figure-numbers", "figure-space", "figure-joints"):
         assert f'data-specification="{figure}"' in page

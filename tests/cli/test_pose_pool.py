@@ -35,6 +35,13 @@ def test_forty_poses_chosen_from_the_ur5_grid_calibrate_it(run, ur5_folder: Path
     document = run("design", "poses", *arguments, "--json").document
     chosen = np.array(document["chosen"])
     assert len(np.unique(chosen)) == POSES and document["flank_not_sure"] == []
+    # nothing was drawn, so there is no seed, on the page neither
+    page = (ur5_folder / "plan.html").read_text(encoding="utf-8")
+    assert (
+        document["seed"] is None
+        and "Plan plan.yaml, chosen from given poses" in page
+        and ", seed" not in page
+    )
     assert set(document["criteria"]) == {"c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"}
     np.testing.assert_array_equal(read_plan_of(ur5_folder / "plan.yaml", PosePlan).q, rows[chosen, 1:7])
     train = write_csv(ur5_folder / "train.csv", header, rows[chosen])

@@ -58,7 +58,8 @@ def pose_page(study: PoseStudy) -> Page:
     sections = [_space(study), _joints(study)]
     return Page(
         title=f"{study.model.name}: poses to measure",
-        subtitle=f"Plan {Path(results['plan']).name}, seed {results['seed']}",
+        subtitle=f"Plan {Path(results['plan']).name}, "
+        + ("chosen from given poses" if results["seed"] is None else f"seed {results['seed']}"),
         verdict=verdict,
         sections=[_numbers(results), *sections] if chosen else sections,
         document=results,

@@ -35,21 +35,22 @@ VERIFICATION = "verification"
 
 @dataclass(frozen=True, eq=False)
 class DesignedPoses:
-    """A plan of random poses for a verification, and the file it was written to."""
+    """A plan of random poses for a verification, the file it was written to, and the seed they were drawn with."""
 
     plan: PosePlan
     file: Path
+    seed: int
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        return {"plan": self.file, "poses": len(self.plan), "seed": self.plan.seed}
+        return {"plan": self.file, "poses": len(self.plan), "seed": self.seed}
 
 
 @dataclass(frozen=True, eq=False)
 class ChosenPoses:
     """A plan of calibration poses, its file, why these, the way through them, and where the robot will work (None: anywhere).
 
-    `pool` are the given poses they were chosen from, if any.
+    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones.
     """
 
     plan: PosePlan
@@ -57,6 +58,7 @@ class ChosenPoses:
     design: PoseDesign
     curve: PoseCurve
     way: VisitingOrder
+    seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
 
@@ -67,8 +69,8 @@ class ChosenPoses:
         """
         design, curve = self.design, self.curve
         return (
-            {"plan": self.file, "poses": len(self.plan), "seed": self.plan.seed}
-            | pool_block(design, self.pool)
+            {"plan": self.file, "poses": len(self.plan)}
+            | pool_block(design, self.pool, self.seed)
             | {
                 "criterion": design.criterion.name,
                 "candidates": len(design.candidates),
@@ -93,12 +95,13 @@ class ChosenPoses:
         )
 
 
-def pool_block(design: PoseDesign, pool: PosePool | None) -> dict[str, Any]:
-    """Which poses of a given pool were chosen, and which could not be."""
+def pool_block(design: PoseDesign, pool: PosePool | None, seed: int) -> dict[str, Any]:
+    """Which poses of a given pool were chosen, and which could not be; without one, the seed of the random poses."""
     if pool is None:
-        return {}
+        return {"seed": seed}
     left_out = np.setdiff1d(pool.pose, design.candidates.pose)
     return {
+        "seed": None,
         "chosen": design.numbers,
         "flank_not_sure": np.setdiff1d(left_out, design.hidden),
         "not_seen": design.hidden,
@@ -151,7 +154,7 @@ def plan_calibration_poses(
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    result = ChosenPoses(plan, out, design, curve, way, choice.working, choice.pool)
+    result = ChosenPoses(plan, out, design, curve, way, seed, choice.working, choice.pool)
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result
 
@@ -164,7 +167,7 @@ def plan_verification_poses(
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
-    result = DesignedPoses(plan, out)
+    result = DesignedPoses(plan, out, seed)
     write_pose_plan(out, model, plan, result.document(), None)
     return result
 

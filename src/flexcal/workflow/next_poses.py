@@ -30,13 +30,17 @@ from flexcal.workflow.pose_choice import PoseChoice
 
 @dataclass(frozen=True, eq=False)
 class ContinuedPoses:
-    """The next poses, best first, up to where to stop; `plan` and `file` are None where nothing is left to measure."""
+    """The next poses, best first, up to where to stop; `plan` and `file` are None where nothing is left to measure.
+
+    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones.
+    """
 
     plan: PosePlan | None
     file: Path | None
     found: NextPoses
     stop: int | None
     wanted: float | None
+    seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
 
@@ -49,9 +53,8 @@ class ContinuedPoses:
                 "poses": 0 if self.plan is None else len(self.plan),
                 "measured": found.measured,
             }
-            | pool_block(design, self.pool)
+            | pool_block(design, self.pool, self.seed)
             | {
-                "seed": design.plan.seed,
                 "criterion": design.criterion.name,
                 "candidates": len(design.candidates),
                 "wanted_mm": None if self.wanted is None else self.wanted / MILLIMETRE,
@@ -90,11 +93,11 @@ def plan_next_poses(
     after = next_poses(choice.found, known, count, rng=rng, criterion=criterion)
     stop = after.enough(wanted)
     if stop == 0:
-        return ContinuedPoses(None, None, after, stop, wanted, choice.working, choice.pool)
+        return ContinuedPoses(None, None, after, stop, wanted, seed, choice.working, choice.pool)
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
     result = ContinuedPoses(
-        plan, out, replace(after, design=design), stop, wanted, choice.working, choice.pool
+        plan, out, replace(after, design=design), stop, wanted, seed, choice.working, choice.pool
     )
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result
