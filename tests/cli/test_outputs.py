@@ -54,16 +54,18 @@ def test_a_place_that_is_no_folder(run, tmp_path: Path, place: str) -> None:
 
 
 def test_folders_that_are_missing_are_made(tmp_path: Path) -> None:
-    with outputs(tmp_path / "a" / "b", ("x*",)):
+    with outputs("demo", tmp_path / "a" / "b", ("x*",)):
         (tmp_path / "a" / "b" / "x1").write_text("1")
-    assert (tmp_path / "a" / "b" / LEDGER).read_text() == f"{sha256(tmp_path / 'a' / 'b' / 'x1')}  x1\n"
+    assert (
+        tmp_path / "a" / "b" / LEDGER
+    ).read_text() == f"# flexcal demo\n{sha256(tmp_path / 'a' / 'b' / 'x1')}  x1\n"
 
 
 def test_what_an_earlier_run_left_goes(tmp_path: Path) -> None:
     """Three responses of a new plan among six of an old one would be fitted together."""
     (tmp_path / "other").write_text("mine")
     for count in (6, 3):
-        with outputs(tmp_path, ("x*",)):
+        with outputs("demo", tmp_path, ("x*",)):
             for k in range(count):
                 (tmp_path / f"x{k}").unlink(missing_ok=True)
                 (tmp_path / f"x{k}").write_text(str(count))
@@ -72,7 +74,7 @@ def test_what_an_earlier_run_left_goes(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("problem", [InputError("no"), KeyboardInterrupt()])
 def test_a_verb_that_fails_leaves_nothing(tmp_path: Path, problem: BaseException) -> None:
-    with pytest.raises(type(problem)), outputs(tmp_path / "a" / "b", ("x*", "y")):
+    with pytest.raises(type(problem)), outputs("demo", tmp_path / "a" / "b", ("x*", "y")):
         (tmp_path / "a" / "b" / "x1").write_text("1")
         raise problem
     assert list(tmp_path.iterdir()) == []
@@ -80,15 +82,53 @@ def test_a_verb_that_fails_leaves_nothing(tmp_path: Path, problem: BaseException
 
 def test_a_verb_that_fails_may_be_run_again(tmp_path: Path) -> None:
     """What it had replaced of its own by then still counts as its own."""
-    with outputs(tmp_path, ("x", "y")):
+    with outputs("demo", tmp_path, ("x", "y")):
         (tmp_path / "x").write_text("1")
-    with pytest.raises(InputError), outputs(tmp_path, ("x", "y")):
+    with pytest.raises(InputError), outputs("demo", tmp_path, ("x", "y")):
         (tmp_path / "x").unlink()
         (tmp_path / "x").write_text("2")
         (tmp_path / "y").write_text("2")
         raise InputError("no")
     assert not (tmp_path / "y").exists()
-    with outputs(tmp_path, ("x", "y")):
+    with outputs("demo", tmp_path, ("x", "y")):
         (tmp_path / "x").unlink()
         (tmp_path / "x").write_text("3")
     assert (tmp_path / "x").read_text() == "3"
+
+
+def test_results_of_two_verbs_do_not_share_a_folder(run, ur5_folder: Path) -> None:
+    robot, out, poses = ur5_folder / "robot.yaml", ur5_folder / "out", ur5_folder / "random.csv"
+    assert run("calibrate", robot, poses, "--terms", "kinematic", "--out", out).status == 0
+    sentence = refused(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out)
+    assert "written by 'flexcal calibrate'" in sentence and "a folder of its own with --out" in sentence
+    # the page alone may be made anew from the numbers, and the same verb may be run again
+    assert run("report", out).status == 0
+    assert run("calibrate", robot, poses, "--terms", "kinematic", "--out", out).status == 0
+    assert "calibrate" in refused(run, ur5_folder, "verify", robot, poses, "--estimates", out, "--out", out)
+    digests = {}
+    for line in (out / LEDGER).read_text().splitlines():
+        if not line.startswith("#"):
+            digest, name = line.split("  ")
+            digests[name] = digest
+    assert digests == {name: sha256(out / name) for name in digests} and "report.html" in digests
+
+
+def test_measurements_do_not_replace_the_plan_of_the_same_name(tmp_path: Path) -> None:
+    plan = tmp_path / "poses.csv"
+    with outputs("design poses", plan, page=True):
+        plan.write_text("plan")
+    with pytest.raises(InputError, match="design poses") as caught, outputs("import", plan):
+        plan.write_text("measured")
+    assert "give 'flexcal import' a file of its own" in str(caught.value)
+    assert plan.read_text() == "plan"
+
+
+def test_a_ledger_without_verbs_hinders_none(tmp_path: Path) -> None:
+    """As flexcal wrote it before it noted them."""
+    (tmp_path / "x").write_text("1")
+    (tmp_path / LEDGER).write_text(f"{sha256(tmp_path / 'x')}  x\n")
+    with outputs("demo", tmp_path, ("x",)):
+        (tmp_path / "x").unlink()
+        (tmp_path / "x").write_text("2")
+    with pytest.raises(InputError, match="'flexcal demo'"), outputs("verify", tmp_path, ("x",)):
+        pass

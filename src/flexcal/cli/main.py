@@ -104,7 +104,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         if stop.code == 0:  # --help
             return 0
         raise refusal(verb, said.getvalue()) from None
-    with outputs(parsed.out, verb.leaves, page=verb.page):
+    with outputs(verb.name, parsed.out, verb.leaves, page=verb.page):
         parsed.run()
     return 0
 

@@ -1,4 +1,4 @@
-"""What `--out` may write over: only what flexcal wrote; a file that somebody else wrote or changed is never touched."""
+"""What `--out` may write over: only what the same verb wrote; no file of another verb, nor what somebody wrote or changed."""
 
 from __future__ import annotations
 
@@ -13,18 +13,22 @@ from flexcal.errors import InputError
 from flexcal.estimates_file import sha256_of
 
 LEDGER = ".flexcal"
-"""In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it; of a name the last line counts."""
+"""In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it, each verb's lines under a comment
+that names it; of a name the last line counts."""
+_COMMENT = "# flexcal "
+_REPORT = "report"
+"""The verb that makes the pages of the others anew."""
 
 
 @contextmanager
-def outputs(out: Path | None, names: Sequence[str] = (), *, page: bool = False) -> Iterator[None]:
-    """Around a verb that writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing.
+def outputs(verb: str, out: Path | None, names: Sequence[str] = (), *, page: bool = False) -> Iterator[None]:
+    """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing.
 
     With `page`, it also writes an HTML file of the same name beside `out`.
 
     Raises `InputError` beforehand where the folder cannot be written to, and where one of the files is there already that flexcal did
-    not write or that was changed since. When the verb fails, what it made is removed again; when it succeeds, so is what an earlier run
-    left under these names.
+    not write, that another verb wrote, or that was changed since. When the verb fails, what it made is removed again; when it succeeds, so
+    is what an earlier run left under these names.
     """
     if out is None:
         yield
@@ -38,16 +42,23 @@ def outputs(out: Path | None, names: Sequence[str] = (), *, page: bool = False) 
     before = _present(folder, patterns)
     try:
         for path in before:
-            if known.get(path.name) != sha256_of(path):
+            digest, writer = known.get(path.name, ("", ""))
+            if digest != sha256_of(path):
                 raise InputError(
                     f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
                     "give another --out, or move it away."
+                )
+            if writer not in ("", verb, _REPORT) and verb != _REPORT:
+                place = "a folder" if names else "a file"
+                raise InputError(
+                    f"{path} was written by 'flexcal {writer}', which another verb does not write over; "
+                    f"give 'flexcal {verb}' {place} of its own with --out."
                 )
         yield
     except BaseException:
         for path in _present(folder, patterns).keys() - before.keys():
             path.unlink()
-        _record(folder, _present(folder, patterns), before, known)
+        _record(verb, folder, _present(folder, patterns), before, known)
         for path in made:
             with suppress(OSError):
                 path.rmdir()
@@ -56,7 +67,7 @@ def outputs(out: Path | None, names: Sequence[str] = (), *, page: bool = False) 
     for path in before:
         if after.get(path) == before[path]:
             path.unlink()
-    _record(folder, after, before, known)
+    _record(verb, folder, after, before, known)
 
 
 def _make(folder: Path) -> list[Path]:
@@ -81,21 +92,29 @@ def _present(folder: Path, patterns: Sequence[str]) -> dict[Path, tuple[int, int
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in sorted(files)}
 
 
-def _ledger(folder: Path) -> dict[str, str]:
-    path = folder / LEDGER
-    lines = path.read_text(encoding="utf-8").splitlines() if path.is_file() else []
-    return {name: digest for digest, _, name in (line.partition("  ") for line in lines)}
+def _ledger(folder: Path) -> dict[str, tuple[str, str]]:
+    """Digest and verb of every file; the verb is empty where an older flexcal did not write it down."""
+    path, verb = folder / LEDGER, ""
+    found: dict[str, tuple[str, str]] = {}
+    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else []:
+        if line.startswith("#"):
+            verb = line.removeprefix(_COMMENT)
+        else:
+            digest, _, name = line.partition("  ")
+            found[name] = (digest, verb)
+    return found
 
 
 def _record(
+    verb: str,
     folder: Path,
     present: dict[Path, tuple[int, int]],
     before: dict[Path, tuple[int, int]],
-    known: dict[str, str],
+    known: dict[str, tuple[str, str]],
 ) -> None:
     """Add what was written anew, in one write, so that verbs which run at the same time do not lose each other's lines."""
     written = {path.name: sha256_of(path) for path in present if present[path] != before.get(path)}
-    lines = [f"{digest}  {name}\n" for name, digest in written.items() if known.get(name) != digest]
+    lines = [f"{digest}  {name}\n" for name, digest in written.items() if known.get(name) != (digest, verb)]
     if lines:
         with (folder / LEDGER).open("a", encoding="utf-8") as stream:
-            stream.write("".join(lines))
+            stream.write("".join([f"{_COMMENT}{verb}\n", *lines]))
