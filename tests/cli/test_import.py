@@ -139,3 +139,38 @@ def test_a_folder_is_no_file_to_write(run, ur5_folder: Path) -> None:
     before = snapshot(ur5_folder)
     outcome = run("import", ur5_folder / "robot.yaml", ur5_folder / "grid.csv", "--out", ur5_folder)
     assert outcome.status == 2 and "is a folder" in outcome.err and snapshot(ur5_folder) == before
+
+
+def test_timestamps_of_poses(run, ur5_folder: Path) -> None:
+    """Poses a minute apart keep when they were measured, in seconds from the first, and are numbered."""
+    header, rows = read_csv(ur5_folder / "random.csv")
+    robot, out = ur5_folder / "robot.yaml", ur5_folder / "poses.csv"
+    lines = ["Zeitstempel;" + ";".join(header[1:])]
+    for minute, row in enumerate(rows):
+        lines.append(
+            f"2026-03-01 12:{minute:02d}:30,5;" + ";".join(f"{v:.9f}".replace(".", ",") for v in row[1:])
+        )
+    (ur5_folder / "german.csv").write_text("\n".join(lines))
+    done = run("import", robot, ur5_folder / "german.csv", "--out", out)
+    words = " ".join(done.out.split())
+    assert done.status == 0 and "Zeitstempel counts in seconds from 2026-03-01 12:00:30,5" in words
+    assert "timestamps, as seconds" in words
+    poses = read_poses(out, RobotModel.from_yaml(robot, estimates=False))
+    np.testing.assert_allclose(poses.time, 60.0 * np.arange(20))
+    np.testing.assert_array_equal(poses.pose, np.arange(1, 21))
+    np.testing.assert_allclose(poses.position, rows[:, 7:10], atol=1e-8)
+    before = snapshot(ur5_folder)
+    refused = run("import", robot, ur5_folder / "german.csv", "--write-signals")
+    assert refused.status == 2 and "leave --write-signals out" in refused.err
+    assert snapshot(ur5_folder) == before
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(1.0, "s"), (1e3, "ms")])
+def test_times_of_poses_are_told_by_how_long_one_takes(
+    run, ur5_folder: Path, scale: float, unit: str
+) -> None:
+    header, rows = read_csv(ur5_folder / "random.csv")
+    timed = np.column_stack([rows, scale * 40.0 * np.arange(len(rows))])
+    file = write_csv(ur5_folder / "timed.csv", [*header, "time"], timed)
+    document = run("import", ur5_folder / "robot.yaml", file, "--json").document
+    assert document["kind"] == "poses" and document["columns"]["t"]["unit"] == unit

@@ -13,8 +13,8 @@ from flexcal.importing.column_names import ColumnName, parse_name
 from flexcal.importing.column_words import NEUTRAL, NO_POINT, POINT, SIGMA, SINGLE, TURN, rank
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.joint_columns import joint_quantities
-from flexcal.importing.placed_columns import PlacedColumns
-from flexcal.importing.unit_guess import joint_units, point_unit, time_unit
+from flexcal.importing.placed_columns import TIMESTAMP, PlacedColumns
+from flexcal.importing.unit_guess import joint_units, point_unit, pose_time_unit, time_unit
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
@@ -56,8 +56,9 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
         placed[quantity] = place(foreign, model, quantity, columns, "their names")
     taken = {column for found in placed.values() for column in found.columns}
     rest = [name for name in names if name.column not in taken and name.column not in reasons]
-    for quantity, columns in (_vectors(rest, reasons) | _singles(rest, foreign, reasons)).items():
-        placed[quantity] = place(foreign, model, quantity, columns, "their names")
+    vectors, singles = _vectors(rest, reasons), _singles(rest, foreign, reasons)
+    for quantity, columns in (vectors | singles).items():
+        placed[quantity] = place(foreign, model, quantity, columns, "their names", points="xyz" in vectors)
     if "sigma" in placed and "sigma_xyz" in placed:
         reasons[placed.pop("sigma").columns[0]] = "there are sigma_x, sigma_y and sigma_z"
     texts = {
@@ -162,13 +163,27 @@ def _singles(
                 reasons[name.column] = f"{found[quantity][0]} is taken as {quantity}"
             else:
                 found[quantity] = (name.column,)
+    others = [name.column for name in names if name.column in foreign.times and name.column not in reasons]
+    if others and "t" not in found:
+        found["t"] = (others[0],)
     return found
 
 
 def place(
-    foreign: ForeignTable, model: RobotModel, quantity: str, columns: tuple[str, ...], why: str
+    foreign: ForeignTable,
+    model: RobotModel,
+    quantity: str,
+    columns: tuple[str, ...],
+    why: str,
+    *,
+    points: bool = False,
 ) -> PlacedColumns:
-    """`columns` as a quantity, with the units that the file says, else those that their magnitude or their kind tells."""
+    """`columns` as a quantity, with the units that the file says, else those that their magnitude or their kind tells.
+
+    With `points` a time is that of a measured pose, else of a sample.
+    """
+    if quantity == "t" and columns[0] in foreign.times:
+        return PlacedColumns.plain(quantity, columns, (TIMESTAMP,), "timestamps, as seconds from the first")
     said = [parse_name(column, foreign.units.get(column)).unit for column in columns]
     known = UNITS.get(quantity, {})
     if all(unit in known for unit in said):
@@ -181,9 +196,8 @@ def place(
         units = (point_unit(model, values),) * 3
         return PlacedColumns.plain(quantity, columns, units, f"{why}; the unit by the robot's reach")
     if quantity == "t":
-        return PlacedColumns.plain(
-            quantity, columns, (time_unit(values[:, 0]),), f"{why}; the unit by the rate"
-        )
+        unit = (pose_time_unit if points else time_unit)(values[:, 0])
+        return PlacedColumns.plain(quantity, columns, (unit,), f"{why}; the unit by the rate")
     default = next(iter(known), None)
     taken = f"; taken to be in {default}" if default else ""
     return PlacedColumns.plain(quantity, columns, (default,) * len(columns), f"{why}{taken}")

@@ -28,7 +28,7 @@ NO_POINT = _words("force f error err deviation dev delta normal velocity vel v s
 TURN = _words("orientation quaternion quat rotation rot")
 SIGMA = _words("sigma σ std sd uncertainty stddev")
 SINGLE = {
-    "t": _words("t time timestamp stamp zeit seconds secs"),
+    "t": _words("t time timestamp stamp datetime zeit zeitstempel uhrzeit seconds secs"),
     "pose": _words(
         "pose poses no nr id number index idx measurement point punkt punktnr messpunkt nummer lfd sample row"
     ),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.importing.foreign_table import ForeignTable
+from flexcal.importing.timestamps import with_times
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _EXCEL = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
@@ -16,12 +17,15 @@ _ROS = (".mcap", ".db3", ".bag")
 def read_foreign(
     path: Path, joints: Sequence[str], *, sheet: str | None = None, topic: str | None = None
 ) -> ForeignTable:
-    """Read a table of another program: text with separators, Excel, MAT, Parquet, or a ROS recording.
+    """Read a table of another program: text with separators, Excel, MAT, Parquet, or a ROS recording; timestamps become seconds.
 
     `joints` are the robot's, by which a recording's messages are chosen; `sheet` is that of an Excel file, `topic` that of the points in
-    a recording. Raises `InputError` where the file cannot be read, and
-    where the library for it is not installed.
+    a recording. Raises `InputError` where the file cannot be read, and where the library for it is not installed.
     """
+    return with_times(_read(path, joints, sheet, topic))
+
+
+def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | None) -> ForeignTable:
     suffix = path.suffix.lower()
     if not path.exists():
         raise InputError(f"{path}: there is no such file; check the name and the folder.")

@@ -16,13 +16,14 @@ class ForeignTable:
 
     table: numbers (N,), NaN where a cell is empty or holds something else, and texts (N,). units: what the file says of columns beside
     their names, as in a row under the header. named: False where there is no header, so that the columns are called c1, c2, …
-    notes: what was done or left out in reading, a sentence each.
+    notes: what was done or left out in reading, a sentence each. times: columns that held timestamps and now seconds from the first.
     """
 
     table: Table
     units: Mapping[str, str] = field(default_factory=dict)
     named: bool = True
     notes: tuple[str, ...] = ()
+    times: tuple[str, ...] = ()
 
     def __len__(self) -> int:
         return len(self.table)

@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 
 
 def table_of(path: Path, frame: pl.DataFrame, first: int) -> ForeignTable:
-    """Numbers and texts of a frame whose first row is called `first`; lists of as many numbers each become columns name[0], name[1], …
+    """Numbers and texts of a frame whose first row is called `first`; lists of as many numbers each become columns name[0], name[1], …,
+    times seconds from the first.
 
     Raises `InputError` where there are no rows.
     """
@@ -25,14 +26,20 @@ def table_of(path: Path, frame: pl.DataFrame, first: int) -> ForeignTable:
     if not len(frame):
         raise InputError(f"{path}: the table has a header but no rows; add some.")
     columns: dict[str, np.ndarray] = {}
-    notes = []
+    notes, times = [], []
     for name, series in zip(frame.columns, frame.get_columns(), strict=True):
         if series.dtype.is_numeric() or series.dtype == pl.Boolean:
             columns[name] = series.cast(pl.Float64).fill_null(np.nan).to_numpy()
         elif series.dtype == pl.String:
             columns[name] = np.array([value or "" for value in series], dtype=str)
         elif series.dtype.is_temporal():
-            columns[name] = series.cast(pl.Datetime("us")).cast(pl.Int64).to_numpy() * 1e-6
+            first_of = series.drop_nulls()
+            stamps = series.cast(pl.Datetime("us")).cast(pl.Int64)
+            columns[name] = (stamps - stamps.drop_nulls().first()).cast(pl.Float64).fill_null(
+                np.nan
+            ).to_numpy() * 1e-6
+            notes.append(f"{name} counts in seconds from {first_of[0]}")
+            times.append(name)
         elif isinstance(series.dtype, pl.List | pl.Array):
             lengths = {len(value) if value is not None else 0 for value in series}
             if len(lengths) == 1:
@@ -43,4 +50,4 @@ def table_of(path: Path, frame: pl.DataFrame, first: int) -> ForeignTable:
         else:
             notes.append(f"{name} holds {series.dtype} and is left out")
     table = Table(TableFile(path, tuple(columns), first), first, columns)
-    return ForeignTable(table, notes=tuple(notes))
+    return ForeignTable(table, notes=tuple(notes), times=tuple(times))

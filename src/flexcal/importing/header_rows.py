@@ -9,6 +9,7 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.importing.column_names import is_unit
+from flexcal.importing.timestamps import STAMP
 
 NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 
@@ -25,7 +26,7 @@ class Header:
 
 
 def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word: str) -> Header:
-    """The header of a table `width` wide: the row before the first of which half is numbers, or before a row of units.
+    """The header of a table `width` wide: the row before the first of which half is numbers and times, or before a row of units.
 
     Raises `InputError` where there is no row of numbers, the names are not as many as the values, or one stands twice.
     """
@@ -54,4 +55,6 @@ def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word:
 
 def _is_data(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell]
-    return bool(filled) and 2 * sum(bool(NUMBER.fullmatch(cell)) for cell in filled) >= len(cells)
+    return bool(filled) and 2 * sum(bool(NUMBER.fullmatch(c) or STAMP.fullmatch(c)) for c in filled) >= len(
+        cells
+    )

@@ -16,6 +16,8 @@ _NEARLY_ALL = 0.95
 _LARGEST = 4.0
 """Points of one target lie within so many times the reach of their middle."""
 _SLOWEST_IN_MS = 110.0
+_LONGEST_AT_A_POSE = 1000.0
+"""From one measured pose to the next it takes seconds or minutes, fewer seconds than this."""
 
 
 def joint_units(model: RobotModel, q: np.ndarray) -> tuple[str, ...]:
@@ -53,3 +55,9 @@ def time_unit(t: np.ndarray) -> str:
     """The unit of time stamps (N,) by their usual step: seconds from once a second on, milliseconds from ten times a second on, else us."""
     step = float(np.median(np.diff(t))) if len(t) > 1 else 1.0
     return "s" if step <= 1.1 else "ms" if step <= _SLOWEST_IN_MS else "us"
+
+
+def pose_time_unit(t: np.ndarray) -> str:
+    """The unit of the times (N,) at which poses were measured, by their usual step."""
+    step = float(np.median(np.abs(np.diff(t)))) if len(t) > 1 else 1.0
+    return "s" if step < _LONGEST_AT_A_POSE else "ms" if step < 1e3 * _LONGEST_AT_A_POSE else "us"

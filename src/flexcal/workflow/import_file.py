@@ -31,7 +31,19 @@ from flexcal.importing import (
 from flexcal.model import RobotModel
 from flexcal.units import MILLIMETRE
 
-_POSES = ("pose", "q", "xyz", "length", "quaternion", "sigma", "sigma_xyz", "tau", "payload", "temperature")
+_POSES = (
+    "pose",
+    "q",
+    "xyz",
+    "length",
+    "quaternion",
+    "sigma",
+    "sigma_xyz",
+    "tau",
+    "payload",
+    "temperature",
+    "t",
+)
 _LOG = ("t", *JOINT_QUANTITIES, "temperature", "payload")
 
 
@@ -200,7 +212,7 @@ def _converted(
     """Columns (N,) by flexcal's names, and quantities (N, m); raises `InputError` at the first value that is missing."""
     columns: dict[str, np.ndarray] = {}
     values: dict[str, np.ndarray] = {}
-    if "pose" not in guess.placed and "t" not in guess.placed:
+    if "pose" not in guess.placed and ({"xyz", "length"} & guess.placed.keys() or "t" not in guess.placed):
         columns["pose"] = np.arange(1, len(foreign) + 1)
     for quantity, placed in guess.placed.items():
         for column in placed.columns:
