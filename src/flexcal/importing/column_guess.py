@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -14,6 +15,7 @@ from flexcal.importing.column_words import NEUTRAL, NO_POINT, POINT, SIGMA, SING
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.joint_columns import joint_quantities
 from flexcal.importing.placed_columns import TIMESTAMP, PlacedColumns
+from flexcal.importing.rtde_names import rtde_columns
 from flexcal.importing.unit_guess import joint_units, point_unit, pose_time_unit, time_unit
 
 if TYPE_CHECKING:
@@ -42,7 +44,25 @@ def reasons_of(left_out: Sequence[LeftOut]) -> list[str]:
     by_reason: dict[str, list[str]] = {}
     for left in left_out:
         by_reason.setdefault(left.why, []).append(left.column)
-    return [f"{', '.join(columns)}: {why}" for why, columns in by_reason.items()]
+    return [f"{', '.join(_shortened(columns))}: {why}" for why, columns in by_reason.items()]
+
+
+def _shortened(columns: Sequence[str]) -> list[str]:
+    """Names that count up, three or more, as the first … the last."""
+    parts = [re.match(r"(.*?)(\d+)(\D*)$", column, re.DOTALL) for column in columns]
+    listed, at = [], 0
+    while at < len(columns):
+        end, first = at + 1, parts[at]
+        while first and end < len(columns) and (p := parts[end]) and p.group(1, 3) == first.group(1, 3):
+            if int(p[2]) != int(first[2]) + end - at:
+                break
+            end += 1
+        if end - at > 2:
+            listed.append(f"{columns[at]} … {columns[end - 1]}")
+        else:
+            listed += columns[at:end]
+        at = end
+    return listed
 
 
 def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
@@ -51,14 +71,24 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
         return _by_order(foreign, model)
     names = [parse_name(column, foreign.units.get(column)) for column in foreign.numbers]
     reasons: dict[str, str] = {}
-    placed: dict[str, PlacedColumns] = {}
-    for quantity, columns in joint_quantities(names, model, reasons).items():
-        placed[quantity] = place(foreign, model, quantity, columns, "their names")
-    taken = {column for found in placed.values() for column in found.columns}
-    rest = [name for name in names if name.column not in taken and name.column not in reasons]
+    placed = rtde_columns(foreign, model, reasons)
+    for quantity, columns in joint_quantities(_left(names, placed, reasons), model, reasons).items():
+        if quantity in placed:
+            reasons |= dict.fromkeys(columns, f"{placed[quantity].columns[0]} … are taken as {quantity}")
+        else:
+            placed[quantity] = place(foreign, model, quantity, columns, "their names")
+    rest = _left(names, placed, reasons)
     vectors, singles = _vectors(rest, reasons), _singles(rest, foreign, reasons)
     for quantity, columns in (vectors | singles).items():
-        placed[quantity] = place(foreign, model, quantity, columns, "their names", points="xyz" in vectors)
+        other = placed.get(quantity)
+        if other is not None and quantity != "xyz":
+            reasons |= dict.fromkeys(columns, f"{other.columns[0]} is taken as {quantity}")
+        else:
+            if other is not None:  # what a controller computes gives way to what was measured
+                reasons |= dict.fromkeys(other.columns, f"{columns[0]} … are taken as {quantity}")
+            placed[quantity] = place(
+                foreign, model, quantity, columns, "their names", points="xyz" in vectors
+            )
     if "sigma" in placed and "sigma_xyz" in placed:
         reasons[placed.pop("sigma").columns[0]] = "there are sigma_x, sigma_y and sigma_z"
     texts = {
@@ -72,6 +102,14 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
             reasons[name] = "its names are not all under `points:` of robot.yaml"
     texts = {"target" if key == "point" else key: name for key, name in texts.items()}
     return _guess(foreign, placed, texts, reasons)
+
+
+def _left(
+    names: Sequence[ColumnName], placed: Mapping[str, PlacedColumns], reasons: Mapping[str, str]
+) -> list[ColumnName]:
+    """The columns that are nothing yet."""
+    taken = {column for found in placed.values() for column in found.columns}
+    return [name for name in names if name.column not in taken and name.column not in reasons]
 
 
 def _guess(

@@ -10,7 +10,9 @@ def _words(text: str) -> frozenset[str]:
 JOINT = _words("q j joint joints axis axes ax achse theta th θ jnt gelenk angle angles winkel")
 """Of joint positions, whatever stands beside them; the others of `POSITION` are so only with one of these, or a joint's name."""
 POSITION = JOINT | _words("a position positions pos state states value values encoder")
-NO_JOINT = _words("tcp cartesian pose error err dev deviation force voltage limit mode offset digital analog")
+CARTESIAN = _words("tcp cartesian")
+"""Of the tool, so of no joint."""
+NO_JOINT = _words("pose error err dev deviation force voltage limit mode offset digital analog")
 NO_JOINT |= _words("residual correction delta status")
 KINDS = (
     ("ddq", _words("ddq qdd acceleration accelerations acc accel")),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 from flexcal.data.signals import JOINT_QUANTITIES
 from flexcal.importing.column_names import ColumnName, parse_name
 from flexcal.importing.column_words import (
+    CARTESIAN,
     JOINT,
     KINDS,
     NEUTRAL,
@@ -115,6 +116,8 @@ def _run_together(text: str) -> str:
 def _kind(words: Sequence[str], *, named: bool, unit: str | None) -> str | None:
     """The quantity that words speak of; with a joint's name and no word it is its position."""
     telling = [word for word in words if word not in NEUTRAL]
+    if not named and set(words) & CARTESIAN:
+        return None
     if "_".join(words) in JOINT_QUANTITIES:
         return "_".join(words)
     by_unit = next((quantity for quantity, units in _BY_UNIT.items() if unit in units), None)

@@ -28,6 +28,7 @@ from flexcal.importing import (
     read_foreign,
     reasons_of,
 )
+from flexcal.importing.rtde_names import TOOL
 from flexcal.model import RobotModel
 from flexcal.units import MILLIMETRE
 
@@ -142,6 +143,10 @@ def import_file(
     elif kind == "poses" and not stated:
         remarks.append(
             "the instrument's noise is not in it: say it with --sigma MM (1σ a coordinate), or it will count as the robot's"
+        )
+    if "xyz" in guess.placed and guess.placed["xyz"].columns == TOOL:
+        remarks.append(
+            "these points are what the controller computes from the joints, by its own kinematics: no calibration can rest on them"
         )
     if kind == "log" and "tau" not in guess.placed:
         remarks.append("there are no torques: 'identify dynamics' needs tau1 and so on")
