@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import datetime
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -113,10 +114,71 @@ def test_mat(tmp_path: Path, rng: np.random.Generator) -> None:
     np.testing.assert_array_equal(foreign.numbers["log.point[2]"], point[2])
     np.testing.assert_array_equal(foreign.numbers["t"], np.arange(20.0))
     assert any("note" in text and "gain" in text for text in foreign.notes)
+
+
+def write_mat73(path: Path, variables: dict) -> None:
+    """As MATLAB lays out version 7.3: HDF5 behind a block of 512 bytes that says so, arrays by columns, structs as groups."""
+    import h5py
+
+    def put(group, name: str, value) -> None:
+        if isinstance(value, dict):
+            group.create_group(name).attrs["MATLAB_class"] = np.bytes_("struct")
+            for field, inner in value.items():
+                put(group[name], field, inner)
+            return
+        text = isinstance(value, str)
+        matrix = np.atleast_2d(np.array([ord(c) for c in value], np.uint16) if text else np.asarray(value))
+        item = group.create_dataset(name, data=matrix.T)
+        names = {"float64": "double", "float32": "single", "bool": "logical"}
+        item.attrs["MATLAB_class"] = np.bytes_(
+            "char" if text else names.get(str(matrix.dtype), str(matrix.dtype))
+        )
+
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_group("#refs#")
+        for name, value in variables.items():
+            put(file, name, value)
+    with path.open("r+b") as stream:
+        stream.write(b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM")
+
+
+def test_mat_of_version_7_3(tmp_path: Path, rng: np.random.Generator) -> None:
+    """It reads as version 7 does."""
+    from scipy.io import savemat
+
+    pytest.importorskip("h5py")
+    variables = {
+        "log": {
+            "q": rng.normal(size=(20, 6)),
+            "point": rng.normal(size=(3, 20)),
+            "deep": {"n": np.arange(20)},
+        },
+        "t": np.arange(20.0)[:, None],
+        "single": np.linspace(0, 1, 20, dtype=np.float32)[None],
+        "on": np.arange(20)[:, None] > 7,
+        "note": "text",
+        "gain": 3.0,
+    }
+    savemat(tmp_path / "old.mat", variables)
+    write_mat73(tmp_path / "new.mat", variables)
+    old, new = read(tmp_path / "old.mat"), read(tmp_path / "new.mat")
+    assert set(new.numbers) == set(old.numbers) and len(new.numbers) == 13
+    for name, values in old.numbers.items():
+        np.testing.assert_array_equal(new.numbers[name], values)
+    assert any("note" in text and "gain" in text for text in new.notes)
+
+
+def test_mat_of_version_7_3_that_cannot_be_read(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "new.mat").write_bytes(
         b"MATLAB 7.3 MAT-file, Platform: GLNXA64".ljust(124) + b"\x00\x02IM" + bytes(400)
     )
-    with pytest.raises(InputError, match=r"7\.3 are not read.*-v7"):
+    pytest.importorskip("h5py")
+    with pytest.raises(InputError, match=r"not a readable MAT-file .* '-v7'"):
+        read(tmp_path / "new.mat")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    with pytest.raises(
+        InputError, match=r"need h5py: pip install h5py; or save it again with save\(…, '-v7'\)"
+    ):
         read(tmp_path / "new.mat")
 
 

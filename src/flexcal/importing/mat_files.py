@@ -1,4 +1,4 @@
-"""MATLAB's MAT-files up to version 7."""
+"""MATLAB's MAT-files."""
 
 from __future__ import annotations
 
@@ -17,27 +17,9 @@ def read_mat(path: Path) -> ForeignTable:
     """Read the variables of a MAT-file as columns, structs as name.field and matrices as name[0], name[1], …
 
     Rows are the length that most variables share; what has another shape is left out and named. Raises `InputError` where the file is
-    none, is of version 7.3, or holds no numbers.
+    none or holds no numbers, and for version 7.3 as `read_hdf5_mat` does.
     """
-    from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
-
-    try:
-        content = loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
-    except NotImplementedError:
-        raise InputError(
-            f"{path}: MAT-files of version 7.3 are not read; in MATLAB, save it again with save(…, '-v7')."
-        ) from None
-    except (MatReadError, ValueError, TypeError, OSError) as problem:
-        reason = " ".join(str(problem).split()) or type(problem).__name__
-        raise InputError(
-            f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
-        ) from problem
-    variables: dict[str, np.ndarray] = {}
-    others: list[str] = []
-    for name, value in content.items():
-        if not name.startswith("__"):
-            _collect(name, value, variables, others)
+    variables, others = _variables(path)
     lengths = Counter(length for value in variables.values() for length in set(value.shape) if length > 1)
     if not lengths:
         raise InputError(
@@ -56,6 +38,30 @@ def read_mat(path: Path) -> ForeignTable:
             others.append(name)
     notes = (f"no column of {rows} rows, left out: {', '.join(others)}",) if others else ()
     return ForeignTable(Table(TableFile(path, tuple(columns), 1), 1, columns), notes=notes)
+
+
+def _variables(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
+    """Variables (N,) or (N, M) of numbers by name, and the names of all others."""
+    from scipy.io import loadmat
+    from scipy.io.matlab import MatReadError
+
+    try:
+        content = loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
+    except NotImplementedError:  # version 7.3
+        from flexcal.importing.hdf5_mat_files import read_hdf5_mat
+
+        return read_hdf5_mat(path)
+    except (MatReadError, ValueError, TypeError, OSError) as problem:
+        reason = " ".join(str(problem).split()) or type(problem).__name__
+        raise InputError(
+            f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."
+        ) from problem
+    variables: dict[str, np.ndarray] = {}
+    others: list[str] = []
+    for name, value in content.items():
+        if not name.startswith("__"):
+            _collect(name, value, variables, others)
+    return variables, others
 
 
 def _collect(name: str, value: Any, variables: dict[str, np.ndarray], others: list[str]) -> None:
