@@ -75,7 +75,7 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     assert check["verdict"] == "unknown" and check["low"] > 1 and check["applied"] == check["factor"]
     assert any("no sigma" in remark for remark in document["remarks"])
     page = (ur5 / "map.html").read_text(encoding="utf-8")
-    assert "accuracy map" in page and "figure-predicted" in page
+    assert "accuracy map" in page and "figure-predicted" in page and "nothing is made smaller" in page
     seen = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "some.csv", "--json")
     assert seen.document["verification"]["fitted"] == ["some.csv"]
     assert "Were these poses unknown" in (ur5 / "map.html").read_text(encoding="utf-8")

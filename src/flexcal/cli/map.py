@@ -27,8 +27,8 @@ class Map:
     """Predict how accurate the tool is all over where the robot works: mean and 95 % of its error, from the calibration's uncertainty.
 
     The poses are random ones that put the target into the volume, in whatever orientation comes, or those of a file. With --verification,
-    measured poses that the calibration never saw say whether the prediction can be believed, and make it larger where it cannot. The page
-    shows where errors are large, and what they come from.
+    measured poses that the calibration never saw say whether the prediction can be believed, and make it larger where it cannot, never
+    smaller. The page shows where errors are large, and what they come from.
     """
 
     robot: Robot

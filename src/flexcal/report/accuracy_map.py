@@ -95,6 +95,12 @@ def _where(study: MapStudy) -> str:
     return "those given or random ones all over the joint ranges"
 
 
+_UP_ONLY = (
+    "Where errors are larger than chance allows, this page is multiplied by the observed over the predicted size; where they are smaller, "
+    "nothing is made smaller, for other poses may be worse than those that were measured."
+)
+
+
 def _checks(study: MapStudy) -> tuple[Check, ...]:
     scale = study.scale
     question = "Can the prediction be believed?"
@@ -231,6 +237,7 @@ def _observed(study: MapStudy) -> Section:
     )
     blocks: tuple[Block, ...] = (
         Table("table-scale", "Observed against predicted errors", ("", ""), rows),
+        Text((_UP_ONLY,)),
         FigureBlock(
             "figure-predicted",
             "Predicted against observed errors",
