@@ -134,6 +134,56 @@ def test_repeatability_of_measured_visits(run, ur5: Path) -> None:
     assert once.status == 2 and "each of the 20 poses was visited once only" in once.err
 
 
+def test_drift_of_a_robot_that_warms_up(run, ur5: Path) -> None:
+    """Forty cycles through five poses, a minute each pose: all go 0.2 mm along x together, pose 2 another 0.1 mm along z."""
+    first = pl.read_csv(ur5 / "after.csv").unique("pose", maintain_order=True).head(5)
+    rng = np.random.default_rng(8)
+    cycles = []
+    for k in range(40):
+        warm = k / 39
+        noise = SIGMA * rng.standard_normal((5, 3))
+        alone = pl.when(pl.col("pose") == first["pose"][1]).then(1e-4 * warm).otherwise(0.0)
+        cycles.append(
+            first.with_columns(
+                pl.col("x") + 2e-4 * warm + pl.Series(noise[:, 0]),
+                pl.col("y") + pl.Series(noise[:, 1]),
+                pl.col("z") + alone + pl.Series(noise[:, 2]),
+                t=pl.Series(60.0 * (5 * k + np.arange(5))),
+            )
+        )
+    table = pl.concat(cycles)
+    table.write_csv(ur5 / "cycles.csv")
+    done = run("repeatability", ur5 / "robot.yaml", ur5 / "cycles.csv", "--out", ur5 / "drift", "--json")
+    assert done.status == 0 and not any("times in the files" in text for text in done.document["remarks"])
+    drift, each = done.document["drift"], done.document["drift"]["each"]
+    points = table.filter(pl.col("pose") == first["pose"][1]).select("x", "y", "z").to_numpy()
+    centres = points.reshape(4, 10, 3).mean(axis=1)
+    np.testing.assert_allclose(
+        each[1]["way_mm"], 1e3 * np.linalg.norm(centres - centres[0], axis=1), rtol=1e-9
+    )
+    np.testing.assert_allclose(each[1]["t_s"], 60.0 * (np.array([22.5, 72.5, 122.5, 172.5]) + 1))
+    assert all(item["certain"] and len(item["rp_mm"]) == 4 for item in each)
+    # from the middle of the first ten cycles to that of the last it is 30/39 of the whole way
+    assert drift["together_mm"] == pytest.approx(0.2 * 30 / 39, abs=0.02)
+    assert drift["way_mm"]["max"] == pytest.approx(np.hypot(0.2, 0.1) * 30 / 39, abs=0.03)
+    course = each[1]["ap_calibrated_mm"]
+    assert each[1]["dap_calibrated_mm"] == pytest.approx(abs(course[-1] - course[0]), rel=1e-12)
+    page = (ur5 / "drift" / "report.html").read_text(encoding="utf-8")
+    assert "figure-drift" in page and "What drifts? All poses together went" in page
+    shown = run("repeatability", ur5 / "robot.yaml", ur5 / "cycles.csv").out
+    assert "drift of repeatability, dRP" in shown and "moved beyond chance at 5 of 5 poses" in shown
+
+
+def test_times_that_do_not_go_on(run, ur5: Path) -> None:
+    """Two files that both begin at zero."""
+    table = pl.read_csv(ur5 / "after.csv")
+    timed = [table.with_columns(t=np.arange(60.0)), table.with_columns(t=np.arange(60.0) + 0.5)]
+    pl.concat(timed).write_csv(ur5 / "both.csv")
+    done = run("repeatability", ur5 / "robot.yaml", ur5 / "both.csv", "--json")
+    assert done.document["drift"] is None
+    assert any("go on from row to row and file to file" in text for text in done.document["remarks"])
+
+
 def test_repeatability_needs_no_calibration(run, ur5_folder: Path, calibrated: Path) -> None:
     done = run("repeatability", ur5_folder / "robot.yaml", calibrated / "after.csv", "--json")
     assert done.status == 0 and "ap_calibrated_mm" not in done.document

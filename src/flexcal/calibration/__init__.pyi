@@ -5,6 +5,7 @@ from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
 from .measured_points import require_points
 from .plausibility import Moved, moved_far
+from .pose_drift import VISITS_A_SET, PoseDrift, common_way, drift_of_poses
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
 from .prediction import Prediction, predict
 from .propagated_covariance import Propagation, propagation
@@ -17,6 +18,7 @@ from .verification import Verification, verify, verify_jointly
 
 __all__ = [
     "CYCLES",
+    "VISITS_A_SET",
     "AccuracyMap",
     "Calibration",
     "Drift",
@@ -24,6 +26,7 @@ __all__ = [
     "ErrorScale",
     "ErrorStatistics",
     "Moved",
+    "PoseDrift",
     "PoseRepeatability",
     "Prediction",
     "Propagation",
@@ -31,6 +34,8 @@ __all__ = [
     "Verification",
     "accuracy_map",
     "calibrate",
+    "common_way",
+    "drift_of_poses",
     "error_scale",
     "error_sources",
     "geometric_parameters",

@@ -56,6 +56,12 @@ def repeatability(poses: PoseSet) -> list[PoseRepeatability]:
     return found
 
 
+def repeatability_of(points: np.ndarray) -> float:
+    """RP = l̄ + 3 S_l of points (K, 3), in their unit."""
+    distance = np.linalg.norm(points - points.mean(axis=0), axis=1)
+    return float(distance.mean() + 3 * distance.std(ddof=1))
+
+
 def noise_repeatability(sigma: np.ndarray) -> float:
     """RP, m, that an instrument's 1σ noise (N, 3) alone shows at many visits."""
     return _NOISE * float(np.sqrt((sigma**2).mean()))
@@ -83,12 +89,10 @@ def _numbers(poses: PoseSet) -> np.ndarray:
 
 def _evaluate(poses: PoseSet, rows: np.ndarray, number: np.ndarray) -> PoseRepeatability:
     points = poses.position[rows]
-    deviations = points - points.mean(axis=0)
-    distance = np.linalg.norm(deviations, axis=1)
     return PoseRepeatability(
         rows,
-        deviations,
-        float(distance.mean() + 3 * distance.std(ddof=1)),
+        points - points.mean(axis=0),
+        repeatability_of(points),
         None if poses.quaternion_wxyz is None else _rotation_spread(poses.quaternion_wxyz[rows]),
         _direction_variation(points, rows, number),
     )

@@ -48,9 +48,16 @@ def repeatability_table(document: Mapping[str, Any]) -> Table:
         "ap_calibrated_mm": "accuracy AP, calibrated",
         "vap_mm": "variation of AP by direction, vAP",
     }
-    for key, label in labels.items():
-        if document.get(key) is not None:
-            table.add_row(label, *(_millimetres(value) for value in document[key].values()))
+    drifting = {
+        "drp_mm": "drift of repeatability, dRP",
+        "dap_nominal_mm": "drift of accuracy, as delivered, dAP",
+        "dap_calibrated_mm": "drift of accuracy, calibrated, dAP",
+        "way_mm": "way of the barycentre meanwhile",
+    }
+    for block, named in ((document, labels), (document["drift"] or {}, drifting)):
+        for key, label in named.items():
+            if block.get(key) is not None:
+                table.add_row(label, *(_millimetres(value) for value in block[key].values()))
     return table
 
 

@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import CYCLES, PoseRepeatability
+from flexcal.calibration import CYCLES, VISITS_A_SET, PoseRepeatability
 from flexcal.data import PoseSet
+from flexcal.report.figures.pose_courses import pose_courses
 from flexcal.report.figures.residual_trend import residual_trend
 from flexcal.report.notation import document_millimetres
 from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Table, Text, Verdict, worst
@@ -72,10 +73,12 @@ def repeatability_page(study: RepeatabilityStudy) -> Page:
     )
     return Page(
         title=f"{study.name}: repeatability and pose accuracy",
-        subtitle="After ISO 9283:1998, clauses 7.2.1 to 7.2.3",
+        subtitle="After ISO 9283:1998, clauses 7.2.1 to 7.2.3"
+        + ("" if results["drift"] is None else ", and drift of pose characteristics"),
         verdict=verdict,
         sections=[
             _poses_section(study),
+            *([] if results["drift"] is None else [_drift_section(results["drift"])]),
             _order_section(study),
             provenance_section("", None, {}, study.provenance),
         ],
@@ -120,7 +123,63 @@ def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
         answer = f"The instrument's noise alone would show an RP of {document_millimetres(noise)} mm; "
         answer += f"{document_millimetres(seen)} mm are seen on average."
         checks.append(Check(question, answer, "good" if seen > 1.5 * noise else "care"))
+    if (drift := study.results["drift"]) is not None:
+        moved = [item for item in drift["each"] if item["certain"]]
+        farthest = max(drift["each"], key=lambda item: item["way_mm"][-1])
+        answer = (
+            f"{len(moved)} of {len(drift['each'])} poses moved from the first visits to the last, "
+            f"pose {farthest['pose']} by {document_millimetres(farthest['way_mm'][-1])} mm."
+            if moved
+            else "It moved no more than its visits scatter."
+        )
+        checks.append(Check("Did it stay while it was measured?", answer, "care" if moved else "good"))
     return tuple(checks)
+
+
+def _drift_section(drift: Mapping[str, Any]) -> Section:
+    kinds = [kind for kind in KINDS if f"dap_{kind}_mm" in drift]
+    columns = (
+        "pose",
+        "sets",
+        *(f"d{KINDS[kind]} / mm" for kind in kinds),
+        "dRP / mm",
+        "way / mm",
+        "beyond chance",
+    )
+    rows = tuple(
+        (
+            str(item["pose"]),
+            str(len(item["t_s"])),
+            *(document_millimetres(item[f"dap_{kind}_mm"]) for kind in kinds),
+            document_millimetres(item["drp_mm"]),
+            document_millimetres(item["way_mm"][-1]),
+            "yes" if item["certain"] else "no",
+        )
+        for item in drift["each"]
+    )
+    sentences = [
+        f"The visits to each pose are taken in sets of {VISITS_A_SET} or more, in their order. dAP and dRP are by how much AP and RP of "
+        "the last set differ from those of the first. AP may stay while the point goes round the command: the way is the distance "
+        "between the barycentres of the first set and the last, and goes beyond chance where Hotelling's test of two samples says so "
+        "(less than 0.27 % of poses that stay).",
+    ]
+    if len(drift["each"]) > 1:
+        sentences.append(
+            f"What drifts? All poses together went {document_millimetres(drift['together_mm'])} mm, as a base or an instrument does "
+            f"that moves; besides, each went {document_millimetres(drift['apart_mm'])} mm (root mean square), as an arm that warms up."
+        )
+    blocks = (
+        Table("table-drift", "From the first visits to the last", columns, rows),
+        FigureBlock(
+            "figure-drift",
+            "The course of every pose",
+            pose_courses(drift["each"]),
+            "One mark a set, at the mean time of its visits. The noise of the instrument is part of it.",
+            "Way of the barycentre and RP of every pose against time.",
+        ),
+        Text(tuple(sentences)),
+    )
+    return Section("drift", "What drifted meanwhile", "", blocks)
 
 
 def _poses_section(study: RepeatabilityStudy) -> Section:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +11,11 @@ import numpy as np
 
 from flexcal.calibration import (
     CYCLES,
+    VISITS_A_SET,
+    PoseDrift,
     PoseRepeatability,
+    common_way,
+    drift_of_poses,
     noise_repeatability,
     predict,
     repeatability,
@@ -38,17 +42,24 @@ from flexcal.workflow.verify_robot import registrable
 class RobotRepeatability:
     """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
 
-    "nominal": the nominal robot, laid as well as it goes through the points; "calibrated": the calibrated one.
+    "nominal": the nominal robot, laid as well as it goes through the points; "calibrated": the calibrated one. `drifts` are those of the
+    poses that were visited often enough while a clock ran.
     """
 
     poses: PoseSet
     visited: list[PoseRepeatability]
     errors: Mapping[str, np.ndarray]
+    drifts: list[PoseDrift]
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = list(unused_columns(self.poses))
+        timed = self.poses.time is not None
+        remarks = list(unused_columns(replace(self.poses, time=None)))
+        if timed and not self.drifts:
+            remarks.append(
+                f"drift shows at poses with {2 * VISITS_A_SET} visits or more, with times that go on from row to row and file to file"
+            )
         fewest = min(len(pose.rows) for pose in self.visited)
         if fewest < CYCLES:
             remarks.append(
@@ -81,8 +92,45 @@ class RobotRepeatability:
             "instrument_rp_mm": noise_repeatability(self.poses.sigma) / MILLIMETRE
             if self.poses.sigma_given
             else None,
+            "drift": self._drift(),
             "each": rows,
             "remarks": list(self.remarks),
+        }
+
+    def _drift(self) -> dict[str, Any] | None:
+        """dRP, dAP and the way of the barycentres over all poses, and the course of each; None where none is known."""
+        if not self.drifts:
+            return None
+        each = []
+        for drift in self.drifts:
+            first = int(drift.sets[0][0])
+            courses = {
+                f"ap_{kind}_mm": drift.accuracy(errors) / MILLIMETRE for kind, errors in self.errors.items()
+            }
+            each.append(
+                {
+                    "pose": int(self.poses.pose[first]),
+                    "target": str(self.poses.target[first]),
+                    "t_s": drift.time.tolist(),
+                    "rp_mm": (drift.repeatability / MILLIMETRE).tolist(),
+                    "way_mm": (np.linalg.norm(drift.way, axis=1) / MILLIMETRE).tolist(),
+                    **{key: course.tolist() for key, course in courses.items()},
+                    "drp_mm": drift.repeatability_drift / MILLIMETRE,
+                    **{
+                        f"dap_{kind}_mm": drift.accuracy_drift(errors) / MILLIMETRE
+                        for kind, errors in self.errors.items()
+                    },
+                    "certain": drift.certain,
+                }
+            )
+        together, apart = common_way(self.drifts)
+        keys = ["drp_mm", *(f"dap_{kind}_mm" for kind in self.errors)]
+        return {
+            **{key: _spread([item[key] for item in each]) for key in keys},
+            "way_mm": _spread([item["way_mm"][-1] for item in each]),
+            "together_mm": together / MILLIMETRE,
+            "apart_mm": apart / MILLIMETRE,
+            "each": each,
         }
 
     def _pose(self, pose: PoseRepeatability) -> dict[str, Any]:
@@ -116,7 +164,7 @@ def repeat_robot(
         errors["nominal"] = nominal_errors(nominal, poses)
     if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
         errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
-    result = RobotRepeatability(poses, visited, errors)
+    result = RobotRepeatability(poses, visited, errors, drift_of_poses(poses, visited))
     if out is not None:
         document = result.document()
         write_results(out, document)
