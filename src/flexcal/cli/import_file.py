@@ -143,6 +143,11 @@ class Import:
             return f"flexcal identify dynamics {self.robot} {self.out}"
         if found.kind == "joints":
             return f"flexcal design poses {self.robot} --from {self.out} --out plan.yaml"
-        return (
-            f"flexcal calibrate {self.robot} {self.out}, or flexcal verify on poses that were kept for that"
-        )
+        from flexcal.workflow.calibrated_robot import stored_estimates
+
+        calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))
+        if stored_estimates(found.model, None).is_file():
+            return (
+                f"{verify}, where the calibration never saw these poses; or, to calibrate anew, {calibrate}"
+            )
+        return f"{calibrate}; or, where they were kept to check a calibration, {verify}"
