@@ -165,6 +165,18 @@ def test_timestamps_of_poses(run, ur5_folder: Path) -> None:
     assert snapshot(ur5_folder) == before
 
 
+def test_a_time_that_is_none_is_placed(run, ur5_folder: Path, foreign: Path) -> None:
+    lines = foreign.read_text().splitlines()
+    stamps = ["when", *(f"2026-03-01 12:{k:02d}:00" for k in range(len(lines) - 1))]
+    stamps[7] = "later"
+    foreign.write_text("\n".join(f"{stamp},{line}" for stamp, line in zip(stamps, lines, strict=True)))
+    sign = "q3=-axis 3[deg]"
+    refused = run("import", ur5_folder / "robot.yaml", foreign, "--map", sign)
+    assert refused.status == 2 and "other.csv line 8, column when: there is no time" in refused.err
+    assert "--map t=none" in refused.err
+    assert run("import", ur5_folder / "robot.yaml", foreign, "--map", sign, "t=none").status == 0
+
+
 @pytest.mark.parametrize(("scale", "unit"), [(1.0, "s"), (1e3, "ms")])
 def test_times_of_poses_are_told_by_how_long_one_takes(
     run, ur5_folder: Path, scale: float, unit: str

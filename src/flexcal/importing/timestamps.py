@@ -25,7 +25,7 @@ _NO_DATE = 1904
 
 
 def with_times(foreign: ForeignTable) -> ForeignTable:
-    """`foreign` with texts that are all timestamps as seconds from the first of their column, named in `times`."""
+    """`foreign` with texts most of which are timestamps as seconds from the first of their column, named in `times`."""
     found = {}
     for name, texts in foreign.texts.items():
         seconds = seconds_of(texts.tolist())
@@ -34,20 +34,21 @@ def with_times(foreign: ForeignTable) -> ForeignTable:
     if not found:
         return foreign
     notes = [
-        f"{name} counts in seconds from {next(filter(None, foreign.texts[name].tolist()))}" for name in found
+        f"{name} counts in seconds from {foreign.texts[name][np.isfinite(seconds)][0]}"
+        for name, seconds in found.items()
     ]
     table = Table(foreign.table.file, foreign.table.first, {**foreign.table.columns, **found})
     return replace(foreign, table=table, notes=(*foreign.notes, *notes), times=(*foreign.times, *found))
 
 
 def seconds_of(texts: Sequence[str]) -> np.ndarray | None:
-    """Seconds (N,) from the first of `texts`, NaN where one is empty; None where one is no timestamp, or all are empty.
+    """Seconds (N,) from the first of `texts`, NaN where one is no timestamp; None where most that are not empty are none.
 
     Without dates, a time of day that is half a day or more before the one above it is of the next day.
     """
     stamps = [_stamp(text) if text else None for text in texts]
     filled = [stamp for stamp in stamps if stamp is not None]
-    if not filled or len(filled) < sum(bool(text) for text in texts):
+    if not filled or 2 * len(filled) <= sum(bool(text) for text in texts):
         return None
     if len({(dated, zoned) for _, _, dated, zoned in filled}) > 1:
         return None

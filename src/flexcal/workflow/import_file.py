@@ -223,10 +223,11 @@ def _converted(
         for column in placed.columns:
             bad = ~np.isfinite(foreign.numbers[column])
             if bad.any():
+                what = "time" if column in foreign.times else "number"
                 raise foreign.table.error(
                     int(np.argmax(bad)),
                     column,
-                    "there is no number; complete or remove it, or take the column back with --map NAME=none.",
+                    f"there is no {what}; complete or remove the line, or take the column back with --map {quantity}=none.",
                 )
         found = placed.values(foreign.table)
         if quantity == "quaternion":
