@@ -24,7 +24,7 @@ _MOVED = 0.02
 class Import:
     """Turn measurements with other names and units into flexcal's columns in SI units: measured poses, or a log of joints.
 
-    FILE is text with separators, Excel, MAT, Parquet, or a ROS recording (MCAP, rosbag2). Columns are recognised by the
+    FILE is text with separators, Excel, MAT, Parquet, a universal file, or a ROS recording (MCAP, rosbag2). Columns are recognised by the
     joints' names, usual words and numbers; units where they stand beside the names, else by magnitude. What was guessed is shown on the
     first rows, and what is left out is named. Without --out nothing is written.
 

@@ -11,13 +11,14 @@ from flexcal.importing.timestamps import with_times
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _EXCEL = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
+_UFF = (".uff", ".unv")
 _ROS = (".mcap", ".db3", ".bag")
 
 
 def read_foreign(
     path: Path, joints: Sequence[str], *, sheet: str | None = None, topic: str | None = None
 ) -> ForeignTable:
-    """Read a table of another program: text with separators, Excel, MAT, Parquet, or a ROS recording; timestamps become seconds.
+    """Read a table of another program: text with separators, Excel, MAT, Parquet, universal, or a ROS recording; timestamps become seconds.
 
     `joints` are the robot's, by which a recording's messages are chosen; `sheet` is that of an Excel file, `topic` that of the points in
     a recording. Raises `InputError` where the file cannot be read, and where the library for it is not installed.
@@ -49,9 +50,13 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
         from flexcal.importing.mat_files import read_mat
 
         return read_mat(path)
+    if suffix in _UFF:
+        from flexcal.importing.uff_files import read_uff
+
+        return read_uff(path)
     if suffix == ".parquet":
         from flexcal.importing.parquet_files import read_parquet
 
         return read_parquet(path)
-    known = ", ".join((*_TEXT, *_EXCEL[:2], ".mat", ".parquet", *_ROS))
+    known = ", ".join((*_TEXT, *_EXCEL[:2], ".mat", ".parquet", _UFF[0], *_ROS))
     raise InputError(f"{path}: files that end in '{suffix}' are not understood; known are {known}.")

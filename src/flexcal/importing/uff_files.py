@@ -1,0 +1,76 @@
+"""Universal files: the time histories of their data sets 58."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data.table import Table, TableFile
+from flexcal.errors import InputError
+from flexcal.importing.foreign_table import ForeignTable
+
+_FUNCTION, _TIME_RESPONSE = 58, 1
+_DIRECTIONS = ("", "X", "Y", "Z", "RX", "RY", "RZ")
+_SAME_CLOCK = 1e-6
+"""Share of a step by which two histories may be sampled apart."""
+
+
+def read_uff(path: Path) -> ForeignTable:
+    """Read the time histories of a universal file as columns, beside their time `t`.
+
+    They are called by their first line of text where these tell them apart, else by node and direction, as node 3 +Z. What is sampled at
+    other times than most, or is no time history, is left out and named. Raises `InputError` where pyuff is not installed, the file is
+    none, or holds no time history.
+    """
+    try:
+        import pyuff
+    except ImportError:
+        raise InputError(f"{path}: universal files need pyuff: pip install pyuff.") from None
+    try:
+        file = pyuff.UFF(str(path))
+        kinds = [int(kind) for kind in file.get_set_types()]
+        sets: list[Any] = [file.read_sets(k) for k, kind in enumerate(kinds) if kind == _FUNCTION]
+    except Exception as problem:  # of no class of its own
+        reason = " ".join(str(problem).split()) or type(problem).__name__
+        raise InputError(f"{path}: not a readable universal file ({reason}); export it again.") from problem
+    timed = [item for item in sets if int(item["func_type"]) == _TIME_RESPONSE]
+    if not timed:
+        raise InputError(
+            f"{path}: it holds no time history (data set 58, function type 1); export the recording as such."
+        )
+    names = _names(timed)
+    clocks = [np.asarray(item["x"], dtype=float) for item in timed]
+    alike = [[_same(a, b) for b in clocks] for a in clocks]
+    chosen = alike[int(np.argmax([sum(row) for row in alike]))]
+    clock = clocks[chosen.index(True)]
+    columns = {"t": clock}
+    units = {"t": "s"}
+    left = [name for name, same in zip(names, chosen, strict=True) if not same]
+    for name, item, same in zip(names, timed, chosen, strict=True):
+        if same:
+            columns[name] = np.real(np.asarray(item["data"])).astype(float)
+            units[name] = str(item.get("ordinate_axis_units_lab", "")).strip()
+    notes = [f"sampled at other times, left out: {', '.join(left)}"] if left else []
+    if len(timed) < len(kinds):
+        notes.append(f"data sets that are no time histories, left out: {len(kinds) - len(timed)}")
+    return ForeignTable(Table(TableFile(path, tuple(columns), 1), 1, columns), units, notes=tuple(notes))
+
+
+def _names(timed: list[Mapping[str, Any]]) -> list[str]:
+    """The histories' first lines, or their nodes and directions, numbered where these are the same."""
+    lines = [str(item.get("id1", "")).strip() for item in timed]
+    if len(set(lines)) == len(lines) and not {"", "NONE", "t"} & set(lines):
+        return lines
+    names = []
+    for item in timed:
+        direction = int(item.get("rsp_dir", 0))
+        sign = "-" if direction < 0 else "+"
+        names.append(f"node {int(item.get('rsp_node', 0))} {sign}{_DIRECTIONS[abs(direction)]}".rstrip("+ "))
+    return [name if names.count(name) == 1 else f"{name} ({k + 1})" for k, name in enumerate(names)]
+
+
+def _same(a: np.ndarray, b: np.ndarray) -> bool:
+    return len(a) == len(b) and bool(np.allclose(a, b, rtol=0, atol=_SAME_CLOCK * np.ptp(a) / len(a)))
