@@ -27,9 +27,9 @@ from flexcal.elasticity.model_error import ModelError
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
-from flexcal.report.study import TwoStageStudy
 from flexcal.workflow.designed_frequency import PlanName, response_sensors
 from flexcal.workflow.two_stage import run_two_stage
+from flexcal.workflow.two_stage_run import TwoStageRun
 from flexcal.yaml_reader import read_yaml
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
@@ -46,7 +46,7 @@ def one_seed(seed: int, plan: PlanName, inertias_known: bool, half_gap: float | 
             values |= {name: half_gap for name in values if name.endswith(".backlash")}
             truth = Path(folder) / "given.yaml"
             write_truth(truth, values)
-        study = run_two_stage(
+        run = run_two_stage(
             ROBOT,
             Path(folder) / "out",
             seed=seed,
@@ -57,25 +57,25 @@ def one_seed(seed: int, plan: PlanName, inertias_known: bool, half_gap: float | 
         )
     return {
         "seed": seed,
-        "springs": _springs(study),
-        "inertials": _inertials(study),
-        "geometry": _geometry(study),
-        "predicted": _predicted(study),
-        "results": study.results,
+        "springs": _springs(run),
+        "inertials": _inertials(run),
+        "geometry": _geometry(run),
+        "predicted": _predicted(run),
+        "results": run.results,
     }
 
 
-def _predicted(study: TwoStageStudy) -> float:
+def _predicted(run: TwoStageRun) -> float:
     """Largest standard deviation of a stiffness that is predicted for the plan, from what was known before it was carried out."""
-    planned = PlannedResponses.of(study.informed, study.plan, response_sensors(ROBOT))
+    planned = PlannedResponses.of(run.informed, run.plan, response_sensors(ROBOT))
     return max(std for name, std in planned.std().items() if name.endswith(".stiffness"))
 
 
-def _springs(study: TwoStageStudy) -> dict[str, dict[str, Any]]:
+def _springs(run: TwoStageRun) -> dict[str, dict[str, Any]]:
     """Relative error, and error over standard deviation in the logarithm, of every spring parameter."""
-    estimate, truth = study.stiffness.estimate, study.truth or {}
-    found, bounds = {}, cramer_rao(study)
-    for name in study.stiffness.springs:
+    estimate, truth = run.stiffness.estimate, run.truth
+    found, bounds = {}, cramer_rao(run)
+    for name in run.stiffness.springs:
         k = estimate.parameters.index(name)
         error = float(np.log(estimate.values[name] / truth[name]))
         found[name] = {
@@ -88,12 +88,12 @@ def _springs(study: TwoStageStudy) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _inertials(study: TwoStageStudy) -> dict[str, Any]:
+def _inertials(run: TwoStageRun) -> dict[str, Any]:
     """Error over standard deviation of everything that stage 0 found, and the mean square of all together, decorrelated."""
-    found = study.dynamics
+    found = run.dynamics
     if found is None:
         return {"normalised": [], "joint": float("nan")}
-    truth = {n: (study.truth or {}).get(n, study.nominal.value(n)) for n in found.parameters.names}
+    truth = {n: run.truth.get(n, run.nominal.value(n)) for n in found.parameters.names}
     error = found.parameters.coordinates() - found.parameters.coordinates(truth)
     return {
         "normalised": list(error / np.sqrt(np.diag(found.covariance))),
@@ -101,25 +101,25 @@ def _inertials(study: TwoStageStudy) -> dict[str, Any]:
     }
 
 
-def cramer_rao(study: TwoStageStudy) -> np.ndarray:
+def cramer_rao(run: TwoStageRun) -> np.ndarray:
     """Standard deviations (p,) of stage 1 that noise, distortion and the priors of inertias and geometry allow."""
-    estimate, responses = study.stiffness.estimate, study.responses
+    estimate, responses = run.stiffness.estimate, run.responses
     x = estimate.parameters.coordinates()
-    model = ResponseModel.of(study.informed, responses, estimate.parameters).with_open_gaps(x, study.plan)
+    model = ResponseModel.of(run.informed, responses, estimate.parameters).with_open_gaps(x, run.plan)
     residual = StageOneResidual.of(model, responses, CovarianceWeighting())
     geometry = replace(Tolerances.none(), length=Tolerances.length, angle=Tolerances.angle)
     still = [ExperimentEffect.none(response) for response in responses]
     jacobian = ModelError.of(residual, responses, x, still, geometry).whiten(residual.linearise(x)[1])
-    prior = study.informed.posterior.prior(estimate.parameters)[1]
+    prior = run.informed.posterior.prior(estimate.parameters)[1]
     information = jacobian.T @ jacobian + np.linalg.inv(prior)
     return np.sqrt(np.diag(np.linalg.inv(information)))
 
 
-def _geometry(study: TwoStageStudy) -> list[float]:
+def _geometry(run: TwoStageRun) -> list[float]:
     """Error over standard deviation of every kept geometric parameter against the regrouped truth."""
-    estimate = study.calibration.estimate
-    expected = estimate.regrouped(study.truth or {})
-    names = [n for n in study.calibration.identifiability.kept_names if unit_of(n) in ("m", "rad")]
+    estimate = run.calibration.estimate
+    expected = estimate.regrouped(run.truth)
+    names = [n for n in run.calibration.identifiability.kept_names if unit_of(n) in ("m", "rad")]
     return [(estimate.values[n] - expected[n]) / (estimate.std(n) or np.inf) for n in names]
 
 

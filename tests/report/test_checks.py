@@ -18,7 +18,9 @@ from flexcal.report.checks import (
     check_residual,
     check_truth,
 )
+from flexcal.report.measured_points import CALIBRATED
 from flexcal.report.two_stage import two_stage_checks, two_stage_verdict
+from flexcal.workflow.two_stage_run import TwoStageRun
 
 
 def test_a_good_study_passes_every_check(study: TwoStageStudy) -> None:
@@ -27,24 +29,25 @@ def test_a_good_study_passes_every_check(study: TwoStageStudy) -> None:
 
 
 def test_errors_larger_than_predicted_are_bad(study: TwoStageStudy) -> None:
-    worse = replace(study.elastic_verification, errors=4.0 * study.elastic_verification.errors)
+    worse = replace(study.verification, errors=4.0 * study.verification.errors)
     assert check_claimed_uncertainty(worse).status == "bad"
-    assert two_stage_verdict(replace(study, elastic_verification=worse)).status == "bad"
+    fresh = replace(study.fresh, errors={**study.fresh.errors, CALIBRATED: worse.errors})
+    assert two_stage_verdict(replace(study, fresh=fresh)).status == "bad"
 
 
-def test_noise_of_the_instrument_counts_where_points_are_measured(study: TwoStageStudy) -> None:
-    assert study.measured_verification is not None and study.measured_poses is not None
-    assert check_claimed_uncertainty(study.measured_verification).status != "good"
-    assert check_claimed_uncertainty(study.measured_verification, study.measured_poses.sigma).status == "good"
+def test_noise_of_the_instrument_counts_where_points_are_measured(simulated: TwoStageRun) -> None:
+    measured, sigma = simulated.measured_verification, simulated.verification_poses.sigma
+    assert check_claimed_uncertainty(measured).status != "good"
+    assert check_claimed_uncertainty(measured, sigma).status == "good"
 
 
 def test_without_noise_nothing_is_claimed(study: TwoStageStudy) -> None:
-    checked = check_claimed_uncertainty(study.elastic_verification, noise_given=False)
+    checked = check_claimed_uncertainty(study.verification, noise_given=False)
     assert checked.status == "unknown"
 
 
 def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None:
-    v = study.elastic_verification
+    v = study.verification
     few = replace(
         v,
         errors=v.errors[:9],
@@ -52,12 +55,13 @@ def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None
         ambiguous=v.ambiguous[:9],
         position=v.position[:9],
     )
-    assert check_fresh_poses(study.calibration.errors, few.all).status == "care"
-    assert check_fresh_poses(study.calibration.errors, replace(v, errors=9 * v.errors).all).status == "care"
+    fitted = study.points.statistics(CALIBRATED)
+    assert check_fresh_poses(fitted, few.all).status == "care"
+    assert check_fresh_poses(fitted, replace(v, errors=9 * v.errors).all).status == "care"
 
 
 def test_chi2_is_judged(study: TwoStageStudy) -> None:
-    estimate = study.calibration.estimate
+    estimate = study.geometry
     freedom = estimate.degrees_of_freedom
     by_size = {
         k: check_residual("q", replace(estimate, chi2=k * freedom)).status for k in (0.2, 1.0, 2.0, 9.0)
@@ -67,8 +71,8 @@ def test_chi2_is_judged(study: TwoStageStudy) -> None:
     assert check_residual("q", estimate, sigma_given=False).status == "unknown"
 
 
-def test_a_drift_is_flagged(study: TwoStageStudy) -> None:
-    fit = study.calibration
+def test_a_drift_is_flagged(simulated: TwoStageRun) -> None:
+    fit = simulated.calibration
 
     def judged(calibration: Calibration) -> str:
         drift = Drift.of(calibration)
@@ -81,13 +85,13 @@ def test_a_drift_is_flagged(study: TwoStageStudy) -> None:
 
 
 def test_a_blurred_gap_is_flagged(study: TwoStageStudy) -> None:
-    found = study.calibration.identifiability
-    assert check_rank(len(found.names), found.rank, found.gap).status == "good"
-    assert check_rank(len(found.names), found.rank, 1.2).status == "care"
+    found = study.determined
+    assert check_rank(found.parameters, found.rank, found.gap).status == "good"
+    assert check_rank(found.parameters, found.rank, 1.2).status == "care"
 
 
 def test_many_uncertain_flanks_are_flagged(study: TwoStageStudy) -> None:
-    v = study.elastic_verification
+    v = study.verification
     assert check_flanks(replace(v, ambiguous=np.zeros(150, dtype=bool))).status == "good"
     assert check_flanks(replace(v, ambiguous=np.arange(150) % 3 == 0)).status == "care"
 
@@ -98,25 +102,21 @@ def test_coverage_is_judged() -> None:
 
 def test_the_floor_counts_against_the_truth(study: TwoStageStudy) -> None:
     noise = study.unpredicted_noise
-    assert noise is not None and study.floor is not None
     draws = noise[0] * np.random.default_rng(3).normal(size=(20000, 3))
-    np.testing.assert_allclose(np.linalg.norm(draws, axis=1).mean(), study.floor.mean, rtol=0.02)
-    np.testing.assert_array_equal(
-        replace(study, truth=None).unpredicted_noise, study.verification_poses.sigma
-    )
+    np.testing.assert_allclose(np.linalg.norm(draws, axis=1).mean(), study.errors("floor").mean, rtol=0.02)
 
 
-def test_chance_is_one_in_a_hundred(study: TwoStageStudy, rng: np.random.Generator) -> None:
-    model = study.calibration.model
+def test_chance_is_one_in_a_hundred(simulated: TwoStageRun, rng: np.random.Generator) -> None:
+    model = simulated.calibration.model
     posterior = model.posterior
     names = [n for n in posterior.parameters.names if not n.endswith(".damping")]
     numbers = [posterior.parameters.index(n) for n in names]
     parameters = posterior.parameters.subset(names)
     slopes = parameters.natural_slope(parameters.coordinates())
-    jacobian = predict(model, study.verification_poses, jacobians=True).jacobian(names) * slopes
+    jacobian = predict(model, simulated.verification_poses, jacobians=True).jacobian(names) * slopes
     draws = rng.multivariate_normal(
         np.zeros(len(names)), posterior.covariance[np.ix_(numbers, numbers)], 3000
     )
     errors = draws @ jacobian.reshape(-1, len(names)).T
-    ratios = np.sqrt((errors**2).sum(axis=1) / (study.elastic_verification.parameter_rms**2).sum())
+    ratios = np.sqrt((errors**2).sum(axis=1) / (simulated.elastic_verification.parameter_rms**2).sum())
     assert abs(np.quantile(ratios, 0.99) - CHANCE) < 0.07

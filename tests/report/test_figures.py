@@ -25,7 +25,7 @@ from flexcal.report.sections.geometry import exaggeration
 
 
 def test_skeletons_go_through_the_joints(tx90l: RobotModel, study: TwoStageStudy) -> None:
-    poses = study.calibration.poses
+    poses = study.points.poses
     lengths = {f"{joint}.length_{k}": 0.01 for joint in tx90l.joint_names for k in "xyz"}
     robot = tx90l.with_values({name: 0.0 for name in lengths})
     corners = skeletons(robot, poses)
@@ -44,8 +44,8 @@ def test_bound_contains_95_percent_of_errors_alike_in_three_directions() -> None
 
 
 def test_quantiles_leave_out_uncertain_flanks(study: TwoStageStudy) -> None:
-    figure = predicted_quantiles(study.elastic_verification)
-    assert len(figure.data[1].y) == (~study.elastic_verification.ambiguous).sum() < 150
+    figure = predicted_quantiles(study.verification)
+    assert len(figure.data[1].y) == (~study.verification.ambiguous).sum() < 150
 
 
 def test_levels_show_response_noise_and_distortion(study: TwoStageStudy) -> None:
@@ -58,54 +58,50 @@ def test_levels_show_response_noise_and_distortion(study: TwoStageStudy) -> None
 
 def test_fit_shows_one_pose_at_first(study: TwoStageStudy) -> None:
     labels = ("A", "B", "C")
-    figure = response_fit(study.responses, study.stiffness.predicted, labels)
+    figure = response_fit(study.responses, labels)
     assert {t.meta["pose"] for t in figure.data if t.visible} == {"A"}
     assert len(figure.data) == 3 * 2 * (9 + 3)
 
 
-def test_spring_intervals_are_relative(study: TwoStageStudy) -> None:
-    estimate = study.stiffness.estimate
+def test_spring_intervals_are_relative(tx90l: RobotModel, study: TwoStageStudy) -> None:
+    estimate = study.stiffness
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
     assert len(stiffness) == len(damping) == 9
-    figure = spring_intervals(estimate, stiffness, damping, study.nominal.values, "robot.yaml")
+    figure = spring_intervals(estimate, stiffness, damping, tx90l.values, "robot.yaml")
     name = stiffness[0]
     drawn = figure.data[0]
-    assert drawn.x[0] == pytest.approx(
-        100 * (estimate.values[name] / study.nominal.value(name) - 1), rel=1e-5
-    )
+    assert drawn.x[0] == pytest.approx(100 * (estimate.values[name] / tx90l.value(name) - 1), rel=1e-5)
     low, high = estimate.interval(name) or (0.0, 0.0)
-    width = 100 * (high - low) / study.nominal.value(name)
+    width = 100 * (high - low) / tx90l.value(name)
     assert drawn.error_x.array[0] + drawn.error_x.arrayminus[0] == pytest.approx(width, rel=1e-4)
     assert "not determined by these data" in {text for t in figure.data if t.text for text in t.text}
 
 
 def test_components_share_one_scale(study: TwoStageStudy) -> None:
-    figure = error_components(study.calibration.poses, study.calibration.residuals)
+    figure = error_components(study.points.poses, study.points.calibrated)
     ranges = {tuple(axis.range) for axis in figure.select_yaxes()}
     assert len(ranges) == 1
-    assert max(ranges)[1] >= 1e3 * np.abs(study.calibration.residuals).max()
+    assert max(ranges)[1] >= 1e3 * np.abs(study.points.calibrated).max()
 
 
 def test_the_instruments_noise_stays_within_the_axes(study: TwoStageStudy) -> None:
-    sigma = study.calibration.poses.sigma.copy()
+    sigma = study.points.poses.sigma.copy()
     sigma[3, 1] = 5e-4
-    figure = error_components(replace(study.calibration.poses, sigma=sigma), study.calibration.residuals)
+    figure = error_components(replace(study.points.poses, sigma=sigma), study.points.calibrated)
     assert max(axis.range[1] for axis in figure.select_yaxes()) >= 1.0
 
 
 def test_published_errors_are_named_in_the_legend(study: TwoStageStudy) -> None:
     assert study.paper is not None and study.paper.elastic is not None
-    series = [ErrorSeries("elastic", "blue", study.elastic_verification.errors)]
-    figure = verification_errors(
-        study.verification_poses, series, study.elastic_verification, study.paper.elastic
-    )
+    series = [ErrorSeries("elastic", "blue", study.verification.errors)]
+    figure = verification_errors(study.fresh.poses, series, study.verification, study.paper.elastic)
     heights = {trace.name: trace.y[0] for trace in figure.data if trace.mode == "lines"}
     assert heights == pytest.approx({"paper, 90 %": 0.23, "paper, worst": 0.32}, rel=1e-6)
     assert not figure.layout.annotations
 
 
 def test_rank_is_marked_where_it_is(study: TwoStageStudy) -> None:
-    found = study.calibration.identifiability
+    found = study.determined
     figure = singular_values(found.singular_values, found.diagonal, found.rank, found.gap)
     assert "rank 29" in figure.layout.annotations[0].text
     assert figure.layout.shapes[0].x0 == 29.5

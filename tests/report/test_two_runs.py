@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from flexcal.estimates_file import BLOCKS
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
+from flexcal.report.render import page_html
 from flexcal.report.run_difference import mean_difference, parameter_changes
 from flexcal.report.runs import Comparison, Run
 from flexcal.report.two_runs import comparison_page, comparison_verdict
@@ -111,3 +113,17 @@ def test_shared_measurements_are_no_independent_estimates() -> None:
     assert "Both runs used grid.csv" in same.sections[1].lead
     apart = comparison_page(Comparison(one, replace(one, name="b", data={"grid.csv": "34cd"})))
     assert "share no measurement" in apart.sections[1].lead
+
+
+def test_every_block_of_the_estimates_is_compared() -> None:
+    """A payload 0.3 kg heavier by ten of its joint standard deviations."""
+    sides = [
+        {block: estimate({"payload.mass": mass}, np.array([[4.5e-4]])) for block in BLOCKS}
+        for mass in (6.0, 6.3)
+    ]
+    sizes = np.full(30, 1e-4)
+    found = Comparison(*(run(name, sizes, estimates=side) for name, side in zip("ab", sides, strict=True)))
+    assert tuple(found.changes) == BLOCKS
+    (change,) = found.document()["parameters"]["payload"]["changed"]  # type: ignore[index]
+    assert change["name"] == "payload.mass" and change["score"] == pytest.approx(10.0)
+    assert "table-payload" in page_html(comparison_page(found))

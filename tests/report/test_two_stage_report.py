@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import base64
 import re
+import shutil
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -16,8 +17,10 @@ from flexcal.errors import InputError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.report import TX90L_PAPER, TwoStageStudy, write_two_stage_report
-from flexcal.report.notation import millimetres, significant
-from flexcal.report.study import CadAlone
+from flexcal.report.notation import document_millimetres, millimetres, significant
+from flexcal.workflow.report_folder import report_folder
+from flexcal.workflow.results import quantities
+from flexcal.workflow.two_stage_run import TwoStageRun
 
 MEBIBYTE = 1e6
 
@@ -78,23 +81,25 @@ def test_every_figure_and_table_says_what_it_is(outline: Outline) -> None:
         assert f"Figure {number}" in outline.words or f"Figures {number}" in outline.words
 
 
-def test_arrays_are_float32_in_base64(outline: Outline, study: TwoStageStudy) -> None:
+def test_arrays_are_float32_in_base64(outline: Outline, simulated: TwoStageRun) -> None:
     before, after = outline.figures()["figure-11"]["data"]
     assert after["y"]["dtype"] == "f4"
     drawn = np.frombuffer(base64.b64decode(after["y"]["bdata"]), dtype=np.float32)
-    np.testing.assert_allclose(drawn, 1e3 * np.linalg.norm(study.calibration.residuals, axis=1), rtol=1e-6)
+    np.testing.assert_allclose(
+        drawn, 1e3 * np.linalg.norm(simulated.calibration.residuals, axis=1), rtol=1e-6
+    )
     drawn = np.frombuffer(base64.b64decode(before["y"]["bdata"]), dtype=np.float32)
     np.testing.assert_allclose(
-        drawn, 1e3 * np.linalg.norm(study.nominal_at_calibration.errors, axis=1), rtol=1e-6
+        drawn, 1e3 * np.linalg.norm(simulated.nominal_at_calibration.errors, axis=1), rtol=1e-6
     )
 
 
-def test_first_screen_answers_the_three_questions(html: str, study: TwoStageStudy) -> None:
+def test_first_screen_answers_the_three_questions(html: str, simulated: TwoStageRun) -> None:
     screen = html[html.index('id="verdict"') : html.index('id="stage1"')]
     for statistics in (
-        study.nominal_verification.all,
-        study.rigid_verification[0].all,
-        study.elastic_verification.all,
+        simulated.nominal_verification.all,
+        simulated.rigid_verification[0].all,
+        simulated.elastic_verification.all,
     ):
         assert millimetres(statistics.p90) in screen and millimetres(statistics.max) in screen
     assert TX90L_PAPER.elastic is not None and millimetres(TX90L_PAPER.elastic.max) in screen
@@ -102,15 +107,15 @@ def test_first_screen_answers_the_three_questions(html: str, study: TwoStageStud
         assert question in screen
 
 
-def test_all_numbers_stand_beside_the_papers(html: str, study: TwoStageStudy) -> None:
+def test_all_numbers_stand_beside_the_papers(html: str, simulated: TwoStageRun) -> None:
     """The paper, on hardware: 0.10 mm on its calibration poses, 0.23 mm at nine of ten fresh ones, 0.32 at worst, 0.70 rigid."""
     table = html[html.index('id="table-numbers"') :]
     rows = re.findall(r"<tr.*?</tr>", table[: table.index("</table>")], re.DOTALL)
     cells = [re.sub(r"<[^>]*>", " ", row).split() for row in rows]
     expected = (
-        (study.calibration.errors, "calibration poses, calibrated", ("0.10",)),
-        (study.rigid_verification[0].all, "rigid calibration", ("0.70",)),
-        (study.elastic_verification.all, "elastic calibration", ("0.23", "0.32")),
+        (simulated.calibration.errors, "calibration poses, calibrated", ("0.10",)),
+        (simulated.rigid_verification[0].all, "rigid calibration", ("0.70",)),
+        (simulated.elastic_verification.all, "elastic calibration", ("0.23", "0.32")),
     )
     for ours, label, published in expected:
         (row,) = [row for row in cells if label in " ".join(row)]
@@ -122,14 +127,16 @@ def test_all_numbers_stand_beside_the_papers(html: str, study: TwoStageStudy) ->
 
 
 @pytest.mark.parametrize("kind", ["stiffness", "damping"])
-def test_table_1_has_every_interval_and_the_papers_value(html: str, study: TwoStageStudy, kind: str) -> None:
+def test_table_1_has_every_interval_and_the_papers_value(
+    html: str, study: TwoStageStudy, simulated: TwoStageRun, kind: str
+) -> None:
     table = html[html.index(f'id="table-{kind}"') :]
     table = table[: table.index("</table>")]
     rows = [re.sub(r"<[^>]*>", " ", row) for row in re.findall(r"<tr.*?</tr>", table, re.DOTALL)][1:]
     factor = 1e-3 if kind == "stiffness" else 1.0
     assert "95 % interval" in table and len(rows) == len(study.springs(kind)) == 9
     for name, row in zip(study.springs(kind), rows, strict=True):
-        interval = study.stiffness.estimate.interval(name)
+        interval = simulated.stiffness.estimate.interval(name)
         if interval is None:
             assert "not determined" in row
         else:
@@ -140,13 +147,13 @@ def test_table_1_has_every_interval_and_the_papers_value(html: str, study: TwoSt
 def test_the_poses_are_drawn_in_space(outline: Outline, study: TwoStageStudy) -> None:
     traces = outline.figures()["figure-10"]["data"]
     assert {trace["type"] for trace in traces} <= {"scatter3d", "cone"}
-    assert len(study.calibration.poses) == 40
+    assert len(study.points.poses) == 40
 
 
 def test_what_is_not_determined_is_said_with_a_reason(outline: Outline, study: TwoStageStudy) -> None:
     assert "not determined by these data" in outline.words
     assert "joint_3 bearing y, damping: the responses hardly depend on it in these poses" in outline.words
-    for dropped in study.calibration.identifiability.dropped:
+    for dropped in study.determined.dropped:
         assert dropped.name in outline.words
 
 
@@ -159,26 +166,42 @@ def test_poses_are_chosen_by_name(outline: Outline, study: TwoStageStudy) -> Non
     assert keys == {("figure-7", "pose"), ("figure-10", "arrows")}
 
 
-def test_the_same_study_gives_the_same_bytes(html: str, study: TwoStageStudy, tmp_path: Path) -> None:
-    write_two_stage_report(tmp_path / "again.html", study)
-    assert (tmp_path / "again.html").read_text("utf-8") == html
+def test_the_folder_gives_the_same_bytes_again(report: Path, html: str, tmp_path: Path) -> None:
+    again = tmp_path / "moved"
+    shutil.copytree(report.parent, again)
+    (again / "report.html").unlink()
+    assert report_folder(again).read_text("utf-8") == html
 
 
-def test_a_measured_robot_has_no_truth_columns(study: TwoStageStudy, tmp_path: Path) -> None:
-    path = tmp_path / "measured.html"
-    write_two_stage_report(
-        path, replace(study, truth=None, paper=None, floor=None, seed=None, measured_verification=None)
-    )
-    words = Outline(path.read_text("utf-8")).words
-    assert (
-        "truth in interval" not in words and "noise-free truth" not in words and "paper" not in words.lower()
-    )
+def test_a_folder_of_an_older_version_keeps_its_page(report: Path, tmp_path: Path) -> None:
+    old = tmp_path / "old"
+    shutil.copytree(report.parent, old)
+    (old / "fitted_responses.npz").unlink()
+    before = (old / "report.html").read_bytes()
+    with pytest.raises(InputError, match=r"fitted_responses\.npz cannot be read \(No such file"):
+        report_folder(old)
+    assert (old / "report.html").read_bytes() == before
+
+
+def test_residuals_stand_against_what_might_explain_them(outline: Outline, simulated: TwoStageRun) -> None:
+    drawn = outline.figures()
+    ys = np.frombuffer(base64.b64decode(drawn["figure-order"]["data"][0]["y"]["bdata"]), dtype=np.float32)
+    np.testing.assert_allclose(ys, 1e3 * simulated.calibration.residuals[:, 0], atol=1e-6)
+    assert {"figure-joints", "figure-workspace"} <= set(drawn)
+
+
+def test_provenance_names_every_input_of_both_stages(outline: Outline, study: TwoStageStudy) -> None:
+    for estimate in (study.stiffness, study.geometry):
+        assert estimate.provenance
+        for key, value in estimate.provenance.items():
+            assert key in outline.words and value in outline.words
+    assert "flexcal demo --seed 1 --out demo" in outline.words
 
 
 def test_names_from_files_cannot_break_the_page(study: TwoStageStudy, tmp_path: Path) -> None:
     path = tmp_path / "odd.html"
     odd = "</script><script>alert(1)</script>"
-    write_two_stage_report(path, replace(study, command=odd, results={"note": odd}))
+    write_two_stage_report(path, replace(study, results={**study.results, "command": odd, "note": odd}))
     assert Outline(path.read_text("utf-8")).unbalanced == []
     assert odd not in path.read_text("utf-8")
 
@@ -202,21 +225,30 @@ def test_stage_zero_stands_beside_cad_alone(study: TwoStageStudy, tmp_path: Path
         "link_2.com_x",
     )
     found = replace(
-        study.stiffness.estimate,
+        study.stiffness,
         parameters=Parameters([mass, Parameter(com, "m", 0.2345, prior_std=0.01, prior_mean=0.23)]),
         covariance=np.diag([1e-4, 1e-8]),
         dropped=(),
         identifiable=(True, True),
     )
-    rigid = study.rigid_verification[0]
-    alone = CadAlone(study.stiffness, study.calibration, rigid)
+    rigid = study.results["verification"]["rigid"]
+    verified = {"elastic": rigid, "elastic_unambiguous": rigid, "expected_rms_mm": 0.4321}
+    with_stage_zero = {
+        "dynamics": {"parameters": quantities(found)},
+        "cad_alone": {"stage1": study.results["stage1"], "verification": verified},
+    }
     path = tmp_path / "report.html"
-    write_two_stage_report(path, replace(study, dynamics=found, cad_alone=alone))
+    results = {**study.results, **with_stage_zero}
+    write_two_stage_report(
+        path, replace(study, results=results, estimates={**study.estimates, "dynamics": found})
+    )
     section = path.read_text("utf-8")
     section = section[section.index('id="table-stage0-gain"') : section.index('id="stage1"')]
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", section))
-    both = f"{millimetres(rigid.all.p90)} {millimetres(study.elastic_verification.all.p90)}"
+    both = f"{document_millimetres(rigid['p90_mm'])} {millimetres(study.verification.all.p90)}"
     assert f"stage 2: 90 % of them within / mm {both}" in text
+    expected = float(np.sqrt(np.mean(study.verification.parameter_rms**2)))
+    assert f"rms / mm 0.432 {millimetres(expected)}" in text
     assert "link_2.com_x mm 230 10.0 234 0.100" in text or "link_2.com_x mm 230 10.0 235 0.100" in text
     write_two_stage_report(path, study)
     assert "table-stage0" not in path.read_text("utf-8")

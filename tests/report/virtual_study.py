@@ -1,22 +1,33 @@
-"""A two-stage study simulated from the model itself, without the virtual cell: what the report tests render."""
+"""A two-stage run simulated from the model itself, without the virtual cell: what the report tests render."""
 
 from __future__ import annotations
 
 import time
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, verify
-from flexcal.data import MultisinePlan, PoseSet
+from flexcal.data import MultisinePlan, PoseSet, write_plan
 from flexcal.elasticity import StiffnessResult
+from flexcal.estimates_file import Block, write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
+from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.linearisation import linearise
 from flexcal.model.names import GEOMETRY, SPRINGS, spring_names
 from flexcal.model.transfer import transfer_matrix
-from flexcal.report import TX90L_PAPER, TwoStageStudy
+from flexcal.report.figures.arm_poses import arms_at
+from flexcal.report.fitted_response import fitted_responses
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
 from flexcal.units import DEGREE
+from flexcal.workflow.fitted_files import write_fitted
+from flexcal.workflow.point_files import write_arm, write_points
+from flexcal.workflow.results import write_results
+from flexcal.workflow.two_stage_results import two_stage_document, write_verification
+from flexcal.workflow.two_stage_run import TwoStageRun
 
 DEFAULT_POSES_DEG = (
     (0, -28.6, -94.3, 37.3, -98.1, 0),
@@ -135,7 +146,7 @@ def measured(model: RobotModel, q: np.ndarray, rng: np.random.Generator | None) 
     return pose_set(q, position if rng is None else position + exact.sigma * rng.normal(size=position.shape))
 
 
-def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
+def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
     """Everything a demo would have found, in a few seconds."""
     rng = np.random.default_rng(seed)
     truth = hidden_truth(nominal, rng)
@@ -166,7 +177,7 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
     noisy = measured(robot, q_verify, rng)
     took = time.perf_counter() - started
     floor = 2.0e-5 * rng.normal(size=exact.position.shape)
-    return TwoStageStudy(
+    return TwoStageRun(
         nominal=nominal,
         informed=nominal,
         plan=plan,
@@ -179,20 +190,33 @@ def simulate_study(nominal: RobotModel, seed: int = 1) -> TwoStageStudy:
         nominal_verification=verify(nominal, exact, elastic=False),
         elastic_verification=verify(calibrated.model, exact),
         rigid_verification=tuple(verify(fit.model, exact, elastic=False) for fit in rigid),
-        measured_poses=noisy,
         measured_verification=verify(calibrated.model, noisy),
         floor=ErrorStatistics.of(floor),
         truth=truth,
-        paper=TX90L_PAPER,
         seconds={
             "frequency": 61.2,
             "stage1": 4.1,
             "poses": 12.6,
             "stage2": took,
             "verification": 0.8,
-            "total": 79.0,
         },
-        results={"seed": seed},
         seed=seed,
         command=f"flexcal demo --seed {seed} --out demo",
     )
+
+
+def leave_run(folder: Path, run: TwoStageRun) -> None:
+    """The files of a demo's folder that its report is made of."""
+    fit = run.calibration
+    blocks: dict[Block, Estimate] = {"stiffness": run.stiffness.estimate, "calibration": fit.estimate}
+    for block, estimate in blocks.items():
+        origin = {"program": "flexcal 1", "input.of_both": 64 * "b", f"input.of_{block}": 64 * block[0]}
+        write_estimates(folder / "estimates.yaml", block, replace(estimate, provenance=origin))
+    write_plan(folder / "frequency_plan.yaml", run.plan)
+    write_fitted(folder, fitted_responses(run.stiffness, run.nominal))
+    write_verification(folder / "verification.csv", run)
+    errors = {NOMINAL: run.nominal_at_calibration.errors, CALIBRATED: fit.residuals}
+    write_points(folder, MeasuredPoints(fit.poses, errors, fit.ambiguous))
+    write_arm(folder, arms_at(fit.model, fit.poses, errors))
+    exported = write_urdf(fit.model, folder / "calibrated.urdf")
+    write_results(folder, two_stage_document(run, exported))

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,12 @@ class ErrorStatistics:
         return cls(
             len(distance), float(distance.mean()), float(np.quantile(distance, 0.9)), float(distance.max())
         )
+
+    @classmethod
+    def of_millimetres(cls, block: Mapping[str, Any]) -> ErrorStatistics:
+        """From a block of results.json, as `in_millimetres` makes it."""
+        values = (block[key] for key in ("mean_mm", "p90_mm", "max_mm"))
+        return cls(block["poses"], *(np.nan if v is None else v * MILLIMETRE for v in values))
 
     def in_millimetres(self) -> dict[str, float | int | None]:
         """The block of results.json: poses, mean_mm, p90_mm, max_mm; null without poses."""

@@ -17,7 +17,7 @@ from flexcal.errors import InputError
 class Report:
     """Write report.html of a folder that demo, an identify verb, calibrate or verify left with --out, from stored numbers.
 
-    It is the page that the verb wrote; only of demo, whose own page shows more of the fits, it is a shorter one.
+    It is the page that the verb wrote, byte for byte.
     """
 
     folder: Annotated[Positional[Path], arg(metavar="DIR", help="folder with results.json")]

@@ -10,12 +10,10 @@ from typing import Literal
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics
-from flexcal.estimates_file import Block
+from flexcal.estimates_file import BLOCKS, Block
 from flexcal.estimation import Estimate
 from flexcal.report.run_difference import MeanDifference, ParameterChanges, mean_difference, parameter_changes
 from flexcal.units import MILLIMETRE
-
-_BLOCKS: tuple[Block, ...] = ("dynamics", "stiffness", "calibration")
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,7 +66,7 @@ class Comparison:
         pair = self.first.estimates, self.second.estimates
         return {
             block: parameter_changes(pair[0][block], pair[1][block])
-            for block in _BLOCKS
+            for block in BLOCKS
             if all(block in estimates for estimates in pair)
         }
 

@@ -1,85 +1,103 @@
-"""Everything that a two-stage calibration found, bundled for its report."""
+"""A two-stage calibration, as the folder of `flexcal demo` has it."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.calibration import Calibration, ErrorStatistics, Verification
-from flexcal.data import MultisinePlan, PoseSet
-from flexcal.elasticity import StiffnessResult
+from flexcal.calibration import ErrorStatistics, Verification
+from flexcal.data import MultisinePlan
+from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
-from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
+from flexcal.report.fitted_response import FittedResponse
+from flexcal.report.measured_points import ArmPoses, MeasuredPoints
 from flexcal.report.publication import Publication
+from flexcal.report.sections.identifiability import Determined
 
 MAXWELL_MEAN = 1.5958
 """Mean distance over 1σ of a coordinate, for errors alike in three directions."""
 
 
-@dataclass(frozen=True, eq=False)
-class CadAlone:
-    """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
+@dataclass(frozen=True)
+class RigidFit:
+    """A fit without elasticity: to so many `poses`, of so many determined parameters, and its errors at the fresh poses."""
 
-    stiffness: StiffnessResult
-    calibration: Calibration
-    verification: Verification
+    poses: int
+    rank: int
+    errors: ErrorStatistics
 
 
 @dataclass(frozen=True, eq=False)
 class TwoStageStudy:
-    """One robot, both stages, and how they were checked.
+    """One simulated robot, both stages, and how they were checked.
 
-    `nominal` is the robot of the data sheet; `informed` what both stages start from, with the inertials `dynamics` that trajectories
-    identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds
-    fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
-    `verification_poses` are against the noise-free truth where `truth` is known, otherwise against the instrument;
-    `measured_verification` is against the instrument, on `measured_poses`. `floor` is the error that would remain with every parameter
-    known. `truth` maps parameter names to SI values.
-    `results` is the document of results.json, `seconds` durations by stage.
+    `results` is the document of results.json, `estimates` the blocks of estimates.yaml;
+    `plan` and `responses` are those of stage 1, `points` and `arms` the measured poses of stage 2. `fresh` are poses that no fit
+    saw, with the errors of the robot as delivered, of the fairest rigid fit and of the calibrated robot, against the noise-free truth.
     """
 
-    nominal: RobotModel
-    informed: RobotModel
+    results: Mapping[str, Any]
+    estimates: Mapping[Block, Estimate]
     plan: MultisinePlan
-    responses: tuple[FrequencyResponse, ...]
-    stiffness: StiffnessResult
-    calibration: Calibration
-    rigid: tuple[Calibration, ...]
-    nominal_at_calibration: Verification
-    verification_poses: PoseSet
-    nominal_verification: Verification
-    elastic_verification: Verification
-    rigid_verification: tuple[Verification, ...]
-    dynamics: Estimate | None = None
-    cad_alone: CadAlone | None = None
-    measured_poses: PoseSet | None = None
-    measured_verification: Verification | None = None
-    floor: ErrorStatistics | None = None
-    truth: Mapping[str, float] | None = None
+    responses: tuple[FittedResponse, ...]
+    points: MeasuredPoints
+    arms: ArmPoses
+    fresh: MeasuredPoints
     paper: Publication | None = None
-    seconds: Mapping[str, float] = field(default_factory=dict)
-    results: Mapping[str, Any] = field(default_factory=dict)
-    seed: int | None = None
-    command: str = ""
 
     @property
-    def reference(self) -> str:
-        """What verification errors are measured against, in words."""
-        return "the noise-free truth" if self.truth is not None else "the instrument"
+    def truth(self) -> Mapping[str, float]:
+        """The robot as it really is: SI values by parameter name."""
+        return self.results["truth"]
+
+    @property
+    def stiffness(self) -> Estimate:
+        """What stage 1 found."""
+        return self.estimates["stiffness"]
+
+    @property
+    def geometry(self) -> Estimate:
+        """What stage 2 found."""
+        return self.estimates["calibration"]
+
+    @property
+    def determined(self) -> Determined:
+        """What the points of stage 2 determine."""
+        return Determined.stored(self.results["identifiability"])
+
+    @property
+    def kept(self) -> tuple[str, ...]:
+        """Names of the geometric parameters that they determine."""
+        return tuple(self.results["identifiability"]["kept"])
+
+    @property
+    def verification(self) -> Verification:
+        """The calibrated robot at the fresh poses."""
+        fresh = self.fresh
+        if fresh.parameter_rms is None:
+            raise ValueError("fresh poses have the distances that the covariance predicts")
+        position = fresh.poses.position - fresh.calibrated
+        return Verification(position, fresh.calibrated, fresh.parameter_rms, fresh.ambiguous)
+
+    @cached_property
+    def rigid(self) -> tuple[RigidFit, ...]:
+        """Fits of the same robot without elasticity, the fairest one first."""
+        found = self.results["rigid_fits"]
+        return tuple(RigidFit(f["poses"], f["rank"], self.errors(f"rigid_{f['poses']}")) for f in found)
+
+    def errors(self, model: str) -> ErrorStatistics:
+        """At the fresh poses, of one of the models of results.json."""
+        return ErrorStatistics.of_millimetres(self.results["verification"][model])
 
     def springs(self, kind: Literal["stiffness", "damping"]) -> tuple[str, ...]:
         """Names of all stiffnesses or all dampings of drives and bearings."""
-        return tuple(name for name in self.stiffness.springs if name.endswith(f".{kind}"))
+        return tuple(name for name in self.stiffness.parameters.names if name.endswith(f".{kind}"))
 
     @property
-    def unpredicted_noise(self) -> np.ndarray | None:
-        """1σ (N, 3) m of what verification errors hold beyond the parameters': the instrument's noise, or against the truth the floor."""
-        if self.truth is None:
-            return self.verification_poses.sigma
-        if self.floor is None:
-            return None
-        return np.full(self.verification_poses.position.shape, self.floor.mean / MAXWELL_MEAN)
+    def unpredicted_noise(self) -> np.ndarray:
+        """1σ (N, 3) m of what errors at the fresh poses hold beyond the parameters': the floor."""
+        return np.full(self.fresh.poses.position.shape, self.errors("floor").mean / MAXWELL_MEAN)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flexcal.calibration import Drift
 from flexcal.report.checks import (
     check_claimed_uncertainty,
     check_drift,
@@ -16,17 +15,20 @@ from flexcal.report.checks import (
     check_truth,
 )
 from flexcal.report.first_screen import rung, three_facts
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID
 from flexcal.report.notation import millimetres, ratio
 from flexcal.report.page import Check, Page, Rung, Status, Verdict, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.comparison import comparison_section
 from flexcal.report.sections.geometry import geometry_section
 from flexcal.report.sections.parameters import coverage
-from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.provenance import common_origin, provenance_section
+from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.stage_zero import stage_zero_section
 from flexcal.report.sections.stiffness import stiffness_section
 from flexcal.report.sections.verification import verification_section
 from flexcal.report.study import TwoStageStudy
+from flexcal.units import MILLIMETRE
 
 TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Calibrated, and the numbers can be trusted"),
@@ -44,32 +46,30 @@ def write_two_stage_report(path: str | Path, study: TwoStageStudy) -> None:
 
 def two_stage_page(study: TwoStageStudy) -> Page:
     """The page before it becomes HTML."""
-    before = stage_zero_section(study)
-    kind = "simulated robot, its truth known" if study.truth is not None else "measured robot"
+    before, results, points = stage_zero_section(study), study.results, study.points
     return Page(
-        title=f"{study.nominal.name}: calibration report",
-        subtitle=f"Two-stage calibration with elastic drives and bearings · {kind}"
-        + (f" · seed {study.seed}" if study.seed is not None else ""),
+        title=f"{results['robot']}: calibration report",
+        subtitle="Two-stage calibration with elastic drives and bearings · simulated robot, its truth known · seed "
+        f"{results['seed']}",
         verdict=two_stage_verdict(study),
         sections=(
             *([before] if before is not None else []),
             stiffness_section(study),
             geometry_section(study),
+            residuals_section(results["joints"], points.poses, points.calibrated, study.geometry.outliers),
             verification_section(study),
             comparison_section(study),
             provenance_section(
-                study.command, study.seed, study.seconds, study.calibration.estimate.provenance
+                results["command"], results["seed"], results["seconds"], common_origin(study.estimates)
             ),
         ),
-        document=study.results,
+        document=results,
     )
 
 
 def two_stage_verdict(study: TwoStageStudy) -> Verdict:
     """How accurate it was, how accurate it is, and whether that can be trusted."""
-    before, rigid, after = (
-        v.all for v in (study.nominal_verification, study.rigid_verification[0], study.elastic_verification)
-    )
+    before, rigid, after = (study.fresh.statistics(model) for model in (NOMINAL, RIGID, CALIBRATED))
     checks = two_stage_checks(study)
     status = worst(checks)
     answer, headline = TRUST[status]
@@ -84,53 +84,45 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
         sentence,
         three_facts(before, after, checks, answer, "poses"),
         _rungs(study),
-        f"Error of the tool on {after.poses} poses that were not used for the fit, against {study.reference}",
+        f"Error of the tool on {after.poses} poses that were not used for the fit, against the noise-free truth",
         checks,
     )
 
 
 def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict."""
-    fit, found = study.calibration, study.stiffness.estimate
-    geometry = fit.identifiability
+    found, geometry, determined, fresh = study.stiffness, study.geometry, study.determined, study.verification
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
-    drift = Drift.of(fit)
+    drift = study.results["calibration_fit"]["drift"]
     checks = [
-        check_fresh_poses(fit.errors, study.elastic_verification.all),
-        check_claimed_uncertainty(study.elastic_verification, study.unpredicted_noise),
-        check_residual(
-            "Does noise explain what the geometric fit leaves?",
-            fit.estimate,
-            sigma_given=fit.poses.sigma_given,
-        ),
+        check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all),
+        check_claimed_uncertainty(fresh, study.unpredicted_noise),
+        check_residual("Does noise explain what the geometric fit leaves?", geometry),
         check_residual("Does noise explain what the elastic fit leaves?", found),
-        check_drift(drift.distance, certain=drift.certain),
+        check_drift(drift["distance_mm"] * MILLIMETRE, certain=drift["certain"]),
         check_springs(found, stiffness, damping),
-        check_rank(len(geometry.names), geometry.rank, geometry.gap),
-        check_flanks(study.elastic_verification),
+        check_rank(determined.parameters, determined.rank, determined.gap),
+        check_flanks(fresh),
     ]
-    if study.truth is not None:
-        pairs = (
-            coverage(found, stiffness + damping, study.truth),
-            coverage(fit.estimate, fit.identifiability.kept_names, study.truth),
-        )
-        covered, total = (sum(pair[k] for pair in pairs) for k in (0, 1))
-        if total:
-            checks.append(check_truth(covered, total))
+    pairs = (
+        coverage(found, stiffness + damping, study.truth),
+        coverage(geometry, study.kept, study.truth),
+    )
+    covered, total = (sum(pair[k] for pair in pairs) for k in (0, 1))
+    if total:
+        checks.append(check_truth(covered, total))
     return tuple(checks)
 
 
 def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
     paper = study.paper
-    rungs = [rung("as delivered", study.nominal_verification.all, "nominal")]
-    for fit, verification in zip(study.rigid, study.rigid_verification, strict=True):
-        rungs.append(rung(f"rigid, {len(fit.poses)} poses", verification.all, "rigid"))
+    rungs = [rung("as delivered", study.fresh.statistics(NOMINAL), "nominal")]
+    rungs += [rung(f"rigid, {fit.poses} poses", fit.errors, "rigid") for fit in study.rigid]
     if paper is not None and paper.rigid is not None:
         rungs.append(rung("paper: rigid, hardware", paper.rigid, "published"))
-    words = f"elastic, {len(study.calibration.poses)} poses"
-    rungs.append(rung(words, study.elastic_verification.all, "elastic"))
+    words = f"elastic, {len(study.points.poses)} poses"
+    rungs.append(rung(words, study.fresh.statistics(CALIBRATED), "elastic"))
     if paper is not None and paper.elastic is not None:
         rungs.append(rung("paper: elastic, hardware", paper.elastic, "published"))
-    if study.floor is not None:
-        rungs.append(rung("floor: all known", study.floor, "floor"))
+    rungs.append(rung("floor: all known", study.errors("floor"), "floor"))
     return tuple(rungs)

@@ -35,7 +35,12 @@ from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_o
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.report_folder import report_folder
-from flexcal.workflow.results import identifiability_block, quantities, write_results
+from flexcal.workflow.results import (
+    identifiability_block,
+    identifiability_spectrum,
+    quantities,
+    write_results,
+)
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 AUTO = "auto"
@@ -71,16 +76,11 @@ class RobotCalibration:
         """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
         selected, table = self.selected, self.selection.table if self.selection else ()
         found, drift = selected.identifiability, Drift.of(selected)
-        spectrum = {
-            "kept": list(found.kept_names),
-            "singular_values": found.singular_values,
-            "diagonal": found.diagonal,
-        }
         return {
             "robot": selected.model.name,
             "joints": {joint.name: joint.kind for joint in selected.model.joints},
             "identifiability": identifiability_block(self.rigid.identifiability)
-            | {"selected": identifiability_block(found) | spectrum},
+            | {"selected": identifiability_block(found) | identifiability_spectrum(found)},
             "terms": list(selected.terms),
             "term_selection": [
                 {"terms": list(terms), "order_mm": order / MILLIMETRE, "workspace_mm": workspace / MILLIMETRE}

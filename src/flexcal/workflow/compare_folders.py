@@ -6,14 +6,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from flexcal.calibration import ErrorStatistics
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.estimates_file import read_estimates
 from flexcal.report.measured_points import NOMINAL
 from flexcal.report.runs import Comparison, Run
+from flexcal.report.sections.provenance import common_origin
 from flexcal.report.two_runs import write_comparison
-from flexcal.units import MILLIMETRE
 from flexcal.workflow.point_files import read_points
 from flexcal.workflow.report_folder import OF_CALIBRATION, OF_VERIFICATION, lacking
 from flexcal.workflow.results import RESULTS, read_results
@@ -74,7 +73,7 @@ def _left(folder: Path, name: str) -> Run:
     if OF_VERIFICATION in results or OF_CALIBRATION in results:
         points = read_points(folder, sigma=DEFAULT_SIGMA)
         verified = OF_VERIFICATION in results
-        found = results["provenance"] if verified else _provenance(estimates)
+        found = results["provenance"] if verified else common_origin(estimates)
         return Run(
             name=name,
             kind="verification" if verified else "calibration",
@@ -89,35 +88,22 @@ def _left(folder: Path, name: str) -> Run:
             origin=origin | found,
         )
     if "plan" in results and (folder / VERIFICATION).is_file():
-        found = _provenance(estimates)
+        found = common_origin(estimates)
         fresh = read_verification(folder / VERIFICATION)
-        before = results["verification"]["nominal"]
-        sizes = [before[key] * MILLIMETRE for key in ("mean_mm", "p90_mm", "max_mm")]
-        statistics = ErrorStatistics(before["poses"], *sizes)
         return Run(
             name=name,
             kind="demo",
             robot=results["robot"],
-            q=fresh.q,
-            points=fresh.truth,
-            errors=fresh.errors["elastic"],
+            q=fresh.poses.q,
+            points=fresh.poses.position,
+            errors=fresh.calibrated,
             fresh=True,
-            before=statistics,
+            before=fresh.statistics(NOMINAL),
             estimates=estimates,
             data=_data(found),
             origin=origin | found,
         )
     raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
-
-
-def _provenance(estimates: Mapping[Any, Any]) -> dict[str, str]:
-    """What all blocks say of their origin; of the same key in several blocks, each under the block's name."""
-    found: dict[str, str] = {}
-    for block, estimate in estimates.items():
-        for key, value in estimate.provenance.items():
-            shown = key if found.get(key, value) == value else f"{key} ({block})"
-            found[shown] = value
-    return found
 
 
 def _data(origin: Mapping[str, str]) -> dict[str, str]:

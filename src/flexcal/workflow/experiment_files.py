@@ -14,7 +14,8 @@ from flexcal.model import RobotModel
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.yaml_writer import to_plain
 
-_PLANS = (PLAN, "frequency_plan.yaml")
+FREQUENCY_PLAN = "frequency_plan.yaml"
+_PLANS = (PLAN, FREQUENCY_PLAN)
 """The frequency plan in a folder of responses: as 'identify response' leaves it, and as the demo does."""
 
 

@@ -46,8 +46,10 @@ _GEOMETRIC = (*GEOMETRY, "backlash")
 
 @dataclass(frozen=True, eq=False)
 class RobotStiffness:
-    """The result of stage 1, whether it knew the reference motion, the file that its estimate was written to, and the command line."""
+    """The result of stage 1 of the robot of that name, whether it knew the reference motion, the file that its estimate was written to, and
+    the command line."""
 
+    robot: str
     result: StiffnessResult
     reference_known: bool
     estimate: Estimate
@@ -68,6 +70,7 @@ class RobotStiffness:
                 "dropped": dropped_parameters(estimate.dropped),
             },
             "parameters": quantities(estimate),
+            "robot": self.robot,
             "estimates": self.estimates,
             "command": self.command,
         }
@@ -130,11 +133,14 @@ def identify_robot_stiffness(
     )
     estimate = replace(result.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
-    found = RobotStiffness(result, plan is not None, estimate, target, command)
+    found = RobotStiffness(bare.name, result, plan is not None, estimate, target, command)
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
+        from flexcal.report.fitted_response import fitted_responses
+        from flexcal.workflow.fitted_files import write_fitted
         from flexcal.workflow.report_folder import report_folder
 
+        write_fitted(out, fitted_responses(result, model))
         write_results(out, found.document())
         report_folder(out)
     return found

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
+from flexcal.data import MultisinePlan, read_plan_of
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
@@ -13,21 +13,25 @@ from flexcal.report.calibration import CalibrationStudy, write_calibration_repor
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.report.gains import write_gains_report
 from flexcal.report.inertials import InertialsStudy, write_inertials_report
-from flexcal.report.stored import StoredStudy, write_stored_report
+from flexcal.report.publication import TX90L_PAPER
+from flexcal.report.stiffness import StiffnessStudy, write_stiffness_report
+from flexcal.report.study import TwoStageStudy
+from flexcal.report.two_stage import write_two_stage_report
 from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.experiment_files import read_responses
-from flexcal.workflow.point_files import POINTS, read_arm, read_points
+from flexcal.workflow.experiment_files import FREQUENCY_PLAN
+from flexcal.workflow.fitted_files import read_fitted
+from flexcal.workflow.point_files import read_arm, read_points
 from flexcal.workflow.prediction_files import read_predictions
 from flexcal.workflow.results import RESULTS, read_results
 from flexcal.workflow.stored_block import ESTIMATES
 from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
 
 REPORT = "report.html"
-_REPORTED = ("calibration", "verification", "stage1")
-_DYNAMICS, _INERTIALS, _GAINS = "base_parameters", "trajectories", "declared_gains"
-OF_CALIBRATION, OF_VERIFICATION = "term_selection", "rms_mm"
-"""What results.json of `identify dynamics`, `inertials` and `gains`, of `calibrate` and of `verify` holds, and no other."""
+_DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"
+OF_CALIBRATION, OF_VERIFICATION, OF_DEMO = "term_selection", "rms_mm", "calibration_fit"
+"""What results.json of `identify dynamics`, `inertials`, `gains` and `stiffness`, of `calibrate`, of `verify` and of `demo` holds, and no
+other; the demo has a `stage1` too."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -40,10 +44,6 @@ def report_folder(folder: Path) -> Path:
             f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify left with --out."
         )
     results, path = read_results(folder), folder / REPORT
-    if not any(key in results for key in (*_REPORTED, _DYNAMICS, _INERTIALS, _GAINS)):
-        raise InputError(
-            f"{folder / RESULTS} holds no calibration, verification, stiffness or dynamics; give the folder of one of these."
-        )
     try:
         if _INERTIALS in results:
             write_inertials_report(path, InertialsStudy(results, _block(folder, "dynamics")))
@@ -57,8 +57,15 @@ def report_folder(folder: Path) -> Path:
             write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
         elif OF_CALIBRATION in results:
             write_calibration_report(path, calibration_study(folder))
+        elif OF_DEMO in results:
+            write_two_stage_report(path, two_stage_study(folder))
+        elif _STIFFNESS in results:
+            stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted(folder))
+            write_stiffness_report(path, stiffness)
         else:
-            write_stored_report(path, _stored_study(folder, results))
+            raise InputError(
+                f"{folder / RESULTS} holds no calibration, verification, stiffness or dynamics; give the folder of one of these."
+            )
     except KeyError as problem:
         raise lacking(folder, problem) from problem
     return path
@@ -78,23 +85,24 @@ def calibration_study(folder: Path) -> CalibrationStudy:
     return CalibrationStudy(results, _block(folder, "calibration"), points, read_arm(folder))
 
 
+def two_stage_study(folder: Path) -> TwoStageStudy:
+    """What `demo` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    results = read_results(folder)
+    return TwoStageStudy(
+        results=results,
+        estimates=read_estimates(folder / ESTIMATES),
+        plan=read_plan_of(folder / FREQUENCY_PLAN, MultisinePlan),
+        responses=read_fitted(folder),
+        points=read_points(folder, sigma=DEFAULT_SIGMA),
+        arms=read_arm(folder),
+        fresh=read_verification(folder / VERIFICATION),
+        paper=TX90L_PAPER if results["robot"] == "tx90l" else None,
+    )
+
+
 def _block(folder: Path, block: Block) -> Estimate:
     path = folder / ESTIMATES
     estimates = read_estimates(path)
     if block not in estimates:
         raise InputError(f"{path} holds no {block}; run the verb that leaves it again.")
     return estimates[block]
-
-
-def _stored_study(folder: Path, results: dict[str, Any]) -> StoredStudy:
-    path = folder / ESTIMATES
-    measured, fresh = (folder / POINTS).is_file(), folder / VERIFICATION
-    return StoredStudy(
-        name=folder.resolve().name,
-        results=results,
-        estimates=read_estimates(path) if path.is_file() else {},
-        responses=read_responses(sorted(folder.glob("response_pose_*.npz")))[1],
-        errors=read_verification(fresh).errors if fresh.is_file() else {},
-        points=read_points(folder, sigma=DEFAULT_SIGMA) if measured else None,
-        arms=read_arm(folder) if measured else None,
-    )

@@ -72,6 +72,15 @@ def identifiability_block(found: Identifiability) -> dict[str, Any]:
     }
 
 
+def identifiability_spectrum(found: Identifiability) -> dict[str, Any]:
+    """The parameters that are kept, and singular values and the diagonal of R, relative to the largest: what a figure of the rank shows."""
+    return {
+        "kept": list(found.kept_names),
+        "singular_values": found.singular_values,
+        "diagonal": found.diagonal,
+    }
+
+
 def _plain(value: Any) -> Any:
     if isinstance(value, Mapping):
         return {str(key): _plain(item) for key, item in value.items()}

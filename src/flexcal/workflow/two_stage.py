@@ -22,30 +22,32 @@ from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.figures.arm_poses import arms_at
+from flexcal.report.fitted_response import fitted_responses
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
-from flexcal.report.publication import TX90L_PAPER
-from flexcal.report.study import CadAlone, TwoStageStudy
-from flexcal.report.two_stage import write_two_stage_report
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
+from flexcal.workflow.fitted_files import write_fitted
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.point_files import write_arm, write_points
+from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
 from flexcal.workflow.two_stage_results import VERIFICATION, two_stage_document, write_verification
+from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
 from flexcal.yaml_reader import read_yaml
 
 CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)
 VERIFICATION_POSES = 150
 
-STAGES = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "cad_alone", "report")
+TIMED = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "cad_alone")
+STAGES = (*TIMED, "report")
 
 
 @dataclass
 class Stopwatch:
-    """Wall-clock seconds of every stage."""
+    """Wall-clock seconds of every stage but the report, which has them in it."""
 
-    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(STAGES, 0.0))
+    seconds: dict[str, float] = field(default_factory=lambda: dict.fromkeys(TIMED, 0.0))
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -66,7 +68,7 @@ def run_two_stage(
     report: bool = True,
     command: str = "",
     progress: Progress = silent,
-) -> TwoStageStudy:
+) -> TwoStageRun:
     """Run the two-stage calibration on the virtual cell and leave every intermediate file, results.json and report.html in `out`.
 
     `robot` is a robot.yaml with cell.yaml and frequency_poses.csv beside it. The hidden truth is drawn from `seed`, or taken from the file
@@ -157,7 +159,7 @@ def run_two_stage(
         exact = replace(seen, position=cell.noise_free(anywhere))
         floor = exact.position - predict(nominal.with_values(known), exact).position
         registered = register(nominal, measured, predict(nominal, measured, elastic=False).position)
-        study = TwoStageStudy(
+        run = TwoStageRun(
             nominal=nominal,
             informed=believed,
             dynamics=dynamics,
@@ -171,11 +173,9 @@ def run_two_stage(
             nominal_verification=verify(registered, exact, elastic=False),
             elastic_verification=verify(calibration.model, exact),
             rigid_verification=tuple(verify(c.model, exact, elastic=False) for c in rigid),
-            measured_poses=seen,
             measured_verification=verify(calibration.model, seen),
             floor=ErrorStatistics.of(floor),
             truth=known,
-            paper=TX90L_PAPER if nominal.name == "tx90l" else None,
             seconds=watch.seconds,
             seed=seed,
             command=command,
@@ -185,21 +185,20 @@ def run_two_stage(
         with watch.stage("cad_alone"):
             springs = stage_one(nominal, "cad_alone")
             fitted = calibrate(nominal.with_estimate(springs.estimate), measured)
-            study = replace(study, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact)))
+            run = replace(run, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact)))
             progress("cad_alone", 1.0)
-    study = replace(study, results=two_stage_document(study, exported))
-    with watch.stage("report"):
-        progress("report", 0.0)
-        write_verification(out / VERIFICATION, study)
-        errors = {NOMINAL: study.nominal_at_calibration.errors, CALIBRATED: calibration.residuals}
-        write_points(out, MeasuredPoints(measured, errors, calibration.ambiguous))
-        write_arm(out, arms_at(calibration.model, measured, errors))
-        if report:
-            write_two_stage_report(out / "report.html", study)
-        progress("report", 1.0)
-    study = replace(study, results=two_stage_document(study, exported))
-    write_results(out, study.results)
-    return study
+    run = replace(run, results=two_stage_document(run, exported))
+    progress("report", 0.0)
+    write_fitted(out, fitted_responses(stiffness, nominal))
+    write_verification(out / VERIFICATION, run)
+    errors = {NOMINAL: run.nominal_at_calibration.errors, CALIBRATED: calibration.residuals}
+    write_points(out, MeasuredPoints(measured, errors, calibration.ambiguous))
+    write_arm(out, arms_at(calibration.model, measured, errors))
+    write_results(out, run.results)
+    if report:
+        report_folder(out)
+    progress("report", 1.0)
+    return run
 
 
 def measure_responses(

@@ -2,52 +2,57 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import polars as pl
 
-from flexcal.atomic import write_text
-from flexcal.calibration import ErrorStatistics
+from flexcal.atomic import atomic_path
+from flexcal.calibration import Drift, Verification
+from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.export import Exported
 from flexcal.model.names import SPRINGS
-from flexcal.report.study import CadAlone, TwoStageStudy
-from flexcal.workflow.results import identifiability_block, quantities
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, MeasuredPoints
+from flexcal.units import MILLIMETRE
+from flexcal.workflow.results import identifiability_block, identifiability_spectrum, quantities
+from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
 
 VERIFICATION = "verification.csv"
 
 
-def two_stage_document(study: TwoStageStudy, exported: Exported) -> dict[str, Any]:
+def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
     """The content of results.json."""
-    truth = study.truth or {}
-    estimate = study.stiffness.estimate
-    stage_one = {kind: _springs(study, estimate, kind) for kind in ("stiffness", "damping")}
-    measured = study.measured_verification
-    rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(study.rigid, study.rigid_verification, strict=True)}
+    estimate, found, drift = (
+        run.stiffness.estimate,
+        run.calibration.identifiability,
+        Drift.of(run.calibration),
+    )
+    stage_one = {kind: _springs(run, estimate, kind) for kind in ("stiffness", "damping")}
+    rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(run.rigid, run.rigid_verification, strict=True)}
     return {
-        "dynamics": None if study.dynamics is None else {"parameters": quantities(study.dynamics, truth)},
-        "cad_alone": None if study.cad_alone is None else _cad_alone(study, study.cad_alone),
+        "dynamics": None if run.dynamics is None else {"parameters": quantities(run.dynamics, run.truth)},
+        "cad_alone": None if run.cad_alone is None else _cad_alone(run, run.cad_alone),
         "stage1": stage_one
         | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
-        "identifiability": identifiability_block(study.calibration.identifiability),
-        "calibration": study.calibration.errors.in_millimetres(),
+        "identifiability": identifiability_block(found) | identifiability_spectrum(found),
+        "calibration": run.calibration.errors.in_millimetres(),
         "calibration_fit": {
-            "reduced_chi2": study.calibration.estimate.reduced_chi2,
-            "nominal": study.nominal_at_calibration.all.in_millimetres(),
-            "rigid": study.rigid[0].errors.in_millimetres(),
-            "wrong_flanks": wrong_flanks(study),
+            "reduced_chi2": run.calibration.estimate.reduced_chi2,
+            "nominal": run.nominal_at_calibration.all.in_millimetres(),
+            "rigid": run.rigid[0].errors.in_millimetres(),
+            "wrong_flanks": wrong_flanks(run),
+            "drift": {"distance_mm": drift.distance / MILLIMETRE, "certain": drift.certain},
         },
+        "rigid_fits": [{"poses": len(c.poses), "rank": c.identifiability.rank} for c in run.rigid],
         "verification": {
-            "nominal": study.nominal_verification.all.in_millimetres(),
-            "elastic": study.elastic_verification.all.in_millimetres(),
-            "elastic_unambiguous": study.elastic_verification.unambiguous.in_millimetres(),
-            "rigid": study.rigid_verification[0].all.in_millimetres(),
-            "measured": (measured.all if measured else ErrorStatistics.of(np.zeros((0, 3)))).in_millimetres(),
-            "floor": study.floor.in_millimetres() if study.floor else None,
+            "nominal": run.nominal_verification.all.in_millimetres(),
+            **_verified(run.elastic_verification),
+            "rigid": run.rigid_verification[0].all.in_millimetres(),
+            "measured": run.measured_verification.all.in_millimetres(),
+            "floor": run.floor.in_millimetres(),
         }
         | {name: v.all.in_millimetres() for name, v in rigid.items()},
         "export": {
@@ -55,86 +60,100 @@ def two_stage_document(study: TwoStageStudy, exported: Exported) -> dict[str, An
             "lost": list(exported.lost),
         }
         | (exported.loss.error.in_millimetres() if exported.loss.error else {}),
-        "seconds": dict(study.seconds) | {"total": sum(study.seconds.values())},
-        "seed": study.seed,
-        "robot": study.nominal.name,
-        "joints": {joint.name: joint.kind for joint in study.nominal.joints},
-        "plan": study.plan.name,
-        "command": study.command,
+        "seconds": dict(run.seconds) | {"total": sum(run.seconds.values())},
+        "seed": run.seed,
+        "truth": dict(run.truth),
+        "robot": run.nominal.name,
+        "joints": {joint.name: joint.kind for joint in run.nominal.joints},
+        "plan": run.plan.name,
+        "command": run.command,
     }
 
 
-def _cad_alone(study: TwoStageStudy, cad: CadAlone) -> dict[str, Any]:
+def _cad_alone(run: TwoStageRun, cad: CadAlone) -> dict[str, Any]:
     """The numbers of both stages without stage 0, under the names of the run's own."""
     kinds = ("stiffness", "damping")
     return {
-        "stage1": {kind: _springs(study, cad.stiffness.estimate, kind) for kind in kinds},
+        "stage1": {kind: _springs(run, cad.stiffness.estimate, kind) for kind in kinds},
         "calibration": cad.calibration.errors.in_millimetres(),
-        "verification": {
-            "elastic": cad.verification.all.in_millimetres(),
-            "elastic_unambiguous": cad.verification.unambiguous.in_millimetres(),
-        },
+        "verification": _verified(cad.verification),
     }
 
 
-def _springs(study: TwoStageStudy, estimate: Estimate, kind: str) -> dict[str, Any]:
+def _verified(verification: Verification) -> dict[str, Any]:
+    """Errors of an elastic calibration, and the root mean square that the covariance of its parameters expects."""
+    return {
+        "elastic": verification.all.in_millimetres(),
+        "elastic_unambiguous": verification.unambiguous.in_millimetres(),
+        "expected_rms_mm": float(np.sqrt(np.mean(verification.parameter_rms**2))) / MILLIMETRE,
+    }
+
+
+def _springs(run: TwoStageRun, estimate: Estimate, kind: str) -> dict[str, Any]:
     """Every stiffness or damping as a quantity, by joint and spring."""
-    truth = study.truth or {}
     return {
         joint.name: {
             SPRINGS[c]: estimate.quantity(
-                f"{joint.name}.{SPRINGS[c]}.{kind}", truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
+                f"{joint.name}.{SPRINGS[c]}.{kind}", run.truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
             )
             for c in joint.components
         }
-        for joint in study.nominal.elastic
+        for joint in run.nominal.elastic
     }
 
 
-def wrong_flanks(study: TwoStageStudy) -> int:
+def wrong_flanks(run: TwoStageRun) -> int:
     """Calibration poses at which the flank assumed for a backlash is not the true one."""
     from flexcal.model import static_equilibrium
 
-    if study.truth is None:
-        return 0
-    poses = study.calibration.poses
-    true = static_equilibrium(study.nominal.with_values(study.truth), poses.q, poses.payload).flank
-    return int((true != study.calibration.flank).any(axis=1).sum())
+    poses = run.calibration.poses
+    true = static_equilibrium(run.nominal.with_values(run.truth), poses.q, poses.payload).flank
+    return int((true != run.calibration.flank).any(axis=1).sum())
 
 
-@dataclass(frozen=True, eq=False)
-class StoredVerification:
-    """Joint positions `q` (N, n), true points `truth` (N, 3) m, and the `errors` (N, 3) m of the elastic and the rigid model."""
-
-    q: np.ndarray
-    truth: np.ndarray
-    errors: dict[str, np.ndarray]
+_COLUMNS = {NOMINAL: "nominal", CALIBRATED: "elastic", RIGID: "rigid"}
+"""Models of verification.csv, and what their columns are called there."""
 
 
-def read_verification(path: Path) -> StoredVerification:
+def write_verification(path: Path, run: TwoStageRun) -> None:
+    """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), where every model has the point, the distance
+    that the covariance of the elastic model's parameters predicts, and whether the flanks are certain."""
+    poses, elastic = run.verification_poses, run.elastic_verification
+    models = {NOMINAL: run.nominal_verification, CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
+    columns: dict[str, np.ndarray] = {"pose": poses.pose}
+    columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
+    columns |= {axis: poses.position[:, k] for k, axis in enumerate("xyz")}
+    for model, verification in models.items():
+        columns |= {f"{_COLUMNS[model]}_{axis}": verification.position[:, k] for k, axis in enumerate("xyz")}
+    columns |= {"parameter_rms": elastic.parameter_rms, "unambiguous": ~elastic.ambiguous}
+    with atomic_path(path) as temporary:
+        pl.DataFrame(columns).write_csv(temporary)
+
+
+def read_verification(path: Path) -> MeasuredPoints:
     """What `write_verification` left; raises `InputError` where it cannot be read."""
     try:
         table = pl.read_csv(path)
-        q = table.select([name for name in table.columns if name[0] == "q"]).to_numpy()
-        truth = table.select("x", "y", "z").to_numpy()
-        errors = {
-            kind: truth - table.select(f"{kind}_x", f"{kind}_y", f"{kind}_z").to_numpy()
-            for kind in ("elastic", "rigid")
-        }
-        return StoredVerification(q, truth, errors)
-    except (pl.exceptions.PolarsError, TypeError) as problem:
+
+        def vectors(prefix: str) -> np.ndarray:
+            return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()
+
+        truth, size = vectors(""), len(table)
+        poses = PoseSet(
+            q=table.select([name for name in table.columns if name[0] == "q"]).cast(pl.Float64).to_numpy(),
+            position=truth,
+            sigma=np.zeros((size, 3)),
+            torque=None,
+            payload=None,
+            target=np.full(size, ""),
+            station=np.full(size, ""),
+            temperature=None,
+            pose=table["pose"].to_numpy(),
+        )
+        errors = {model: truth - vectors(f"{name}_") for model, name in _COLUMNS.items()}
+        certain = table["unambiguous"].cast(pl.Boolean).to_numpy()
+        return MeasuredPoints(poses, errors, ~certain, table["parameter_rms"].cast(pl.Float64).to_numpy())
+    except (pl.exceptions.PolarsError, TypeError, OSError) as problem:
         raise InputError(
             f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
         ) from problem
-
-
-def write_verification(path: Path, study: TwoStageStudy) -> None:
-    """Write verification.csv: pose, q1…, x, y, z (noise-free truth), elastic_x…, rigid_x…, unambiguous; m and rad."""
-    poses, elastic, rigid = study.verification_poses, study.elastic_verification, study.rigid_verification[0]
-    header = ["pose", *(f"q{i}" for i in range(1, poses.q.shape[1] + 1)), "x", "y", "z"]
-    header += [f"{kind}_{axis}" for kind in ("elastic", "rigid") for axis in "xyz"] + ["unambiguous"]
-    numbers = np.hstack([poses.q, poses.position, elastic.position, rigid.position])
-    lines = [",".join(header)]
-    for pose, row, ambiguous in zip(poses.pose, numbers, elastic.ambiguous, strict=True):
-        lines.append(",".join([str(pose), *(f"{v:.9f}" for v in row), "false" if ambiguous else "true"]))
-    write_text(path, "\n".join(lines) + "\n")

@@ -7,15 +7,13 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.frequency import FrequencyResponse
 from flexcal.report.figures.canvas import panels, positive, single
 from flexcal.report.figures.response_levels import FREQUENCY_TICKS, frequency_axes
+from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.palette import ELASTIC, INK
 
 
-def response_fit(
-    responses: Sequence[FrequencyResponse], fitted: Sequence[np.ndarray], labels: Sequence[str]
-) -> go.Figure:
+def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go.Figure:
     """Magnitude of every element and phase of the diagonal ones: dots measured, lines the model, one pose shown at a time.
 
     Traces carry `meta = {"pose": label}`, by which the page chooses.
@@ -24,8 +22,8 @@ def response_fit(
     titles = [f"|G<sub>{i + 1}{j + 1}</sub>|" for i in range(n) for j in range(n)]
     titles += [f"phase of G<sub>{i + 1}{i + 1}</sub>" for i in range(n)]
     figure = panels(n + 1, n, 175 * (n + 1) + 80, titles)
-    for number, (response, model, label) in enumerate(zip(responses, fitted, labels, strict=True)):
-        pairs = ((response.response, "measured"), (model, "model"))
+    for number, (response, label) in enumerate(zip(responses, labels, strict=True)):
+        pairs = ((response.response, "measured"), (response.predicted, "model"))
         for i in range(n):
             for j in range(n):
                 for values, kind in pairs:

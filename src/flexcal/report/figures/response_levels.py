@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import plotly.graph_objects as go
 
-from flexcal.frequency import FrequencyResponse
 from flexcal.report.figures.canvas import decades, panels, positive, single
+from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.palette import ELASTIC, NOMINAL, RIGID
 
 FREQUENCY_TICKS = (1, 3, 10, 30, 100, 300)
 
 
-def response_levels(response: FrequencyResponse) -> go.Figure:
+def response_levels(response: FittedResponse) -> go.Figure:
     """Magnitude of every element against frequency, and 1σ of its mean from noise and from nonlinear distortion (eq. 19)."""
     n = len(response.joints)
     titles = [f"G<sub>{i + 1}{j + 1}</sub>" for i in range(n) for j in range(n)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexcal.calibration import ErrorStatistics
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID
 from flexcal.report.notation import NOTHING, statistics_cells
 from flexcal.report.page import Block, Section, Table, Text
 from flexcal.report.publication import Publication
@@ -12,13 +12,16 @@ from flexcal.report.study import TwoStageStudy
 def comparison_section(study: TwoStageStudy) -> Section:
     """The numbers of the run beside the paper's."""
     paper = study.paper
-    fresh = study.elastic_verification
-    found = study.calibration.identifiability
+    fresh, found = study.verification, study.determined
     errors = [
-        ("calibration poses, as delivered", ErrorStatistics.of(study.nominal_at_calibration.errors), None),
-        ("calibration poses, calibrated", study.calibration.errors, paper.calibration if paper else None),
-        ("fresh poses, as delivered", study.nominal_verification.all, None),
-        ("fresh poses, rigid calibration", study.rigid_verification[0].all, paper.rigid if paper else None),
+        ("calibration poses, as delivered", study.points.statistics(NOMINAL), None),
+        (
+            "calibration poses, calibrated",
+            study.points.statistics(CALIBRATED),
+            paper.calibration if paper else None,
+        ),
+        ("fresh poses, as delivered", study.fresh.statistics(NOMINAL), None),
+        ("fresh poses, rigid calibration", study.fresh.statistics(RIGID), paper.rigid if paper else None),
         ("fresh poses, elastic calibration", fresh.all, paper.elastic if paper else None),
         ("… flank certain", fresh.unambiguous, None),
     ]
@@ -29,7 +32,7 @@ def comparison_section(study: TwoStageStudy) -> Section:
         published = statistics_cells(theirs)[1:] if paper else ()
         rows.append((label, str(ours.poses), *statistics_cells(ours), *published))
     counts = [
-        ("geometric parameters modelled", str(len(found.names)), _number(paper, "parameters")),
+        ("geometric parameters modelled", str(found.parameters), _number(paper, "parameters")),
         ("geometric parameters determined", str(found.rank), _number(paper, "rank")),
         ("smallest singular value, relative", f"{found.singular_values[found.rank - 1]:.2g}", NOTHING),
     ]

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration import Calibration
 from flexcal.data import PoseSet
-from flexcal.report.figures.arm_poses import arm_poses, arms_at
+from flexcal.report.figures.arm_poses import arm_poses
 from flexcal.report.figures.calibration_errors import calibration_errors
 from flexcal.report.figures.error_components import error_components
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, ArmPoses
 from flexcal.report.notation import millimetres
 from flexcal.report.page import FigureBlock, Section, Selector, Slider
-from flexcal.report.sections.identifiability import Determined, identifiability_blocks
+from flexcal.report.sections.identifiability import identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.study import TwoStageStudy
 
@@ -28,21 +27,20 @@ _ARROWS = {CALIBRATED: "after calibration", NOMINAL: "as delivered"}
 
 def geometry_section(study: TwoStageStudy) -> Section:
     """Figs. 10-12, identifiability and the parameters."""
-    fit = study.calibration
-    before = study.nominal_at_calibration.errors
-    arms = arms_at(fit.model, fit.poses, {CALIBRATED: fit.residuals, NOMINAL: before})
+    points = study.points
+    poses, before, after = points.poses, points.errors[NOMINAL], points.calibrated
     return Section(
         "stage2",
         "Stage 2: geometry",
-        f"A laser tracker measured the tool in {len(fit.poses)} poses. With the springs known, the arm's sag is computed for each pose and "
+        f"A laser tracker measured the tool in {len(poses)} poses. With the springs known, the arm's sag is computed for each pose and "
         "what remains is geometry: axes that are not quite parallel, links that are not quite as long as drawn, zero positions of the "
         "encoders, and play in the gears.",
         (
-            arm_figure(arms, len(fit.poses), "Figure 10"),
-            error_figure(fit.poses, before, fit.residuals, "Figure 11"),
-            component_figure(fit),
-            *identifiability_blocks(Determined.of(fit.identifiability), study.paper),
-            parameter_table(fit.estimate, fit.identifiability.kept_names, study.truth),
+            arm_figure(study.arms, len(poses), "Figure 10"),
+            error_figure(poses, before, after, "Figure 11"),
+            component_figure(poses, after),
+            *identifiability_blocks(study.determined, study.paper),
+            parameter_table(study.geometry, study.kept, study.truth),
         ),
     )
 
@@ -83,13 +81,13 @@ def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray, number: 
     )
 
 
-def component_figure(fit: Calibration) -> FigureBlock:
+def component_figure(poses: PoseSet, residuals: np.ndarray) -> FigureBlock:
     """Fig. 12."""
-    largest = np.abs(fit.residuals).max(axis=0)
+    largest = np.abs(residuals).max(axis=0)
     return FigureBlock(
         "figure-12",
         "Figure 12: what is left at the calibration poses, by coordinate",
-        error_components(fit.poses, fit.residuals),
+        error_components(poses, residuals),
         "Measured minus predicted position in the instrument's frame. Bars that stay within the dotted lines and change sign at random are "
         "measurement noise; a pattern would be something that the model misses.",
         "Residuals by pose; the largest are "

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.estimation import Dropped, Identifiability
+from flexcal.estimation import Dropped
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.page import Block, FigureBlock, Table, Text
 from flexcal.report.publication import Publication
@@ -34,19 +34,6 @@ class Determined:
     diagonal: np.ndarray
     dropped: tuple[Dropped, ...]
     weak: tuple[tuple[str, float], ...]
-
-    @classmethod
-    def of(cls, found: Identifiability) -> Determined:
-        """From an analysis."""
-        return cls(
-            len(found.names),
-            found.rank,
-            found.gap,
-            found.singular_values,
-            found.diagonal,
-            found.dropped,
-            found.weak_seen_directions(),
-        )
 
     @classmethod
     def stored(cls, block: Mapping[str, Any]) -> Determined:

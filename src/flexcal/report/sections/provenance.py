@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 
-from flexcal.report.page import Block, Section, Table, Text
+from flexcal.estimates_file import Block
+from flexcal.estimation import Estimate
+from flexcal.report.page import Block as PageBlock
+from flexcal.report.page import Section, Table, Text
 
 
 def provenance_section(
@@ -16,7 +19,7 @@ def provenance_section(
     rows += [("command", command)] if command else []
     rows += [("seed of all random numbers", str(seed))] if seed is not None else []
     rows += [(name, value) for name, value in origin.items()]
-    blocks: list[Block] = [
+    blocks: list[PageBlock] = [
         Table("table-provenance", "What made this report", ("what", "value"), tuple(rows), text_columns=(1,))
     ]
     if seconds:
@@ -37,3 +40,13 @@ def provenance_section(
             )
         )
     return Section("provenance", "Provenance", "", tuple(blocks))
+
+
+def common_origin(estimates: Mapping[Block, Estimate]) -> dict[str, str]:
+    """What all blocks say of their origin; of the same key in several blocks with different values, each under the block's name."""
+    found: dict[str, str] = {}
+    for block, estimate in estimates.items():
+        for key, value in estimate.provenance.items():
+            shown = key if found.get(key, value) == value else f"{key} ({block})"
+            found[shown] = value
+    return found

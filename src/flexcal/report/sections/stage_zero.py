@@ -2,26 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
-from flexcal.calibration import Verification
-from flexcal.elasticity import StiffnessResult
+from flexcal.calibration import ErrorStatistics
 from flexcal.estimation import Estimate
-from flexcal.report.notation import NOTHING, millimetres, significant, spring_label
+from flexcal.report.notation import NOTHING, document_millimetres, millimetres, significant, spring_label
 from flexcal.report.page import Block, Section, Table, Text
-from flexcal.report.study import CadAlone, TwoStageStudy
+from flexcal.report.study import TwoStageStudy
 
 _UNITS = {"kg": (1.0, "kg"), "m": (1e3, "mm"), "kg m²": (1.0, "kg m²")}
 
 
 def stage_zero_section(study: TwoStageStudy) -> Section | None:
     """Gains over CAD and the inertials themselves; None where stage 0 was left out."""
-    if study.dynamics is None:
+    if study.results["dynamics"] is None:
         return None
     blocks: list[Block] = []
-    if study.cad_alone is not None:
-        blocks.append(_gain_table(study, study.cad_alone))
-    blocks.append(_inertial_table(study, study.dynamics))
+    if study.results["cad_alone"] is not None:
+        blocks.append(_gain_table(study))
+    blocks.append(_inertial_table(study, study.estimates["dynamics"]))
     blocks.append(
         Text(
             (
@@ -36,26 +38,30 @@ def stage_zero_section(study: TwoStageStudy) -> Section | None:
     )
 
 
-def _gain_table(study: TwoStageStudy, cad: CadAlone) -> Table:
+def _gain_table(study: TwoStageStudy) -> Table:
     """Both stages from the same data, with the inertials of CAD and with those of stage 0."""
-    rows: list[tuple[str, ...]] = []
-    names = study.springs("stiffness")
-    if study.truth is not None:
-        errors = [_errors(study, result) for result in (cad.stiffness, study.stiffness)]
-        rows += [
-            ("stage 1: largest of all stiffness errors", *(_percent(float(e.max())) for e in errors)),
-            ("stage 1: median of all stiffness errors", *(_percent(float(np.median(e))) for e in errors)),
-        ]
-    for name in names:
-        stds = (_relative_std(result.estimate, name) for result in (cad.stiffness, study.stiffness))
+    both = (study.results["cad_alone"], study.results)
+    springs = [_stiffnesses(results) for results in both]
+    errors = [np.array([abs(q["estimate"] / q["truth"] - 1) for q in found.values()]) for found in springs]
+    rows: list[tuple[str, ...]] = [
+        ("stage 1: largest of all stiffness errors", *(_percent(float(e.max())) for e in errors)),
+        ("stage 1: median of all stiffness errors", *(_percent(float(np.median(e))) for e in errors)),
+    ]
+    for name in study.springs("stiffness"):
+        stds = (_relative_std(found[name]) for found in springs)
         rows.append((f"stage 1: std of {spring_label(name)}", *(_percent(std) for std in stds)))
-    both = (cad.verification, study.elastic_verification)
+    fresh = [results["verification"] for results in both]
+    every = [ErrorStatistics.of_millimetres(found["elastic"]) for found in fresh]
+    certain = [ErrorStatistics.of_millimetres(found["elastic_unambiguous"]) for found in fresh]
     rows += [
-        ("stage 2: mean of the fresh poses / mm", *(millimetres(v.all.mean) for v in both)),
-        ("stage 2: 90 % of them within / mm", *(millimetres(v.all.p90) for v in both)),
-        ("stage 2: worst / mm", *(millimetres(v.all.max) for v in both)),
-        ("stage 2: worst, flank certain / mm", *(millimetres(v.unambiguous.max) for v in both)),
-        ("stage 2: what the intervals expect, rms / mm", *(millimetres(_expected(v)) for v in both)),
+        ("stage 2: mean of the fresh poses / mm", *(millimetres(v.mean) for v in every)),
+        ("stage 2: 90 % of them within / mm", *(millimetres(v.p90) for v in every)),
+        ("stage 2: worst / mm", *(millimetres(v.max) for v in every)),
+        ("stage 2: worst, flank certain / mm", *(millimetres(v.max) for v in certain)),
+        (
+            "stage 2: what the intervals expect, rms / mm",
+            *(document_millimetres(found["expected_rms_mm"]) for found in fresh),
+        ),
     ]
     return Table(
         "table-stage0-gain",
@@ -65,22 +71,18 @@ def _gain_table(study: TwoStageStudy, cad: CadAlone) -> Table:
     )
 
 
+def _stiffnesses(results: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The quantities of stage 1 by parameter name."""
+    found = results["stage1"]["stiffness"].items()
+    return {f"{joint}.{spring}.stiffness": q for joint, springs in found for spring, q in springs.items()}
+
+
 def _percent(share: float | None) -> str:
     return NOTHING if share is None else f"{100 * share:.2f} %"
 
 
-def _errors(study: TwoStageStudy, result: StiffnessResult) -> np.ndarray:
-    truth = study.truth or {}
-    return np.array([abs(result.estimate.values[n] / truth[n] - 1) for n in study.springs("stiffness")])
-
-
-def _relative_std(estimate: Estimate, name: str) -> float | None:
-    std = estimate.std(name)
-    return None if std is None else std / estimate.values[name]
-
-
-def _expected(verification: Verification) -> float:
-    return float(np.sqrt(np.mean(verification.parameter_rms**2)))
+def _relative_std(quantity: Mapping[str, Any]) -> float | None:
+    return None if quantity["std"] is None else quantity["std"] / quantity["estimate"]
 
 
 def _inertial_table(study: TwoStageStudy, found: Estimate) -> Table:
@@ -93,15 +95,13 @@ def _inertial_table(study: TwoStageStudy, found: Estimate) -> Table:
         prior = item.prior_std * (before if item.scale == "log" else 1.0)
         std = found.std(item.name) or np.nan
         cells = [significant(factor * v, 3) for v in (before, prior, item.value, std)]
-        if study.truth is not None:
-            true = study.truth.get(item.name)
-            cells.append(NOTHING if true is None else significant(factor * true, 3))
+        true = study.truth.get(item.name)
+        cells.append(NOTHING if true is None else significant(factor * true, 3))
         rows.append((item.name, unit, *cells))
-    columns = ("parameter", "unit", "CAD", "1σ of CAD", "identified", "1σ")
     return Table(
         "table-stage0",
         f"All {len(rows)} inertial parameters",
-        columns if study.truth is None else (*columns, "truth"),
+        ("parameter", "unit", "CAD", "1σ of CAD", "identified", "1σ", "truth"),
         tuple(rows),
         text_columns=(1,),
         folded=True,

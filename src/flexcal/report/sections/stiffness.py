@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
-from flexcal.frequency import FrequencyResponse
+from flexcal.estimation import Estimate
 from flexcal.report.figures.response_fit import response_fit
 from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.spring_intervals import spring_intervals
+from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.notation import percent, significant
 from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text
 from flexcal.report.sections.springs import spring_table, unseen_springs
@@ -17,15 +20,11 @@ from flexcal.units import DEGREE
 
 def stiffness_section(study: TwoStageStudy) -> Section:
     """Fig. 5, Table 1 and Figs. 7-9."""
-    estimate, paper = study.stiffness.estimate, study.paper
+    estimate, paper = study.stiffness, study.paper
     published = paper.springs if paper else {}
     source = paper.short if paper else ""
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
-    reference = study.truth if study.truth is not None else study.nominal.values
-    word = "the truth" if study.truth is not None else "robot.yaml"
-    unseen = unseen_springs(estimate, study.stiffness.springs)
-    first = study.responses[0]
-    labels = tuple(_label(study, k) for k in range(len(study.responses)))
+    unseen = unseen_springs(estimate, (*stiffness, *damping))
     blocks: list[Block] = [
         spring_table(estimate, stiffness, "stiffness", study.truth, published, source),
         spring_table(estimate, damping, "damping", study.truth, published, source),
@@ -36,23 +35,13 @@ def stiffness_section(study: TwoStageStudy) -> Section:
         FigureBlock(
             "figure-springs",
             "Estimates and their 95 % intervals",
-            spring_intervals(estimate, stiffness, damping, reference, word),
-            f"Each dot is an estimate relative to {word}, each bar its 95 % interval: about 19 of 20 bars should reach zero where zero "
-            "is the truth. Bars that leave the picture are cut.",
-            f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to {word}, with 95 % intervals. "
+            spring_intervals(estimate, stiffness, damping, study.truth, "the truth"),
+            "Each dot is an estimate relative to the truth, each bar its 95 % interval: about 19 of 20 bars should reach zero. Bars "
+            "that leave the picture are cut.",
+            f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to the truth, with 95 % intervals. "
             "The numbers are in Table 1.",
         ),
-        response_block(first, labels[0]),
-        FigureBlock(
-            "figure-7",
-            "Figures 7 to 9: measured responses against the fitted model",
-            response_fit(study.responses, study.stiffness.predicted, labels),
-            "Dots are measured, lines are the model with the one set of springs and dampers that fits all poses at once. Where an element "
-            "nearly vanishes, because the pose hardly couples the two axes, dots scatter and carry little weight.",
-            f"Magnitudes of all elements and phases of the diagonal ones in {len(labels)} poses; the table below says how well they fit.",
-            (Selector("Pose", "pose", labels),),
-        ),
-        _fit_table(study, labels),
+        *response_blocks(study.responses, estimate),
     ]
     return Section(
         "stage1",
@@ -64,7 +53,25 @@ def stiffness_section(study: TwoStageStudy) -> Section:
     )
 
 
-def response_block(response: FrequencyResponse, label: str) -> FigureBlock:
+def response_blocks(responses: Sequence[FittedResponse], estimate: Estimate) -> tuple[Block, ...]:
+    """Figs. 5 and 7-9, and how well the model fits in every pose."""
+    labels = tuple(f"Pose {response.pose + 1}" for response in responses)
+    return (
+        _measured_figure(responses[0], labels[0]),
+        FigureBlock(
+            "figure-7",
+            "Figures 7 to 9: measured responses against the fitted model",
+            response_fit(responses, labels),
+            "Dots are measured, lines are the model with the one set of springs and dampers that fits all poses at once. Where an element "
+            "nearly vanishes, because the pose hardly couples the two axes, dots scatter and carry little weight.",
+            f"Magnitudes of all elements and phases of the diagonal ones in {len(labels)} poses; the table below says how well they fit.",
+            (Selector("Pose", "pose", labels),),
+        ),
+        _fit_table(responses, estimate, labels),
+    )
+
+
+def _measured_figure(response: FittedResponse, label: str) -> FigureBlock:
     """Fig. 5: one measured frequency response."""
     return FigureBlock(
         "figure-5",
@@ -87,12 +94,7 @@ def _experiment(study: TwoStageStudy) -> str:
     )
 
 
-def _label(study: TwoStageStudy, k: int) -> str:
-    response = study.responses[k]
-    return f"Pose {response.pose + 1}"
-
-
-def _levels_in_words(response: FrequencyResponse) -> str:
+def _levels_in_words(response: FittedResponse) -> str:
     size = np.abs(np.diagonal(response.response, axis1=1, axis2=2))
     share = np.median(np.diagonal(response.std, axis1=1, axis2=2) / size)
     noise = np.median(np.diagonal(response.noise_std, axis1=1, axis2=2) / size)
@@ -102,27 +104,21 @@ def _levels_in_words(response: FrequencyResponse) -> str:
     )
 
 
-def _fit_table(study: TwoStageStudy, labels: tuple[str, ...]) -> Table:
+def _fit_table(responses: Sequence[FittedResponse], estimate: Estimate, labels: tuple[str, ...]) -> Table:
     rows = []
-    result = study.stiffness
-    for label, response, model, misfit in zip(
-        labels, study.responses, result.predicted, result.misfit, strict=True
-    ):
-        off = np.abs(np.diagonal(response.response / model - 1, axis1=1, axis2=2))
+    for label, response in zip(labels, responses, strict=True):
+        off = np.abs(np.diagonal(response.response / response.predicted - 1, axis1=1, axis2=2))
         angles = ", ".join(f"{round(q / DEGREE, 1) + 0.0:.1f}" for q in response.q_mean).replace("-", "−")
-        payload = study.nominal.payload
-        mass = response.payload if response.payload is not None else (payload.mass if payload else 0.0)
         rows.append(
             (
                 label,
                 f"{angles}°",
-                f"{mass:g} kg",
+                f"{response.payload:g} kg",
                 percent(float(np.median(off))),
-                significant(float(np.sqrt(np.diagonal(misfit).mean())), 3),
+                significant(float(np.sqrt(np.diagonal(response.misfit).mean())), 3),
                 f"{response.degrees_of_freedom:.0f}",
             )
         )
-    estimate = study.stiffness.estimate
     return Table(
         "table-fit",
         "How well the model fits, pose by pose",

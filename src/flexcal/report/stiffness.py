@@ -1,0 +1,81 @@
+"""The report of springs and dampers from frequency responses (`flexcal identify stiffness`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.estimation import Estimate
+from flexcal.report.checks import check_residual, check_springs
+from flexcal.report.fitted_response import FittedResponse
+from flexcal.report.page import Block, Check, Fact, Page, Section, Text, Verdict, tally, worst
+from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.springs import spring_table, unseen_springs
+from flexcal.report.sections.stiffness import response_blocks
+from flexcal.report.two_stage import TRUST
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessStudy:
+    """What `identify stiffness` left: the document of results.json, the block of estimates.yaml, and the responses by pose."""
+
+    results: Mapping[str, Any]
+    estimate: Estimate
+    responses: tuple[FittedResponse, ...]
+
+    def springs(self, kind: str) -> tuple[str, ...]:
+        """Names of all stiffnesses or dampings."""
+        return tuple(name for name in self.estimate.parameters.names if name.endswith(f".{kind}"))
+
+
+def write_stiffness_report(path: str | Path, study: StiffnessStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, stiffness_page(study))
+
+
+def stiffness_page(study: StiffnessStudy) -> Page:
+    """The page before it becomes HTML."""
+    results, estimate = study.results, study.estimate
+    return Page(
+        title=f"{results['robot']}: stiffness report",
+        subtitle="Stiffness and damping of drives and bearings, from frequency responses in "
+        f"{len(study.responses)} {'pose' if len(study.responses) == 1 else 'poses'}",
+        verdict=_verdict(study),
+        sections=(
+            Section("stage1", "Springs and dampers", "", _blocks(study)),
+            provenance_section(results["command"], None, {}, estimate.provenance),
+        ),
+        document=results,
+    )
+
+
+def stiffness_checks(study: StiffnessStudy) -> tuple[Check, ...]:
+    """The checks behind the verdict."""
+    return (
+        check_residual("Does noise explain what the fit leaves?", study.estimate),
+        check_springs(study.estimate, study.springs("stiffness"), study.springs("damping")),
+    )
+
+
+def _verdict(study: StiffnessStudy) -> Verdict:
+    checks = stiffness_checks(study)
+    status = worst(checks)
+    answer, headline = TRUST[status]
+    facts = (Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),)
+    sentence = "Stiffness and damping were identified; how accurate the tool is, positions have to tell."
+    return Verdict(status, headline, sentence, facts, (), "", checks)
+
+
+def _blocks(study: StiffnessStudy) -> tuple[Block, ...]:
+    estimate = study.estimate
+    stiffness, damping = study.springs("stiffness"), study.springs("damping")
+    unseen = unseen_springs(estimate, (*stiffness, *damping))
+    return (
+        spring_table(estimate, stiffness, "stiffness", None, {}, ""),
+        spring_table(estimate, damping, "damping", None, {}, ""),
+        *((Text((), "Not determined by these data", unseen),) if unseen else ()),
+        *response_blocks(study.responses, estimate),
+    )

@@ -1,0 +1,58 @@
+"""Everything that a two-stage calibration of the virtual robot found."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from flexcal.calibration import Calibration, ErrorStatistics, Verification
+from flexcal.data import MultisinePlan, PoseSet
+from flexcal.elasticity import StiffnessResult
+from flexcal.estimation import Estimate
+from flexcal.frequency import FrequencyResponse
+from flexcal.model import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class CadAlone:
+    """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
+
+    stiffness: StiffnessResult
+    calibration: Calibration
+    verification: Verification
+
+
+@dataclass(frozen=True, eq=False)
+class TwoStageRun:
+    """One robot, both stages, and how they were checked.
+
+    `nominal` is the robot of the data sheet; `informed` what both stages start from, with the inertials `dynamics` that trajectories
+    identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds
+    fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
+    `verification_poses` are against the noise-free truth; `measured_verification`, at the same poses, is against the instrument. `floor` is
+    the error that would remain with every parameter known. `truth` maps parameter names to SI values.
+    `results` is the document of results.json, `seconds` durations by stage.
+    """
+
+    nominal: RobotModel
+    informed: RobotModel
+    plan: MultisinePlan
+    responses: tuple[FrequencyResponse, ...]
+    stiffness: StiffnessResult
+    calibration: Calibration
+    rigid: tuple[Calibration, ...]
+    nominal_at_calibration: Verification
+    verification_poses: PoseSet
+    nominal_verification: Verification
+    elastic_verification: Verification
+    rigid_verification: tuple[Verification, ...]
+    measured_verification: Verification
+    floor: ErrorStatistics
+    truth: Mapping[str, float]
+    dynamics: Estimate | None = None
+    cad_alone: CadAlone | None = None
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    results: Mapping[str, Any] = field(default_factory=dict)
+    seed: int = 0
+    command: str = ""
