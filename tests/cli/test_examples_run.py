@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import shlex
 import shutil
 from dataclasses import replace
@@ -19,15 +20,29 @@ from flexcal.cli.main import main
 from flexcal.cli.verbs import VERBS
 from flexcal.data import read_poses, write_poses
 from flexcal.dynamics import CLASSIC, Observation
+from flexcal.estimates_file import sha256_of
 from flexcal.model import RobotModel
 
 ran: list[str] = []
 
 
 def run(line: str) -> None:
-    """A command line of the help, in the current folder."""
-    assert main(shlex.split(line)[1:]) == 0, line
+    """A command line of the help, in the current folder; the pages that it leaves say how to make them again, and of what."""
+    words = shlex.split(line)
+    given = {sha256_of(Path(word)) for word in words if Path(word).is_file()}
+    before = pages()
+    assert main(words[1:]) == 0, line
     ran.append(line)
+    for page in (
+        () if words[1] == "report" else (page for page, time in pages().items() if time != before.get(page))
+    ):
+        text = html.unescape(page.read_text(encoding="utf-8"))
+        assert line in text and not [digest for digest in given if digest not in text], (line, page)
+
+
+def pages() -> dict[Path, int]:
+    """Pages below the current folder, and when they were written."""
+    return {page: page.stat().st_mtime_ns for page in Path().rglob("*.html")}
 
 
 def example(name: str) -> str:
@@ -67,6 +82,8 @@ def calibrated_arm(folder: Path, examples: Path) -> list[str]:
         seen = predict(model, visits).position + 2e-5 * rng.standard_normal((3 * len(q), 3))
         write_poses(folder / f"{name}.csv", replace(visits, position=seen))
     shutil.copy("compensated.csv", "visits.csv")
+    run("flexcal verify robot.yaml others.csv --out checked")
+    run("flexcal repeatability robot.yaml visits.csv --out repeated")
     return ["verify", "repeatability", "map", "predict", "certificate", "report", *EXPORTS]
 
 
@@ -83,6 +100,7 @@ def recordings_of_two_payloads(folder: Path, examples: Path) -> list[str]:
         for i, gain in enumerate((50, 20)):
             columns |= {f"q{i + 1}": motion.q[:, i], f"i{i + 1}": motion.torque[:, i] / gain}
         pl.DataFrame(columns).write_csv(folder / "logs" / f"{name}.csv")
+    run("flexcal identify gains robot.yaml logs/free.csv logs/loaded.csv --out gains")
     return ["identify gains"]
 
 
@@ -90,6 +108,7 @@ def exciting_motion(folder: Path, examples: Path) -> list[str]:
     shutil.copytree(
         examples / "tx40", folder, dirs_exist_ok=True, ignore=shutil.ignore_patterns("estimates.*")
     )
+    run("flexcal identify dynamics robot.yaml exciting.parquet --hold-out last:0.3 --out dynamics")
     return ["identify dynamics"]
 
 
@@ -100,12 +119,15 @@ def virtual_robot(folder: Path, examples: Path) -> list[str]:
     )
     run(example("design trajectory"))
     run("flexcal measure trajectory.yaml --cell virtual --out exciting")
+    run("flexcal identify inertials robot.yaml exciting --out inertials")
     run(example("identify inertials"))
     run("flexcal design trajectory robot.yaml --loaded --out holding.yaml")
     run("flexcal measure holding.yaml --cell virtual --out loaded")
+    run("flexcal identify payload robot.yaml loaded --out payload")
     run(example("identify payload"))
     for name in ("design frequency", "measure", "identify response", "identify stiffness", "design poses"):
         run(example(name))
+    run("flexcal identify stiffness robot.yaml responses --out stiffness")
     run("flexcal measure poses.yaml --cell virtual --out measured")
     shutil.copy("measured/poses.csv", "poses.csv")
     run("flexcal design poses robot.yaml --random --count 30 --out others.yaml")

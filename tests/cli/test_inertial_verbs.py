@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
@@ -187,10 +188,10 @@ def test_folders_of_other_plans(run, recorded: Path, tmp_path: Path) -> None:
     (folder / LOG).unlink()
     assert LOG.removesuffix(".parquet") in refused(run, tmp_path, *inertials)
     for verb, following in (("poses", "calibrate"), ("frequency", "identify response")):
-        plan = folder / "plan.yaml"
-        plan.unlink()
+        plan = tmp_path / f"{verb}.yaml"
         options = ("--random", "--count", 3) if verb == "poses" else ()
         assert run("design", verb, robot, *options, "--out", plan).status == 0
+        shutil.copy(plan, folder / "plan.yaml")
         assert f"'flexcal {following}'" in refused(run, tmp_path, *inertials)
 
 

@@ -12,6 +12,8 @@ from flexcal.report.figures.plan_space import plan_space
 from flexcal.report.figures.pose_numbers import pose_numbers
 from flexcal.report.pose_design import PoseStudy, pose_checks, pose_page
 
+ORIGIN = {"provenance": {"input.robot.yaml": "0123"}, "command": "flexcal design poses robot.yaml"}
+
 
 def _results(positive: int, blocked: list[list[int]], reached: float) -> dict:
     return {
@@ -25,6 +27,7 @@ def _results(positive: int, blocked: list[list[int]], reached: float) -> dict:
         "moves_s": 12.3,
         "blocked_moves": blocked,
         "curve": [{"poses": n, "tool_error_mm": 0.1 / n, "random_mm": 0.2 / n} for n in (10, 20, 40)],
+        **ORIGIN,
     }
 
 
@@ -47,7 +50,7 @@ def test_first_screen_and_figures(tx90l: RobotModel, rng: np.random.Generator) -
     page = pose_page(PoseStudy(tx90l, q, _results(9, [], 1.0)))
     assert [fact.value for fact in page.verdict.facts] == ["0.0300", "20", "12"]
     assert [figure.id for figure in page.figures] == ["figure-numbers", "figure-space", "figure-joints"]
-    drawn = pose_page(PoseStudy(tx90l, q, {"plan": "r.yaml", "seed": 1, "poses": 20}))
+    drawn = pose_page(PoseStudy(tx90l, q, {"plan": "r.yaml", "seed": 1, "poses": 20, **ORIGIN}))
     assert drawn.verdict.facts == () and len(drawn.figures) == 2
 
 

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Estimates, Json, Robot, require_robot
 
@@ -40,7 +41,13 @@ class Certificate:
         require_robot(self.robot, self.targets, self.before, self.after)
         console = Console(self.json)
         document = certify_robot(
-            self.robot, self.targets, self.before, self.after, self.out, estimates=self.estimates
+            self.robot,
+            self.targets,
+            self.before,
+            self.after,
+            self.out,
+            estimates=self.estimates,
+            command=command_line(),
         ).document()
         labels = {
             "before": "before, targets laid as well as they go",

@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
@@ -86,6 +87,7 @@ class DesignFrequency:
                 detection_lines=self.detection_lines,
                 place_payload=self.place_payload,
                 seed=self.seed,
+                command=command_line(),
                 progress=progress,
             ).document()
         console.show(predicted_table(document["predicted_std"]))

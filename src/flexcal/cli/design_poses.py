@@ -10,6 +10,7 @@ from typing import Annotated, Any, Literal, TypeVar
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring, on_the_robot
 from flexcal.cli.options import (
@@ -98,7 +99,12 @@ class DesignPoses:
         from flexcal.workflow.design_poses import plan_verification_poses
 
         drawn = plan_verification_poses(
-            self.robot, self.out, self.count, payload=self.payload, seed=self.seed
+            self.robot,
+            self.out,
+            self.count,
+            payload=self.payload,
+            seed=self.seed,
+            command=command_line(),
         )
         console.say(f"wrote {self.out}: {self.count} random poses")
         console.finish(
@@ -118,6 +124,7 @@ class DesignPoses:
                 wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
                 payload=self.payload,
                 seed=self.seed,
+                command=command_line(),
                 progress=progress,
             )
 

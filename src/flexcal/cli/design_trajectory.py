@@ -8,6 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
@@ -90,7 +91,9 @@ class DesignTrajectory:
             seed=self.seed,
         )
         with console.progress() as progress:
-            document = plan_trajectories(self.robot, self.out, request, progress=progress).document()
+            document = plan_trajectories(
+                self.robot, self.out, request, command=command_line(), progress=progress
+            ).document()
         without = "" if document["payload"] is None else ", without the payload"
         console.say(
             f"wrote {self.out}: {document['trajectories']} trajectories of {document['periods']} periods of "

@@ -8,6 +8,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import (
@@ -72,6 +73,7 @@ class Map:
                 payload=self.payload,
                 estimates=self.estimates,
                 seed=self.seed,
+                command=command_line(),
                 progress=progress,
             )
         document = found.document()

@@ -7,6 +7,7 @@ from typing import Annotated
 
 from tyro.conf import arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, require_files, require_robot
 
@@ -34,7 +35,9 @@ class Repeatability:
         require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
         console = Console(self.json)
-        document = repeat_robot(self.robot, self.poses, estimates=self.estimates, out=self.out).document()
+        document = repeat_robot(
+            self.robot, self.poses, estimates=self.estimates, out=self.out, command=command_line()
+        ).document()
         console.show(repeatability_table(document))
         noise = document["instrument_rp_mm"]
         if noise is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -45,7 +45,6 @@ class MapStudy:
     results: Mapping[str, Any]
     scale: ErrorScale | None = None
     verification: tuple[Verification, np.ndarray | None] | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)
 
 
 def write_map_page(path: Path, study: MapStudy) -> None:
@@ -77,7 +76,7 @@ def map_page(study: MapStudy) -> Page:
     sections = [_numbers(study), _space(study), _sources(study)]
     if study.verification is not None:
         sections.append(_observed(study))
-    sections.append(provenance_section("", None, {}, study.provenance))
+    sections.append(provenance_section(results["command"], None, {}, results["provenance"]))
     return Page(
         title=f"{study.model.name}: accuracy map",
         subtitle=f"Predicted error of the tool with {significant(results['payload_kg'], 3)} kg of payload",

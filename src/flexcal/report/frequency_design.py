@@ -19,6 +19,7 @@ from flexcal.report.figures.predicted_springs import predicted_springs
 from flexcal.report.notation import significant, spring_label
 from flexcal.report.page import Block, Check, Fact, FigureBlock, Page, Section, Table, Verdict, tally, worst
 from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
 
 LARGE = 0.05
 """Relative standard deviation from which a stiffness is known badly; from `LOG_STD_LIMIT` on it is not known at all."""
@@ -41,15 +42,20 @@ class FrequencyDesignStudy:
 
 def write_frequency_page(path: str | Path, study: FrequencyDesignStudy) -> None:
     """Write the page of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    plan = study.planned.plan
-    minutes = study.results["seconds_on_the_robot"] / 60
+    plan, results = study.planned.plan, study.results
+    minutes = results["seconds_on_the_robot"] / 60
     page = Page(
         title=f"{study.model.name}: plan of the frequency experiments",
         subtitle=f"{len(plan.poses)} poses · {len(plan.lines)} lines from {plan.frequencies_hz[0]:g} to {plan.frequencies_hz[-1]:g} Hz · "
         f"{plan.realisations} realisations · {minutes:.0f} minutes on the robot",
         verdict=_verdict(study),
-        sections=[_springs(study), _poses(study), _amplitudes(study)],
-        document=study.results,
+        sections=[
+            _springs(study),
+            _poses(study),
+            _amplitudes(study),
+            provenance_section(results["command"], results["seed"], {}, results["provenance"]),
+        ],
+        document=results,
     )
     write_page(path, page)
 

@@ -17,6 +17,7 @@ from flexcal.report.figures.pose_numbers import pose_numbers
 from flexcal.report.notation import significant
 from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Verdict, worst
 from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
 
 _FEW = 0.2
 """Share of the poses on the rarer flank of a backlash below which the page warns."""
@@ -55,7 +56,11 @@ def pose_page(study: PoseStudy) -> Page:
         "",
         checks,
     )
-    sections = [_space(study), _joints(study)]
+    sections = [
+        _space(study),
+        _joints(study),
+        provenance_section(results["command"], results["seed"], {}, results["provenance"]),
+    ]
     return Page(
         title=f"{study.model.name}: poses to measure",
         subtitle=f"Plan {Path(results['plan']).name}, "

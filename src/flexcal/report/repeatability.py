@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,6 @@ class RepeatabilityStudy:
     poses: PoseSet
     visited: Sequence[PoseRepeatability]
     results: Mapping[str, Any]
-    provenance: Mapping[str, str] = field(default_factory=dict)
 
 
 def write_repeatability_report(path: str | Path, study: RepeatabilityStudy) -> None:
@@ -80,7 +79,7 @@ def repeatability_page(study: RepeatabilityStudy) -> Page:
             _poses_section(study),
             *([] if results["drift"] is None else [_drift_section(results["drift"])]),
             _order_section(study),
-            provenance_section("", None, {}, study.provenance),
+            provenance_section(results["command"], None, {}, results["provenance"]),
         ],
         document=results,
     )

@@ -27,6 +27,7 @@ from flexcal.report.page import (
     worst,
 )
 from flexcal.report.render import write_page
+from flexcal.report.sections.provenance import provenance_section
 
 _INSTANTS = 400
 
@@ -44,7 +45,11 @@ def trajectory_page(design: TrajectoryDesign, document: Mapping[str, Any]) -> Pa
         subtitle=f"{len(plan)} trajectories of {plan.periods} periods of {1 / plan.base_frequency_hz:g} s, criterion "
         f"{design.goal.criterion.name}",
         verdict=_verdict(design, document),
-        sections=[_motions(design), _knowledge(design, document)],
+        sections=[
+            _motions(design),
+            _knowledge(design, document),
+            provenance_section(document["command"], document["seed"], {}, document["provenance"]),
+        ],
         document=document,
     )
 

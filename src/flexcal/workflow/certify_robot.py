@@ -71,7 +71,7 @@ class Visited:
 class RobotCertificate:
     """Before and after at the same targets; `refitted`: after, with the targets laid as well as they go, as before is.
 
-    `verification` and `scale`: the measurements after against what the calibration predicts.
+    `verification` and `scale`: the measurements after against what the calibration predicts. `command`: the command line.
     """
 
     robot: CalibratedRobot
@@ -83,6 +83,7 @@ class RobotCertificate:
     scale: ErrorScale
     files: Mapping[str, str]
     fitted: tuple[str, ...]
+    command: str = ""
 
     @property
     def rms(self) -> dict[str, float]:
@@ -140,11 +141,19 @@ class RobotCertificate:
             "rms_mm": {name: value / MILLIMETRE for name, value in self.rms.items()},
             "files": self.files,
             "remarks": list(self.remarks),
+            "command": self.command,
         }
 
 
 def certify_robot(
-    robot: Path, targets: Path, before: Path, after: Path, out: Path, *, estimates: Path | None = None
+    robot: Path,
+    targets: Path,
+    before: Path,
+    after: Path,
+    out: Path,
+    *,
+    estimates: Path | None = None,
+    command: str = "",
 ) -> RobotCertificate:
     """Compare measurements at nominal and at compensated commands with the targets of both, and write the certificate to `out`.
 
@@ -196,6 +205,7 @@ def certify_robot(
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
         ),
         fitted_files(calibrated, [after]),
+        command,
     )
     write_certificate(out, CertificateStudy(result.document(), result.before.centres, result.after.centres))
     return result

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -24,11 +25,13 @@ from flexcal.workflow.designed_frequency import (
     CANDIDATES,
     POSES,
     PlanName,
+    declared_sensors,
     designed_excitation,
     response_sensors,
     unplaced_plan,
 )
 from flexcal.workflow.frequency_plans import frequency_plan, read_frequency_poses
+from flexcal.workflow.robot_origin import robot_origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +39,7 @@ class DesignedFrequency:
     """A plan, the file it was written to and what it will tell; the `choice` of its poses and their `curve` where they were chosen.
 
     `flat` is the same with equal amplitudes. `curve` holds numbers of poses and the largest standard deviation of a stiffness with as many,
-    chosen and at random, (3, K).
+    chosen and at random, (3, K). `provenance` says what it comes from, `command` the command line, where there was one.
     """
 
     planned: PlannedResponses
@@ -45,6 +48,8 @@ class DesignedFrequency:
     choice: ChosenPoses | None = None
     curve: np.ndarray | None = None
     placements: tuple[Placement, ...] = ()
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
 
     @property
     def plan(self) -> MultisinePlan:
@@ -73,6 +78,8 @@ class DesignedFrequency:
             "predicted_std": self.planned.std(),
             "predicted_std_flat": self.flat.std(),
             "largest_stiffness_std": {"name": name, "std": largest},
+            "provenance": dict(self.provenance),
+            "command": self.command,
         }
         if self.placements:
             result["payload_placements"] = [{"com": p.com, "largest_std": p.std} for p in self.placements]
@@ -101,6 +108,7 @@ def plan_frequency_experiments(
     detection_lines: bool = False,
     place_payload: bool = False,
     seed: int = 0,
+    command: str = "",
     progress: Progress = silent,
 ) -> DesignedFrequency:
     """Write the plan `kind` for a robot to `out`, and a page with pictures beside it.
@@ -118,8 +126,8 @@ def plan_frequency_experiments(
     sensors = response_sensors(robot)
     choice = None
     if kind == "default" or kind == "paper":
-        beside = model.path.parent / "frequency_poses.csv"
-        plan = frequency_plan(model, beside if poses is None else poses, kind, seed)
+        poses = model.path.parent / "frequency_poses.csv" if poses is None else poses
+        plan = frequency_plan(model, poses, kind, seed)
         plan = leave_out_detection_lines(plan) if detection_lines else plan
         flat = planned = PlannedResponses.of(model, plan, sensors)
         if amplitude == "shaped":
@@ -141,7 +149,8 @@ def plan_frequency_experiments(
     planned = replace(planned, plan=replace(planned.plan, crest=crest))
     curve = None if choice is None else _curve(choice, seed)
     places = payload_placements(model, planned.plan, sensors, progress) if place_payload else ()
-    found = DesignedFrequency(planned, flat, out, choice, curve, places)
+    files = [file for file in (poses, declared_sensors(robot)) if file is not None]
+    found = DesignedFrequency(planned, flat, out, choice, curve, places, robot_origin(model, files), command)
     write_plan(out, planned.plan)
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
     write_frequency_page(page_beside(out), study)

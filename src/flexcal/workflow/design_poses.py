@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ from flexcal.report.pose_design import PoseStudy, write_pose_page
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.pose_choice import PoseChoice
 from flexcal.workflow.results import identifiability_block
+from flexcal.workflow.robot_origin import robot_origin
 
 VERIFICATION = "verification"
 """Name of a plan of random poses."""
@@ -35,22 +37,31 @@ VERIFICATION = "verification"
 
 @dataclass(frozen=True, eq=False)
 class DesignedPoses:
-    """A plan of random poses for a verification, the file it was written to, and the seed they were drawn with."""
+    """A plan of random poses for a verification, its file, the seed they were drawn with, what it comes from, and the command line."""
 
     plan: PosePlan
     file: Path
     seed: int
+    provenance: Mapping[str, str]
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
-        return {"plan": self.file, "poses": len(self.plan), "seed": self.seed}
+        return {
+            "plan": self.file,
+            "poses": len(self.plan),
+            "seed": self.seed,
+            "provenance": dict(self.provenance),
+            "command": self.command,
+        }
 
 
 @dataclass(frozen=True, eq=False)
 class ChosenPoses:
     """A plan of calibration poses, its file, why these, the way through them, and where the robot will work (None: anywhere).
 
-    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones.
+    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `provenance` says what the plan comes from,
+    `command` the command line.
     """
 
     plan: PosePlan
@@ -61,6 +72,8 @@ class ChosenPoses:
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `chosen` are the poses' numbers in the file they come from; those left out there stand beside, with why.
@@ -91,6 +104,8 @@ class ChosenPoses:
                     }
                     for n, c, r in zip(curve.counts, curve.chosen, curve.random, strict=True)
                 ],
+                "provenance": dict(self.provenance),
+                "command": self.command,
             }
         )
 
@@ -134,6 +149,7 @@ def plan_calibration_poses(
     wanted: float | None = None,
     payload: float | None = None,
     seed: int = 0,
+    command: str = "",
     progress: Progress = silent,
 ) -> ChosenPoses:
     """Choose `count` poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
@@ -154,20 +170,21 @@ def plan_calibration_poses(
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    result = ChosenPoses(plan, out, design, curve, way, seed, choice.working, choice.pool)
+    origin = robot_origin(model, choice.files)
+    result = ChosenPoses(plan, out, design, curve, way, seed, choice.working, choice.pool, origin, command)
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result
 
 
 def plan_verification_poses(
-    robot: Path, out: Path, count: int, *, payload: float | None = None, seed: int = 0
+    robot: Path, out: Path, count: int, *, payload: float | None = None, seed: int = 0, command: str = ""
 ) -> DesignedPoses:
     """Draw `count` random poses over the whole workspace, for a verification, and write the plan to `out`, and its page beside it."""
     model = RobotModel.from_yaml(robot)
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
-    result = DesignedPoses(plan, out, seed)
+    result = DesignedPoses(plan, out, seed, robot_origin(model), command)
     write_pose_plan(out, model, plan, result.document(), None)
     return result
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -16,6 +17,7 @@ from flexcal.design.sequences import SequenceName
 from flexcal.design.torque_columns import TorqueColumns
 from flexcal.design.torque_goal import TrajectoryCriterion
 from flexcal.errors import InputError
+from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.trajectory_design import write_trajectory_page
@@ -73,10 +75,12 @@ class TrajectoryRequest:
 
 @dataclass(frozen=True, eq=False)
 class DesignedTrajectories:
-    """A design and the file that its plan was written to."""
+    """A design, the file that its plan was written to, what it comes from, and the command line, where there was one."""
 
     design: TrajectoryDesign
     file: Path
+    provenance: Mapping[str, str]
+    command: str = ""
 
     @property
     def page(self) -> Path:
@@ -101,20 +105,23 @@ class DesignedTrajectories:
             "prior_gain": design.prior_gain(),
             "page": self.page,
             "seed": plan.seed,
+            "provenance": dict(self.provenance),
+            "command": self.command,
         }
 
 
 def plan_trajectories(
-    robot: Path, out: Path, request: TrajectoryRequest, *, progress: Progress = silent
+    robot: Path, out: Path, request: TrajectoryRequest, *, command: str = "", progress: Progress = silent
 ) -> DesignedTrajectories:
     """Write exciting trajectories of the nominal robot to the file `out`, and a page of pictures beside it.
 
     Raises `FlexcalError` as `design_trajectories` does.
     """
-    design = request.design(RobotModel.from_yaml(robot, estimates=False), progress)
-    found = DesignedTrajectories(design, out)
-    write_trajectory_page(found.page, design, found.document())
-    write_plan(out, design.plan)
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    origin = provenance([robot, nominal.urdf, *(() if request.after is None else (request.after,))])
+    found = DesignedTrajectories(request.design(nominal, progress), out, origin, command)
+    write_trajectory_page(found.page, found.design, found.document())
+    write_plan(out, found.design.plan)
     return found
 
 

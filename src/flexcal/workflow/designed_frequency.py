@@ -81,10 +81,16 @@ def unplaced_plan(model: RobotModel, kind: str, *, detection_lines: bool = False
     return leave_out_detection_lines(plan) if detection_lines else plan
 
 
+def declared_sensors(robot: Path) -> Path | None:
+    """cell.yaml beside robot.yaml, where there is one."""
+    file = robot.parent / "cell.yaml"
+    return file if file.is_file() else None
+
+
 def response_sensors(robot: Path) -> ResponseSensors:
     """The sensors that cell.yaml beside robot.yaml declares, common ones where there is none."""
-    file = robot.parent / "cell.yaml"
-    if not file.is_file():
+    file = declared_sensors(robot)
+    if file is None:
         return COMMON_SENSORS
     sensors = read_yaml(file, CellConfig).sensors
     return ResponseSensors(encoder_resolution(sensors), sensors.torque_noise)

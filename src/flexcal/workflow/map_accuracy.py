@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -31,7 +31,7 @@ from flexcal.report.accuracy_map import MapStudy, write_map_page
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.pose_choice import box_corners, working_volume
+from flexcal.workflow.pose_choice import box_corners, working_file, working_volume
 from flexcal.workflow.verify_robot import fitted_files, verification_poses
 
 _WORST = 5
@@ -46,6 +46,7 @@ class RobotMap:
     """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say of it.
 
     `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the `worst` rows.
+    `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     reach: Propagation
@@ -56,6 +57,8 @@ class RobotMap:
     worst_sources: dict[str, np.ndarray]
     scale: ErrorScale | None
     fitted: tuple[str, ...]
+    provenance: Mapping[str, str]
+    command: str = ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -105,6 +108,8 @@ class RobotMap:
                 "fitted": list(self.fitted),
             },
             "remarks": list(self.remarks),
+            "provenance": dict(self.provenance),
+            "command": self.command,
         }
 
 
@@ -123,6 +128,7 @@ def map_accuracy(
     payload: float | None = None,
     estimates: Path | None = None,
     seed: int = 0,
+    command: str = "",
     progress: Progress = silent,
 ) -> RobotMap:
     """Predict the tool's error at `count` random poses in a box, or at the poses or points of a file, and write the map to `out`.
@@ -146,14 +152,16 @@ def map_accuracy(
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
     fitted = fitted_files(calibrated, verification)
-    result = RobotMap(reach, found, box, worst, shares, error_sources(reach, q[worst]), scale, fitted)
+    place = working_file(working)
     origin = provenance(
-        [robot, calibrated.nominal.urdf, *verification],
+        [robot, calibrated.nominal.urdf, *verification, *(() if place is None else (place,))],
         {"seed": seed},
         calibrated.stored,
         tuple(calibrated.blocks),
     )
-    page = MapStudy(model, found, box, result.document(), scale, study, origin)
+    sources = error_sources(reach, q[worst])
+    result = RobotMap(reach, found, box, worst, shares, sources, scale, fitted, origin, command)
+    page = MapStudy(model, found, box, result.document(), scale, study)
     if out != page_beside(out):
         _write_table(out, found)
     write_map_page(page_beside(out), page)
@@ -169,7 +177,7 @@ def _poses(
     progress: Progress,
 ) -> tuple[np.ndarray | None, np.ndarray]:
     """The box, where there is one, and the poses."""
-    if working is not None and ":" not in working:
+    if working_file(working) is not None:
         place = working_volume(CollisionChecker(reach.model), working, seed)
         assert place is not None
         return None, place.q

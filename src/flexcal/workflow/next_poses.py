@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +26,7 @@ from flexcal.workflow.design_poses import (
     write_pose_plan,
 )
 from flexcal.workflow.pose_choice import PoseChoice
+from flexcal.workflow.robot_origin import robot_origin
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +44,8 @@ class ContinuedPoses:
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
@@ -63,6 +66,8 @@ class ContinuedPoses:
                 "flanks": flank_block(design),
                 "tool_error_mm": found.tool_error / MILLIMETRE,
                 "least_possible_mm": found.possible / MILLIMETRE,
+                "provenance": dict(self.provenance),
+                "command": self.command,
             }
         )
 
@@ -79,6 +84,7 @@ def plan_next_poses(
     wanted: float | None = None,
     payload: float | None = None,
     seed: int = 0,
+    command: str = "",
     progress: Progress = silent,
 ) -> ContinuedPoses:
     """Write to `out` the next poses, at most `count`, after the files of `measured` ones; nothing where these are enough.
@@ -92,12 +98,16 @@ def plan_next_poses(
     choice = PoseChoice.of(model, candidates, working, payload, count, rng, seed, progress)
     after = next_poses(choice.found, known, count, rng=rng, criterion=criterion)
     stop = after.enough(wanted)
+    origin = robot_origin(model, (*measured, *choice.files))
     if stop == 0:
-        return ContinuedPoses(None, None, after, stop, wanted, seed, choice.working, choice.pool)
+        return ContinuedPoses(
+            None, None, after, stop, wanted, seed, choice.working, choice.pool, origin, command
+        )
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
+    after = replace(after, design=design)
     result = ContinuedPoses(
-        plan, out, replace(after, design=design), stop, wanted, seed, choice.working, choice.pool
+        plan, out, after, stop, wanted, seed, choice.working, choice.pool, origin, command
     )
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result

@@ -24,12 +24,14 @@ from flexcal.progress import Progress
 
 @dataclass(frozen=True, eq=False)
 class PoseChoice:
-    """The candidates `found`, the given `pool` that they come from, if any, and where the robot will work (None: anywhere)."""
+    """The candidates `found`, the given `pool` that they come from, if any, where the robot will work (None: anywhere), and the `files` of
+    both."""
 
     checker: CollisionChecker
     found: PoseCandidates
     pool: PosePool | None
     working: WorkingVolume | None
+    files: tuple[Path, ...]
 
     @classmethod
     def of(
@@ -60,7 +62,15 @@ class PoseChoice:
             checker=checker,
             progress=progress,
         )
-        return cls(checker, found, given if isinstance(given, PosePool) else None, place)
+        files = [candidates] if isinstance(candidates, Path) else []
+        if (file := working_file(working)) is not None:
+            files.append(file)
+        return cls(checker, found, given if isinstance(given, PosePool) else None, place, tuple(files))
+
+
+def working_file(given: str | None) -> Path | None:
+    """The file that says where the robot will work; None where a box does, or robot.yaml."""
+    return None if given is None or ":" in given else Path(given)
 
 
 def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> WorkingVolume | None:
@@ -74,10 +84,11 @@ def working_volume(checker: CollisionChecker, given: str | None, seed: int) -> W
         if declared is None:
             return None
         return working_box(checker, np.array(declared.lower), np.array(declared.upper), rng)
-    if ":" in given:
+    file = working_file(given)
+    if file is None:
         corners = box_corners(given)
         return working_box(checker, corners[0], corners[1], rng)
-    q, points = read_working(Path(given), model)
+    q, points = read_working(file, model)
     if points is not None:
         return working_points(checker, points, rng)
     assert q is not None

@@ -43,13 +43,16 @@ class RobotRepeatability:
     """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
 
     "nominal": the nominal robot, laid as well as it goes through the points; "calibrated": the calibrated one. `drifts` are those of the
-    poses that were visited often enough while a clock ran.
+    poses that were visited often enough while a clock ran. `provenance` has all files with their hashes, `command` the command line, where
+    there was one.
     """
 
     poses: PoseSet
     visited: list[PoseRepeatability]
     errors: Mapping[str, np.ndarray]
     drifts: list[PoseDrift]
+    provenance: Mapping[str, str]
+    command: str = ""
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -95,6 +98,8 @@ class RobotRepeatability:
             "drift": self._drift(),
             "each": rows,
             "remarks": list(self.remarks),
+            "provenance": dict(self.provenance),
+            "command": self.command,
         }
 
     def _drift(self) -> dict[str, Any] | None:
@@ -147,7 +152,12 @@ class RobotRepeatability:
 
 
 def repeat_robot(
-    robot: Path, files: Sequence[Path], *, estimates: Path | None = None, out: Path | None = None
+    robot: Path,
+    files: Sequence[Path],
+    *,
+    estimates: Path | None = None,
+    out: Path | None = None,
+    command: str = "",
 ) -> RobotRepeatability:
     """Pose accuracy and repeatability from the repeated visits in `files`; with `out`, results.json and report.html are left there.
 
@@ -164,14 +174,14 @@ def repeat_robot(
         errors["nominal"] = nominal_errors(nominal, poses)
     if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
         errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
-    result = RobotRepeatability(poses, visited, errors, drift_of_poses(poses, visited))
+    stored = None if calibrated is None else calibrated.stored
+    blocks = () if calibrated is None else tuple(calibrated.blocks)
+    origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
+    result = RobotRepeatability(poses, visited, errors, drift_of_poses(poses, visited), origin, command)
     if out is not None:
         document = result.document()
         write_results(out, document)
-        stored = None if calibrated is None else calibrated.stored
-        blocks = () if calibrated is None else tuple(calibrated.blocks)
-        origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
-        study = RepeatabilityStudy(nominal.name, poses, visited, document, origin)
+        study = RepeatabilityStudy(nominal.name, poses, visited, document)
         write_repeatability_report(out / "report.html", study)
     return result
 

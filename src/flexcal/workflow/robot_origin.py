@@ -1,0 +1,16 @@
+"""Where a page on the robot as it is known comes from."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from flexcal.estimates_file import provenance, read_estimates
+from flexcal.model import RobotModel
+
+
+def robot_origin(model: RobotModel, files: Iterable[Path] = ()) -> dict[str, str]:
+    """Program, and SHA-256 of robot.yaml, its URDF, all blocks of its estimates where there are some, and the `files`."""
+    stored = model.path.parent / model.config.estimates
+    blocks = tuple(read_estimates(stored)) if stored.exists() else ()
+    return provenance([model.path, model.urdf, *files], estimates=stored, blocks=blocks)
