@@ -2,6 +2,7 @@
 
 `python -m benchmarks.payload --first 20 --count 10`: the payload weighs a fifth more or less than robot.yaml declares and hangs some 20 mm
 elsewhere. The robot's own dynamics are those of stage 0 ("block"), or are fitted to the same recordings without payload ("free").
+`--substeps 8` steps the simulation eight times a sample: fits see the error of cell.yaml's 4 kHz, 0.05 N m at the first two joints.
 """
 
 from __future__ import annotations
@@ -59,13 +60,15 @@ def truth_of(nominal: RobotModel, seed: int) -> dict[str, float]:
     return values | {f"payload.{key}": value for key, value in BODY.items()}
 
 
-def one_seed(seed: int, plans: Path) -> dict[str, Any]:
+def one_seed(seed: int, plans: Path, substeps: int = 1) -> dict[str, Any]:
     """Errors over standard deviations and intervals of either way, and the tool's errors in mm."""
     nominal = RobotModel.from_yaml(EXAMPLE / "robot.yaml", estimates=False)
     with tempfile.TemporaryDirectory() as temporary:
         folder = Path(temporary)
         for name in ("robot.yaml", "tx90l.urdf", "cell.yaml"):
             shutil.copy(EXAMPLE / name, folder)
+        cell = (folder / "cell.yaml").read_text("utf-8").replace("substeps: 1", f"substeps: {substeps}")
+        (folder / "cell.yaml").write_text(cell, "utf-8")
         robot = folder / "robot.yaml"
         truth = truth_of(nominal, seed)
         write_truth(folder / "truth.yaml", truth)
@@ -142,13 +145,14 @@ def main() -> None:
     parser.add_argument("--first", type=int, default=20)
     parser.add_argument("--count", type=int, default=10)
     parser.add_argument("--plans", type=Path, default=None, help="folder for the designed plans, kept")
+    parser.add_argument("--substeps", type=int, default=1, help="of the simulation, a sample")
     given = parser.parse_args()
     with tempfile.TemporaryDirectory() as temporary:
         plans = given.plans or Path(temporary)
         design(plans)
         runs = []
         for seed in range(given.first, given.first + given.count):
-            runs.append(one_seed(seed, plans))
+            runs.append(one_seed(seed, plans, given.substeps))
             print(summary(runs), flush=True)
 
 

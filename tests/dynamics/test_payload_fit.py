@@ -14,7 +14,6 @@ from two_links import swings as swing_of
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
     CLASSIC,
-    ArmYield,
     BaseParameters,
     Motion,
     Observation,
@@ -29,9 +28,8 @@ from flexcal.dynamics.payload_body import nearest_body, of_body, of_frame, told_
 from flexcal.dynamics.payload_equations import in_link
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
+from flexcal.model import RobotModel, torque_regressor
 from flexcal.model.held_payload import holding
-from flexcal.model.periodic_torque import yielding_torque
 from flexcal.model.pseudo_inertia import PSEUDO_INERTIA
 
 BODY = np.array([2.0, 0.05, -0.03, 0.08, 0.02, 0.001, -0.002, 0.03, 0.003, 0.015])
@@ -222,51 +220,3 @@ def test_moments_are_told_together() -> None:
     assert list(told_moments(BODY, wide)) == [True, False, True, True, True, True]
     wide[0] = 0.05
     assert not told_moments(BODY, wide).any()
-
-
-def calm(motion: Motion) -> Motion:
-    """A third of the motion, as heavy arms do it."""
-    return replace(motion, q=motion.q / 3, dq=motion.dq / 3, ddq=motion.ddq / 3)
-
-
-def test_the_yield_of_springs(tx90l: RobotModel, sines: Callable[[int, float], Motion]) -> None:
-    """None where they are stiff; else what exact derivatives give along a periodic motion, away from the ends of the recording."""
-    motion = calm(sines(1000, 100.0))
-    stiff = replace(tx90l, stiffness=1e7 * tx90l.stiffness)
-    assert np.abs(ArmYield.of(stiff, motion, ()).shift).max() < 1e-3
-    states = motion.q, motion.dq, motion.ddq
-    found = ArmYield.of(tx90l, motion, ())
-    omega = 2j * np.pi * 0.1 * np.arange(501)[:, None]
-
-    def derivatives(bent: np.ndarray) -> np.ndarray:
-        return np.array(
-            [np.fft.irfft(np.fft.rfft(bent, axis=0) * omega**order, axis=0) for order in range(3)]
-        )
-
-    exact, rigid = (
-        yielding_torque(robot, *states, derivatives, passes=n) for robot, n in ((tx90l, 3), (tx90l, 1))
-    )
-    exact -= rigid
-    inside = (found.time > 1.0) & (found.time < 9.0)
-    there = exact[np.searchsorted(motion.time, found.time[inside] - 1e-6)]
-    missed = np.linalg.norm(found.shift[inside] - there, axis=0)[:3]
-    assert np.all(missed < 0.05 * np.linalg.norm(there, axis=0)[:3])
-    assert np.abs(there).max() > 1.0
-
-
-def test_slopes_by_springs_and_geometry(tx90l: RobotModel, sines: Callable[[int, float], Motion]) -> None:
-    """A stiffer drive and a turned axis, as much as they change the torques."""
-    motion = calm(sines(500, 100.0))
-    sources = ("joint_2.drive.stiffness", "joint_3.offset")
-    found = ArmYield.of(tx90l, motion, sources)
-    stiffer = tx90l.with_values({sources[0]: 1.01 * tx90l.value(sources[0])})
-    change = ArmYield.of(stiffer, motion, ()).shift - found.shift
-    np.testing.assert_allclose(change, np.log(1.01) * found.slopes[:, :, 0], atol=0.02 * np.abs(change).max())
-    turned = tx90l.with_values({sources[1]: 1e-3}), tx90l
-    heavy = inertial_parameters(tx90l)
-    held = tx90l.payload
-    assert held is not None
-    heavy[LAST] += in_link(held) @ of_frame(np.concatenate([[held.mass], held.com, held.moments]))
-    torque = [torque_regressor(robot, motion.q, motion.dq, motion.ddq) @ heavy for robot in turned]
-    some = (torque[0] - torque[1])[np.searchsorted(motion.time, found.time - 1e-6)]
-    np.testing.assert_allclose(some, 1e-3 * found.slopes[:, :, 1], atol=0.05 * np.abs(some).max())

@@ -12,20 +12,24 @@ import numpy as np
 from flexcal.dynamics.drive_terms import Column, Memory
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.rows import Experiment
+from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 from flexcal.model.declared import uncertain_inertials
 from flexcal.model.names import GEOMETRY, SPRINGS
-from flexcal.model.periodic_torque import yielding_torque
+from flexcal.model.periodic_torque import spring_load, yielding_torque
 
 YIELD = "arm_yield"
 """Name of the column of what the springs change, whose coefficient is one."""
 _RATE_HZ = 50.0
 """Instants a second at which it is evaluated, between which it is interpolated."""
-_SMOOTH_HZ, _ORDER = 8.0, 4
-"""Cut-off and order of the low-pass, forwards and backwards, of deflections before they are differentiated twice."""
-_LOWEST = 0.2
+_CUTOFF_HZ, _ORDER = 10.0, 4
+"""Of the low-pass, forwards and backwards, of the motion, whose noise deflections would differentiate twice more, and of the way from one
+flank of a gap to the other."""
+_HIGHEST = 0.4
 """The cut-off over the sampling rate, at most."""
-_PASSES = 3
+_SHORTEST = 0.5
+"""Duration in s."""
+_PASSES = 4
 """Orders of load over stiffness that deflections are right to."""
 _STEP = 1e-2
 """Of the central differences, in standard deviations' units of 1e-3 rad and m, and of the logarithm of a stiffness."""
@@ -33,10 +37,12 @@ _SMALL = 1e-3
 
 
 def error_sources(model: RobotModel) -> tuple[str, ...]:
-    """Geometric errors of the joints, and of an elastic robot stiffnesses and what weighs on them: masses and centres of mass of links."""
+    """Geometric errors of the joints, and of an elastic robot stiffnesses, gaps and what weighs on them: masses and centres of mass of
+    links."""
     springs = (f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components))
     weights = uncertain_inertials(model, range(model.n)) if model.elastic else ()
-    return (*springs, *weights, *(f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY))
+    gaps = (f"{model.joint_names[i]}.backlash" for i in model.backlash_joints) if model.elastic else ()
+    return (*springs, *gaps, *weights, *(f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY))
 
 
 def error_column(source: str) -> str:
@@ -62,16 +68,21 @@ class ArmYield:
     def of(
         cls, model: RobotModel, experiment: Experiment, sources: Sequence[str], payload: float | None = None
     ) -> ArmYield:
-        """Along a recording, of the `model` with `payload` (kg; None: the one that it has)."""
-        motion = _coarse(experiment)
-        states = motion.q, motion.dq, motion.ddq
-        smoothed = _Smoothed(float(motion.time[1] - motion.time[0]))
+        """Along a recording, of the `model` with `payload` (kg; None: the one that it has), which tells on which flanks drives rest.
+
+        Raises `FlexcalError` for a recording of less than half a second.
+        """
+        motion = _slow(experiment)
+        states, course = (motion.q, motion.dq, motion.ddq), _Course(motion.time)
+        flanks = None
+        if model.elastic:
+            flanks = course.between(np.sign(spring_load(model, *states, course, payload)))
 
         def rigid(robot: RobotModel) -> np.ndarray:
             return yielding_torque(robot, *states, np.zeros_like, payload, passes=1)
 
         def torque(robot: RobotModel) -> np.ndarray:
-            return yielding_torque(robot, *states, smoothed, payload, _PASSES)
+            return yielding_torque(robot, *states, course, payload, _PASSES, flanks)
 
         def shift(robot: RobotModel) -> np.ndarray:
             return torque(robot) - rigid(robot)
@@ -79,7 +90,7 @@ class ArmYield:
         slopes = np.zeros((*motion.q.shape, len(sources)))
         for k, name in enumerate(sources):
             value, key = model.value(name), name.rpartition(".")[2]
-            changed = torque if key in ("stiffness", *GEOMETRY) else shift
+            changed = torque if key in ("stiffness", "backlash", *GEOMETRY) else shift
             log = key in ("stiffness", "mass")
             size = _STEP if log else _STEP * _SMALL
             ends = [value * np.exp(s * size) if log else value + s * size for s in (1, -1)]
@@ -102,23 +113,38 @@ class ArmYield:
 
 
 @dataclass(frozen=True)
-class _Smoothed:
-    """Deflections (N, d) every `step` (s), smoothed, with two derivatives (3, N, d)."""
+class _Course:
+    """Values (N, d) at the instants `time` (N,) s, with their first and second derivative (3, N, d)."""
 
-    step: float
+    time: np.ndarray
 
-    def __call__(self, bent: np.ndarray) -> np.ndarray:
-        from scipy.signal import butter, sosfiltfilt
+    def __call__(self, values: np.ndarray) -> np.ndarray:
+        from scipy.interpolate import make_interp_spline
 
-        corner = min(_SMOOTH_HZ * self.step, _LOWEST)
-        smooth = sosfiltfilt(butter(_ORDER, 2 * corner, output="sos"), bent, axis=0)
-        first = np.gradient(smooth, self.step, axis=0)
-        return np.array([smooth, first, np.gradient(first, self.step, axis=0)])
+        curve = make_interp_spline(self.time, values, k=5)
+        return np.array([curve(self.time, nu=order) for order in range(3)])
+
+    def between(self, flanks: np.ndarray) -> np.ndarray:
+        """From one flank, ±1, to the other as a low-pass goes."""
+        return self(_low_passed(flanks, float(self.time[1] - self.time[0])))
 
 
-def _coarse(experiment: Experiment) -> Motion:
-    """Every so many samples of an experiment, the last one among them."""
+def _slow(experiment: Experiment) -> Motion:
+    """What a low-pass leaves of an experiment, every so many samples, the last one among them."""
     whole = Motion.joined(experiment.blocks())
-    stride = max(1, int(1.0 / (_RATE_HZ * float(whole.time[1] - whole.time[0]))))
+    step = float(whole.time[1] - whole.time[0])
+    if len(whole) * step < _SHORTEST:
+        raise FlexcalError(
+            f"{experiment.name}: {len(whole) * step:.2g} s of motion are too short; record for longer."
+        )
+    stride = max(1, int(1.0 / (_RATE_HZ * step)))
     some = slice((len(whole) - 1) % stride, None, stride)
-    return Motion(whole.time[some], whole.q[some], whole.dq[some], whole.ddq[some], whole.torque[some])
+    q, dq, ddq = (_low_passed(values, step)[some] for values in (whole.q, whole.dq, whole.ddq))
+    return Motion(whole.time[some], q, dq, ddq, whole.torque[some])
+
+
+def _low_passed(values: np.ndarray, step: float) -> np.ndarray:
+    """Values (N, ·) every `step` (s) below `_CUTOFF_HZ`, without phase shift."""
+    from scipy.signal import butter, sosfiltfilt
+
+    return sosfiltfilt(butter(_ORDER, 2 * min(_CUTOFF_HZ * step, _HIGHEST), output="sos"), values, axis=0)

@@ -15,6 +15,8 @@ LENGTH_TOLERANCE = 3e-4
 """1σ of an uncalibrated length, m."""
 ANGLE_TOLERANCE = 5e-4
 """1σ of an uncalibrated offset or misalignment, rad."""
+GAP_TOLERANCE = 1e-4
+"""1σ of an uncalibrated backlash, half the gap, rad."""
 
 SPRING_LOG_STD = 1.5
 """Prior of every stiffness and damping that a frequency response is to find, 1σ of the logarithm (a factor of 4.5): it only keeps the
@@ -106,4 +108,5 @@ def _std(model: RobotModel, name: str, key: str) -> float:
         "com_z": model.prior.com,
         "rotor_inertia": model.prior.rotor_inertia,
         "stiffness": UNIDENTIFIED_STIFFNESS,
+        "backlash": GAP_TOLERANCE,
     }.get(key, float("inf"))

@@ -40,29 +40,59 @@ def yielding_torque(
     derivatives: Callable[[np.ndarray], np.ndarray],
     payload: float | None = None,
     passes: int = 2,
+    flanks: np.ndarray | None = None,
 ) -> np.ndarray:
     """Torque (N, n), N m, at each motor for the arm beyond it, at N samples of a motion of the motors.
 
     `q`, `dq`, `ddq` (N, n) are the motors', referred to the joint; `derivatives` gives deflections (N, d) with their first and second
-    derivative by time (3, N, d). Every spring yields to the torque that acts in it at that instant: right for motions well below the
-    first resonance, where dampers do nothing. Gaps count as closed; rotors and friction are not in it. `payload` in kg, None for the
-    declared. Of the evaluations (`passes`) the first is with a rigid arm, and each makes the deflections of the next right to another
-    order of load over stiffness.
+    derivative by time (3, N, d). Every spring yields to the torque that acts in it at that instant, less what its damper takes: right for
+    motions well below the first resonance. Rotors and friction are not in it. `payload` in kg, None for the declared. Of the evaluations
+    (`passes`) the first is with a rigid arm, the second without dampers, and each makes the deflections of the next right to another
+    order of load over stiffness. `flanks` (3, N, d), with both derivatives, say on which side of its gap a drive rests: -1 to 1, None
+    for all gaps closed.
     """
+    arm = ElasticArm(model, payload)
+    return _loads(model, arm, (q, dq, ddq), derivatives, passes, flanks)[:, arm.joint_velocity]
+
+
+def spring_load(
+    model: RobotModel,
+    q: np.ndarray,
+    dq: np.ndarray,
+    ddq: np.ndarray,
+    derivatives: Callable[[np.ndarray], np.ndarray],
+    payload: float | None = None,
+) -> np.ndarray:
+    """Torque (N, d), N m, of the arm on every spring, in the order of `elastic_axes`, gaps closed; arguments as of `yielding_torque`."""
+    arm = ElasticArm(model, payload)
+    return -_loads(model, arm, (q, dq, ddq), derivatives, 2, None)[:, arm.elastic]
+
+
+def _loads(
+    model: RobotModel,
+    arm: ElasticArm,
+    motion: tuple[np.ndarray, np.ndarray, np.ndarray],
+    derivatives: Callable[[np.ndarray], np.ndarray],
+    passes: int,
+    flanks: np.ndarray | None,
+) -> np.ndarray:
+    """Torque (N, d + n) at every coordinate of the arm, as `yielding_torque` has it."""
     import pinocchio as pin
 
-    arm = ElasticArm(model, payload)
-    axes = elastic_axes(model)
-    stiffness = np.array([model.stiffness[axis] for axis in axes])
-    state = np.zeros((3, len(q), arm.model.nv))
-    state[:, :, arm.joint_velocity] = q + model.geometry[:, 0], dq, ddq
-    rigid = state.copy()
-    torque = np.empty((len(q), arm.model.nv))
+    axes, count = elastic_axes(model), len(motion[0])
+    stiffness, damping = (
+        np.array([values[axis] for axis in axes]) for values in (model.stiffness, model.damping)
+    )
+    half_gap = np.array([model.backlash[joint] if component == 2 else 0.0 for joint, component in axes])
+    rigid = np.zeros((3, count, arm.model.nv))
+    rigid[:, :, arm.joint_velocity] = motion[0] + model.geometry[:, 0], motion[1], motion[2]
+    state, torque, bent = rigid, np.empty(rigid.shape[1:]), np.zeros((3, count, len(axes)))
     for last in (*(False,) * (passes - 1), True):
         for k, (position, velocity, acceleration) in enumerate(state.transpose(1, 0, 2)):
             torque[k] = pin.rnea(arm.model, arm.data, position, velocity, acceleration)
         if last or not axes:
             break
+        bent = derivatives(-(torque[:, arm.elastic] + damping * bent[1]) / stiffness)
         state = rigid.copy()
-        state[:, :, arm.elastic] += derivatives(-torque[:, arm.elastic] / stiffness)
-    return torque[:, arm.joint_velocity]
+        state[:, :, arm.elastic] += bent if flanks is None else bent + half_gap * flanks
+    return torque

@@ -132,7 +132,7 @@ def identify_robot_payload(
         model = model.with_estimate(
             blocks["dynamics"]
         )  # later blocks keep no covariance of links with drives
-    treatment = _slow(treatment_of(model, every), model, every)
+    treatment = _slow(treatment_of(model, every, flexible=bool(model.elastic)), model, every)
     with TemporaryDirectory(prefix="flexcal_") as folder:
         read = read_logs(every, model, treatment, Path(folder), jobs=jobs)
         carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
