@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics
+from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.data import PoseSet
 
 NOMINAL, RIGID, CALIBRATED = "nominal", "rigid", "calibrated"
@@ -36,6 +36,15 @@ class MeasuredPoints:
     def nominal(self) -> np.ndarray | None:
         """Errors (N, 3) m as delivered; None where the points do not allow a registration."""
         return self.errors.get(NOMINAL)
+
+    @property
+    def verification(self) -> Verification:
+        """Errors of the model that is used, and what the parameters' covariance says of them; raises `ValueError` where that was not asked
+        for."""
+        if self.parameter_rms is None:
+            raise ValueError("points of a verification have the distances that the covariance predicts")
+        position = self.poses.position - self.calibrated
+        return Verification(position, self.calibrated, self.parameter_rms, self.ambiguous)
 
     def statistics(self, model: str) -> ErrorStatistics:
         """Of one model's errors."""

@@ -77,11 +77,7 @@ class TwoStageStudy:
     @property
     def verification(self) -> Verification:
         """The calibrated robot at the fresh poses."""
-        fresh = self.fresh
-        if fresh.parameter_rms is None:
-            raise ValueError("fresh poses have the distances that the covariance predicts")
-        position = fresh.poses.position - fresh.calibrated
-        return Verification(position, fresh.calibrated, fresh.parameter_rms, fresh.ambiguous)
+        return self.fresh.verification
 
     @cached_property
     def rigid(self) -> tuple[RigidFit, ...]:

@@ -46,11 +46,7 @@ class VerificationStudy:
     @property
     def verification(self) -> Verification:
         """Prediction, errors and what the parameters' covariance says of them."""
-        points = self.points
-        if points.parameter_rms is None:
-            raise ValueError("points of a verification have the distances that the covariance predicts")
-        position = points.poses.position - points.calibrated
-        return Verification(position, points.calibrated, points.parameter_rms, points.ambiguous)
+        return self.points.verification
 
 
 def write_verification_report(path: str | Path, study: VerificationStudy) -> None:
