@@ -80,6 +80,34 @@ def test_without_noise_it_comes_back(
     assert all(fit.estimate.identifiable) and fit.rise == 0.0
 
 
+def test_what_is_predicted_is_what_was_measured(
+    arm: Observation, truth: np.ndarray, sines: Callable[[int, float], Motion]
+) -> None:
+    """Column by column, of a recording with the payload and of one without; the errors by joint are those of noise that is added to one."""
+    motion, held = sines(1000, 100.0), arm.model.payload
+    pair = [recovery.driven(arm, motion, p) for p in (loaded(arm, truth), truth)]
+    noise = np.zeros_like(motion.torque)
+    noise[:, 1] = np.random.default_rng(3).normal(size=len(motion))
+    base = BaseParameters.of(arm)
+    for added in (0 * noise, noise):
+        noisy = [replace(each, torque=each.torque + added) for each in pair]
+        data = observe(arm, base, noisy, Decimation(1), mask_standstill=False)
+        assert held is not None
+        equations = PayloadEquations(data, [True, False], held, RobotPrior.of(arm, base, None))
+        fit = identify_payload(equations)
+        left = []
+        for each, carries in zip(noisy, (True, False), strict=True):
+            found = equations.coefficients(fit.unknowns, carries)
+            predicted = [found[m] @ own[:-1] for m, own in zip(arm.members, arm.systems(each), strict=True)]
+            left.append(each.torque - np.array(predicted).T)
+        missed = np.linalg.norm(np.concatenate(left), axis=0)
+        size = np.linalg.norm(np.concatenate([each.torque for each in noisy]), axis=0)
+        np.testing.assert_allclose(fit.joint_errors, missed / size, atol=1e-9)
+        assert fit.error == pytest.approx(np.linalg.norm(missed) / np.linalg.norm(size), abs=1e-9)
+        share = np.linalg.norm([added[:, 1]] * 2) / size[1]
+        assert fit.joint_errors == pytest.approx([0, share, 0, 0, 0, 0], rel=0.1, abs=1e-3)
+
+
 def test_without_noise_from_identified_dynamics(
     arm: Observation, base: BaseParameters, truth: np.ndarray, sines: Callable[[int, float], Motion]
 ) -> None:

@@ -92,6 +92,14 @@ class PayloadEquations:
                 stack.append(triangular(rows / noise[number * n + joint]))
         return triangular(np.vstack(stack))
 
+    def coefficients(self, unknowns: np.ndarray, loaded: bool) -> np.ndarray:
+        """χ (p,) of all columns of `data` with which W χ are the torques that `unknowns` (u,) predict, with the payload or without."""
+        missed = np.append(-unknowns, 1.0)
+        found = np.zeros(len(self.data.names))
+        for joint, members in enumerate(self.data.observation.members):
+            found[members] = -(self._map(joint, loaded) @ missed)[:-1]
+        return found
+
     def _map(self, joint: int, loaded: bool) -> np.ndarray:
         """(m + 1, unknowns + 1): from a joint's [W, Y] to its equations."""
         names, members = self.data.names, self.data.observation.members[joint]

@@ -36,13 +36,16 @@ class PayloadFit:
     """The `estimate` of `payload.mass` and so on.
 
     `rise` is by how much a body with these raises the sum of squares above its minimum; `error` the share of the torques' norm that is
-    missed, and `own_error` that which the base parameters miss that fit each joint and recording best (NaN where too short).
+    missed, `joint_errors` (n,) that of every joint by itself, and `own_error` that which the base parameters miss that fit each joint and
+    recording best (NaN where too short). These errors are those of all `unknowns` (u,) of the equations, before the nearest body.
     """
 
     estimate: Estimate
     rise: float
     error: float
+    joint_errors: np.ndarray
     own_error: float
+    unknowns: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,7 +67,6 @@ class _Solution:
     cost: float
     chi2: float
     freedom_left: int
-    error: float
 
 
 def identify_payload(equations: PayloadEquations) -> PayloadFit:
@@ -105,7 +107,8 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
     covariance[0] /= body[0]
     covariance[:, 0] /= body[0]
     estimate = _estimate(found, nearest.rise, body, covariance, told)
-    return PayloadFit(estimate, nearest.rise, found.error, _own_error(equations.data))
+    error, joint_errors = _missed_shares(equations, found.unknowns)
+    return PayloadFit(estimate, nearest.rise, error, joint_errors, _own_error(equations.data), found.unknowns)
 
 
 def _own_error(data: RegressionData) -> float:
@@ -177,20 +180,19 @@ def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarra
         chi2 + float(np.sum((prior @ values) ** 2)),
         chi2,
         freedom,
-        _missed_share(equations, missed),
     )
 
 
-def _missed_share(equations: PayloadEquations, missed: np.ndarray) -> float:
-    """‖errors‖ / ‖torques‖ of all equations."""
-    left = sum(
-        float(np.sum((factor @ missed) ** 2))
-        for own in equations.batches
-        for b in own
-        for factor in b.factors
-    )
-    size = sum(float(np.sum(s.triangle.right**2)) for s in equations.data.subsystems)
-    return float(np.sqrt(left / size)) if size > 0 else 0.0
+def _missed_shares(equations: PayloadEquations, unknowns: np.ndarray) -> tuple[float, np.ndarray]:
+    """‖errors‖ / ‖torques‖ of all equations, and of those of every joint (n,); 0 where there are no torques."""
+    missed = np.append(-unknowns, 1.0)
+    left, size = np.zeros((2, equations.data.observation.model.n))
+    for batch in (batch for own in equations.batches for batch in own):
+        left += [np.sum((factor @ missed) ** 2) for factor in batch.factors]
+    for s in equations.data.subsystems:
+        size[s.equation] += np.sum(s.triangle.right**2)
+    shares = np.sqrt(np.divide(left, size, out=np.zeros_like(left), where=size > 0))
+    return float(np.sqrt(left.sum() / size.sum())) if size.any() else 0.0, shares
 
 
 def _scale(system: np.ndarray, own: slice) -> np.ndarray:
