@@ -64,6 +64,7 @@ def test_numbers_are_those_of_the_results(outline: Outline, study: DynamicsStudy
     error = study.results["error_percent"]
     for value in (error["held_out"], error["train"], *error["per_joint"].values()):
         assert significant(value, 3) in outline.words
+    assert "samples to one row 100 robot.yaml" in outline.words
     assert "the last 30 % of every recording" in outline.words and "61 of 61" in outline.words
     for row in study.results["base_parameters"]:
         assert row["name"] in outline.words and significant(row["std"], 2) in outline.words

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere, with_estimates
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
@@ -43,7 +44,7 @@ class IdentifyPayload:
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Logs that are read at once, each in a process of its own."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for results.json and estimates.yaml (then not beside robot.yaml)."""
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
 
     def run(self) -> None:
@@ -62,6 +63,7 @@ class IdentifyPayload:
                 free=self.free,
                 frame=self.frame,
                 out=self.out,
+                command=command_line(),
                 jobs=self.jobs,
                 progress=progress,
             )
@@ -69,12 +71,13 @@ class IdentifyPayload:
         units = {item.name: item.unit for item in found.fit.estimate.parameters}
         title = f"payload in the frame {found.frame}, inertia about its centre of mass"
         console.show(quantity_table(title, document["parameters"], units))
-        console.say(f"torques missed by {document['error_percent']:.2f} % of their norm")
+        console.say(f"torques missed by {document['error_percent']['train']:.2f} % of their norm")
         for remark in document["remarks"]:
             console.say(remark)
         console.say(f"the same as a line of robot.yaml, if you want to keep it there: {found.declaration}")
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
             console.say(reading_elsewhere(self.robot, found.estimates))
         console.finish(document, self._next(found))
 

@@ -125,7 +125,7 @@ STEPS = (
                 "IdentifyPayload",
                 "recordings with a payload to its mass, centre of mass and inertia",
                 "flexcal identify payload robot.yaml loaded",
-                ("results.json",),
+                ("results.json", "predictions.npz", "report.html"),
             ),
         ),
     ),

@@ -17,13 +17,14 @@ from flexcal.report.dynamics_checks import (
     check_unseen,
 )
 from flexcal.report.notation import significant
-from flexcal.report.page import Check, Fact, Page, Status, Verdict, tally, worst
+from flexcal.report.page import Check, Fact, Page, Section, Status, Verdict, tally, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.base_parameters import base_parameters_section
 from flexcal.report.sections.friction import friction_section
 from flexcal.report.sections.learned_residual import learned_section
 from flexcal.report.sections.provenance import provenance_section
-from flexcal.report.sections.torques import torques_section
+from flexcal.report.sections.signals import signals_table
+from flexcal.report.sections.torques import recording_labels, torque_blocks
 
 _TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Identified, and the torques can be trusted"),
@@ -60,13 +61,22 @@ def write_dynamics_report(path: str | Path, study: DynamicsStudy) -> None:
 def dynamics_page(study: DynamicsStudy) -> Page:
     """The page before it becomes HTML."""
     results = study.results
+    logs = dict(zip(recording_labels(study.predictions), study.predictions, strict=True))
     return Page(
         title=f"{results['robot']}: dynamics report",
         subtitle=f"Inertias and friction from {results['equations']} equations of torque; {results['masked_rows']} rows at standstill "
         f"left out · {len(results['friction_terms'])} friction terms",
         verdict=dynamics_verdict(study),
         sections=[
-            torques_section(results, study.held_out, study.predictions),
+            Section(
+                "torques",
+                "Torques: predicted against measured",
+                "What counts is whether the robot's torques are predicted in motions that the fit never saw.",
+                (
+                    *torque_blocks(results["error_percent"], study.held_out, logs),
+                    signals_table(results["signals"]),
+                ),
+            ),
             base_parameters_section(results, study.estimate),
             friction_section(results),
             *(

@@ -57,6 +57,14 @@ def significant(value: float | None, digits: int = 4) -> str:
     return f"{value:.{max(0, digits - 1 - magnitude)}f}".replace("-", "−")
 
 
+def to_half_width(value: float, half_width: float, digits: int = 2) -> str:
+    """A number with the decimals that half the width of its interval asks for: so many significant `digits` of it."""
+    if not half_width > 0:
+        return significant(value)
+    decimals = max(0, digits - 1 - int(f"{half_width:.{digits - 1}e}".rpartition("e")[2]))
+    return f"{value:z.{decimals}f}".replace("-", "−")
+
+
 def percent(value: float | None, *, signed: bool = False) -> str:
     """A ratio in percent with two significant digits."""
     if value is None or not math.isfinite(value):

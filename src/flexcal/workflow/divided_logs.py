@@ -94,9 +94,8 @@ class DividedLogs:
 
     def predictions(self, observation: Observation, estimate: Estimate) -> list[TorquePrediction]:
         """Of all logs, for the report."""
-        return log_predictions(
-            self.logs, self.borders, observation, estimate, self.treatment, progress=self.progress
-        )
+        predicted = [(observation, estimate.parameters.coordinates())] * len(self.logs)
+        return log_predictions(self.logs, self.borders, predicted, self.treatment, progress=self.progress)
 
     def _systems(
         self, parts: Sequence[LogPart], observation: Observation, batches: int

@@ -12,17 +12,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics import (
-    CLASSIC,
-    ArmYield,
-    BaseParameters,
     JointLog,
-    Observation,
-    PayloadEquations,
     PayloadFit,
-    RegressionData,
-    RobotPrior,
-    Window,
-    batches_each,
     error_sources,
     identify_payload,
     log_blocks,
@@ -35,9 +26,11 @@ from flexcal.model.held_payload import holding, last_frame
 from flexcal.model.stored import PAYLOAD_FRAME, with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
+from flexcal.workflow.log_systems import read_logs
 from flexcal.workflow.log_torques import require_joint_torques
-from flexcal.workflow.payload_remarks import payload_remarks
+from flexcal.workflow.payload_remarks import declared_body, other_payloads, payload_remarks
+from flexcal.workflow.payload_system import PayloadSystem
+from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.recorded_logs import RecordedLogs, recorded_with
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
@@ -53,7 +46,10 @@ _SENSELESS = 0.5
 
 @dataclass(frozen=True, eq=False)
 class RobotPayload:
-    """The `fit`, the `model` with it, the robot's other `blocks`, and where the estimate was written."""
+    """The `fit` of the recordings `loaded` and `free`, the `model` with it, the robot's other `blocks`, and where the estimate was written.
+
+    `declared` is the robot of robot.yaml alone, `command` the command line, where there was one.
+    """
 
     declared: RobotModel
     model: RobotModel
@@ -61,22 +57,38 @@ class RobotPayload:
     fit: PayloadFit
     blocks: Mapping[Block, Estimate]
     treatment: Treatment
+    loaded: tuple[Path, ...]
+    free: tuple[Path, ...]
     estimates: Path
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; `declaration` is the line of robot.yaml that says the same."""
+        fit, held = self.fit, self.declared.payload
+        joints = self.declared.joint_names
         return {
+            "robot": self.declared.name,
             "frame": self.frame,
-            "parameters": quantities(self.fit.estimate),
+            "recordings": {"loaded": list(self.loaded), "free": list(self.free)},
+            "parameters": quantities(fit.estimate),
+            "declared": None if held is None else declared_body(held),
             "declaration": self.declaration,
-            "error_percent": 100 * self.fit.error,
+            "error_percent": {
+                "train": 100 * fit.error,
+                "best": 100 * fit.own_error,
+                "per_joint": dict(zip(joints, 100 * fit.joint_errors, strict=True)),
+            },
+            "body_rise": fit.rise,
+            "other_payloads": other_payloads(fit.estimate, self.blocks),
             "signals": {
                 "cutoff_hz": self.treatment.cutoff_hz,
                 "decimation": self.treatment.decimation.factor,
                 "proposed": list(self.treatment.proposed),
             },
-            "remarks": list(payload_remarks(self.fit, self.declared, self.blocks)),
+            "remarks": list(payload_remarks(fit, self.declared, self.blocks)),
             "estimates": self.estimates,
+            "provenance": dict(fit.estimate.provenance),
+            "command": self.command,
         }
 
     @property
@@ -101,17 +113,18 @@ def identify_robot_payload(
     free: Sequence[Path] = (),
     frame: str = "",
     out: Path | None = None,
+    command: str = "",
     jobs: int = 1,
     progress: Progress = silent,
 ) -> RobotPayload:
     """Find what the robot of a robot.yaml holds in `logs`, and store the block `payload`.
 
-    `logs` and `free` are files, or folders of trajectories as 'measure' leaves them.
-    Of the robot itself its estimates tell, all blocks but that of the payload, or the logs `free` without payload, or both together. The
-    values are in the frame that robot.yaml declares for the payload, else in the URDF frame `frame`, else in that of the last link. With
-    `out`, estimates and results.json go to that folder. Raises `FlexcalError` where neither tells of the robot's dynamics, a log does not
-    fit the robot, says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and
-    as `identify_payload` does; nothing is written then.
+    `logs` and `free` are files, or folders of trajectories as 'measure' leaves them. Of the robot itself its estimates tell, all blocks
+    but that of the payload, or the logs `free` without payload, or both together. The values are in the frame that robot.yaml declares
+    for the payload, else in the URDF frame `frame`, else in that of the last link. With `out`, estimates, results.json, predictions.npz
+    and report.html go to that folder. Raises `FlexcalError` where neither tells of the robot's dynamics, a log does not fit the robot,
+    says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and as
+    `identify_payload` does; nothing is written then.
     """
     loaded, unloaded = RecordedLogs.of(logs), RecordedLogs.of(free)
     _require_plans(loaded, unloaded)
@@ -141,11 +154,13 @@ def identify_robot_payload(
         known = blocks.get("dynamics")
         for number in range(_ROUGH if model.elastic else 0):
             progress("payload", number / (_ROUGH + 1))
-            rough = _fit(model, read, carries, known, (), treatment)
+            rough = identify_payload(PayloadSystem.of(model, read, carries, known, (), treatment).equations)
             model = model.with_values(rough.estimate.values)
         progress("payload", _ROUGH / (_ROUGH + 1))
-        fit = _fit(model, read, carries, known, error_sources(model), treatment)
+        system = PayloadSystem.of(model, read, carries, known, error_sources(model), treatment)
+        fit = identify_payload(system.equations)
         model = model.with_values(fit.estimate.values)
+        predictions = [] if out is None else system.predictions(fit)
         progress("payload", 1.0)
     if fit.error > _SENSELESS:
         raise InputError(
@@ -160,10 +175,25 @@ def identify_robot_payload(
     )
     estimate = replace(fit.estimate, provenance=origin | {PAYLOAD_FRAME: frame})
     target = source if out is None else out / ESTIMATES
-    result = RobotPayload(nominal, model, frame, replace(fit, estimate=estimate), blocks, treatment, target)
+    result = RobotPayload(
+        declared=nominal,
+        model=model,
+        frame=frame,
+        fit=replace(fit, estimate=estimate),
+        blocks=blocks,
+        treatment=treatment,
+        loaded=loaded.files,
+        free=unloaded.files,
+        estimates=target,
+        command=command,
+    )
     store_block(source, target, blocks, "payload", estimate)
     if out is not None:
+        from flexcal.workflow.report_folder import report_folder
+
         write_results(out, result.document())
+        write_predictions(out, predictions)
+        report_folder(out)
     return result
 
 
@@ -186,9 +216,10 @@ def _slow(treatment: Treatment, model: RobotModel, logs: Sequence[Path]) -> Trea
         return treatment
     rate = min(1.0 / next(log_blocks(log, model)).time_step for log in logs)
     slowest = Decimation.near(rate / _ROWS_HZ)
-    return (
-        treatment if treatment.decimation.factor >= slowest.factor else replace(treatment, decimation=slowest)
-    )
+    if treatment.decimation.factor >= slowest.factor:
+        return treatment
+    chosen = tuple(dict.fromkeys((*treatment.proposed, "decimation")))
+    return replace(treatment, decimation=slowest, proposed=chosen)
 
 
 def _require_news(free: Sequence[Path], blocks: Mapping[Block, Estimate]) -> None:
@@ -223,31 +254,3 @@ def _require_payloads(logs: Sequence[JointLog], loaded: Sequence[bool]) -> None:
             raise InputError(
                 f"{log.path}: recorded with a payload of {log.payload:g} kg, but --free takes recordings without."
             )
-
-
-def _fit(
-    model: RobotModel,
-    logs: Sequence[JointLog],
-    loaded: Sequence[bool],
-    dynamics: Estimate | None,
-    sources: tuple[str, ...],
-    treatment: Treatment,
-) -> PayloadFit:
-    """With springs that yield under the payload of the `model`."""
-    plain = Observation(model, CLASSIC)
-    base = BaseParameters.of(plain)
-    prior = RobotPrior.of(plain, base, dynamics, sources)
-    systems, wide = [], plain
-    for log, held in zip(logs, loaded, strict=True):
-        wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, sources, None if held else 0.0)))
-        systems += log_systems(
-            [LogPart(log, Window())],
-            wide,
-            treatment,
-            batches=batches_each(len(logs)),
-            jobs=1,
-            progress=silent,
-        )
-    assert model.payload is not None
-    data = RegressionData.of(wide, base, systems)
-    return identify_payload(PayloadEquations(data, loaded, model.payload, prior))

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
 from flexcal.dynamics import JointLog, Observation, TorquePrediction, predict_torques
-from flexcal.estimation import Estimate
 from flexcal.progress import Progress
 from flexcal.workflow.treatment import Treatment
 
@@ -18,18 +19,16 @@ _FEWEST = 300
 def log_predictions(
     logs: Sequence[JointLog],
     held_out_from: Sequence[float],
-    observation: Observation,
-    estimate: Estimate,
+    predicted: Sequence[tuple[Observation, np.ndarray]],
     treatment: Treatment,
     *,
     progress: Progress,
 ) -> list[TorquePrediction]:
-    """One a log, which the fit did not see from its time `held_out_from` on, s."""
-    parameters = estimate.parameters.coordinates()
+    """One a log, which the fit did not see from its time `held_out_from` on, s; `predicted` has each one's columns and parameters (p,)."""
     points = max(_FEWEST, _POINTS // len(logs))
     found = []
     progress("report", 0.0)
-    for log, border in zip(logs, held_out_from, strict=True):
+    for log, border, (observation, parameters) in zip(logs, held_out_from, predicted, strict=True):
         prediction = predict_torques(
             observation, parameters, log, treatment.decimation, held_out_from=border, points=points
         )

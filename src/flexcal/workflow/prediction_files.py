@@ -1,4 +1,4 @@
-"""What identify dynamics leaves of measured and predicted torques: predictions.npz."""
+"""What identify dynamics and identify payload leave of measured and predicted torques: predictions.npz."""
 
 from __future__ import annotations
 
@@ -48,4 +48,6 @@ def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
                 for k, name in enumerate(file["names"])
             )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise InputError(f"{path} cannot be read ({problem}); run identify dynamics again.") from problem
+        raise InputError(
+            f"{path} cannot be read ({problem}); run the verb that leaves it again."
+        ) from problem

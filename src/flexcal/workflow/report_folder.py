@@ -13,6 +13,7 @@ from flexcal.report.calibration import CalibrationStudy, write_calibration_repor
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.report.gains import write_gains_report
 from flexcal.report.inertials import InertialsStudy, write_inertials_report
+from flexcal.report.payload import PayloadStudy, write_payload_report
 from flexcal.report.publication import TX90L_PAPER
 from flexcal.report.stiffness import StiffnessStudy, write_stiffness_report
 from flexcal.report.study import TwoStageStudy
@@ -29,9 +30,10 @@ from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
 
 REPORT = "report.html"
 _DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"
+_PAYLOAD = "declaration"
 OF_CALIBRATION, OF_VERIFICATION, OF_DEMO = "term_selection", "rms_mm", "calibration_fit"
-"""What results.json of `identify dynamics`, `inertials`, `gains` and `stiffness`, of `calibrate`, of `verify` and of `demo` holds, and no
-other; the demo has a `stage1` too."""
+"""What results.json of `identify dynamics`, `inertials`, `gains`, `stiffness` and `payload`, of `calibrate`, of `verify` and of `demo`
+holds, and no other; the demo has a `stage1` too."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -49,6 +51,9 @@ def report_folder(folder: Path) -> Path:
             write_inertials_report(path, InertialsStudy(results, _block(folder, "dynamics")))
         elif _GAINS in results:
             write_gains_report(path, results)
+        elif _PAYLOAD in results:
+            payload = PayloadStudy(results, _block(folder, "payload"), read_predictions(folder))
+            write_payload_report(path, payload)
         elif _DYNAMICS in results:
             dynamics = DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder))
             write_dynamics_report(path, dynamics)
@@ -64,7 +69,7 @@ def report_folder(folder: Path) -> Path:
             write_stiffness_report(path, stiffness)
         else:
             raise InputError(
-                f"{folder / RESULTS} holds no calibration, verification, stiffness or dynamics; give the folder of one of these."
+                f"{folder / RESULTS} holds no calibration, verification, stiffness, dynamics or payload; give the folder of one of these."
             )
     except KeyError as problem:
         raise lacking(folder, problem) from problem

@@ -10,14 +10,21 @@ from flexcal.dynamics import TorquePrediction
 from flexcal.report.figures.torque_spectra import torque_spectra
 from flexcal.report.figures.torque_traces import torque_traces
 from flexcal.report.notation import significant
-from flexcal.report.page import Block, FigureBlock, Section, Selector, Table
+from flexcal.report.page import Block, FigureBlock, Selector, Table
 
 
-def torques_section(
-    results: Mapping[str, Any], held_out: str, predictions: Sequence[TorquePrediction]
-) -> Section:
-    """Errors by joint and, where there are `predictions`, the torques themselves; `held_out` says what the fit never saw, if anything."""
-    error = results["error_percent"]
+def recording_labels(predictions: Sequence[TorquePrediction]) -> tuple[str, ...]:
+    """What a reader chooses recordings by: their numbers, from 1, and the names of their files."""
+    return tuple(f"{k}: {PurePath(log.name).name}" for k, log in enumerate(predictions, 1))
+
+
+def torque_blocks(
+    error: Mapping[str, Any], held_out: str, logs: Mapping[str, TorquePrediction]
+) -> tuple[Block, ...]:
+    """Errors by joint (results.json: error_percent) and, where there are `logs`, the torques themselves, by label.
+
+    `held_out` says what the fit never saw, if anything.
+    """
     where = held_out or "the recordings of the fit"
     rows = [(joint, significant(value, 3)) for joint, value in error["per_joint"].items()]
     overall = error["held_out"] if held_out else error["train"]
@@ -31,18 +38,11 @@ def torques_section(
             strong=(len(rows) - 1,),
         )
     ]
-    if predictions:
+    if logs:
         joints = tuple(error["per_joint"])
-        labels = [f"{k}: {PurePath(log.name).name}" for k, log in enumerate(predictions, 1)]
-        logs = dict(zip(labels, predictions, strict=True))
-        choice = (Selector("recording", "log", tuple(labels)),) if len(labels) > 1 else ()
+        choice = (Selector("recording", "log", tuple(logs)),) if len(logs) > 1 else ()
         blocks += [_traces(joints, logs, choice), _spectra(joints, logs, choice)]
-    return Section(
-        "torques",
-        "Torques: predicted against measured",
-        "What counts is whether the robot's torques are predicted in motions that the fit never saw.",
-        tuple(blocks),
-    )
+    return tuple(blocks)
 
 
 def _traces(
@@ -50,12 +50,14 @@ def _traces(
 ) -> FigureBlock:
     stride = max(log.stride for log in logs.values())
     thinned = f" Of a long recording only one row in up to {stride} is drawn." if stride > 1 else ""
+    unseen = any(log.held_out.any() for log in logs.values())
+    red = ", red in the part that the fit never saw" if unseen else ""
     return FigureBlock(
         "figure-torques",
         "Torques over time",
         torque_traces(joints, logs),
-        "Grey is the motor torque as measured, at the joint; blue is predicted in the part that was fitted, red in the part that the fit "
-        f"never saw. Standstill is drawn too, though it was not fitted.{thinned}",
+        "Grey is the motor torque as measured, at the joint; blue is predicted in the part that was fitted"
+        f"{red}. Standstill is drawn too, though it was not fitted.{thinned}",
         f"Measured and predicted torque of {len(joints)} joints against time.",
         choice,
     )

@@ -1,0 +1,128 @@
+"""The questions that decide whether an identified payload can be trusted, each answered from results.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.dynamics_checks import LARGE, TOO_LARGE
+from flexcal.report.notation import significant
+from flexcal.report.page import Check
+
+BODILESS = 29.6
+"""Sum of ten squared normal errors that one in a thousand exceeds: the rise of the nearest body from which none fits."""
+UNLIKE = 3.0
+"""Times what must be missed of the torques that is too much."""
+_WIDE = 0.05
+"""1σ over the mass from which it is not known well."""
+
+
+def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    """The checks behind the verdict."""
+    return (
+        _check_torques(results["error_percent"]),
+        _check_body(results["body_rise"]),
+        _check_mass(results["parameters"]["payload.mass"]),
+        _check_told(results["parameters"]),
+        _check_declared(results["parameters"]["payload.mass"], results["declared"]),
+        _check_others(results["other_payloads"]),
+    )
+
+
+def _check_torques(error: Mapping[str, Any]) -> Check:
+    question = "Do robot and payload explain the torques?"
+    train, best = error["train"], error["best"]
+    answer = f"{significant(train, 3)} % of their norm is missed"
+    answer += (
+        f"; fitted by itself, every joint of every recording would leave {significant(best, 3)} %."
+        if best
+        else "."
+    )
+    if train > TOO_LARGE:
+        return Check(question, f"{answer} These are not the torques of this robot with a payload.", "bad")
+    if best and train > UNLIKE * best:
+        return Check(
+            question,
+            f"{answer} The robot's own dynamics do not fit these recordings: identify them again, or give recordings with --free.",
+            "care",
+        )
+    if train > LARGE:
+        return Check(question, f"{answer} That is a lot; look at the torques below.", "care")
+    return Check(question, answer, "good")
+
+
+def _check_body(rise: float) -> Check:
+    question = "Is it a body that could be built?"
+    if rise > BODILESS:
+        return Check(
+            question,
+            f"No body has what these torques ask for: the nearest one raises the sum of squares by {significant(rise, 3)}, and chance by "
+            f"{BODILESS:g} once in a thousand. Check the drive gains, the robot's own dynamics and the frame.",
+            "care",
+        )
+    if rise > 0:
+        return Check(
+            question,
+            f"The nearest one is: it raises the sum of squares by {significant(rise, 3)}, which noise explains.",
+            "good",
+        )
+    return Check(question, "Yes: mass and inertia came out as a body's are.", "good")
+
+
+def _check_mass(mass: Mapping[str, float]) -> Check:
+    question = "Is the mass known well?"
+    share = 100 * mass["std"] / mass["estimate"]
+    if share > 100 * _WIDE:
+        return Check(
+            question,
+            f"Only to {significant(share, 2)} % (1σ); move the joints that lift it through more of their range, or give more recordings.",
+            "care",
+        )
+    return Check(question, f"To {significant(share, 2)} % (1σ).", "good")
+
+
+def _check_told(parameters: Mapping[str, Mapping[str, Any]]) -> Check:
+    question = "Do the recordings tell all of it?"
+    hidden = [name.removeprefix("payload.") for name, item in parameters.items() if not item["identifiable"]]
+    if not hidden:
+        return Check(question, "Mass, centre of mass and inertia are told.", "good")
+    names = ", ".join(hidden)
+    if any(name.startswith("com") for name in hidden):
+        return Check(
+            question,
+            f"Not {names}; turn the payload about other axes, so that gravity comes from more sides.",
+            "care",
+        )
+    return Check(
+        question,
+        f"All but the inertia ({names}), which takes faster turns; positions at rest do not depend on it.",
+        "good",
+    )
+
+
+def _check_declared(mass: Mapping[str, float], declared: Mapping[str, float] | None) -> Check:
+    question = "Is the mass what robot.yaml declares?"
+    if declared is None:
+        return Check(question, "robot.yaml declares no payload to compare with.", "unknown")
+    weight = declared["payload.mass"]
+    if mass["low"] <= weight <= mass["high"]:
+        return Check(question, f"Yes: {weight:g} kg lies within the 95 % interval.", "good")
+    far = abs(mass["estimate"] - weight) / weight if weight > 0 else None
+    size = "" if far is None else f"{significant(100 * far, 2)} % "
+    side = "above" if mass["estimate"] > weight else "below"
+    return Check(
+        question,
+        f"No: it is {size}{side} the declared {weight:g} kg. What was identified counts where these estimates are read; if a scale "
+        "agrees with robot.yaml, the torques or the robot's own dynamics are off.",
+        "care",
+    )
+
+
+def _check_others(others: Mapping[str, float]) -> Check:
+    question = "Were the robot's other estimates made with this payload?"
+    if not others:
+        return Check(question, "None was made with another one.", "good")
+    found = ", ".join(f"'{name}' with {mass:.4g} kg" for name, mass in others.items())
+    return Check(
+        question, f"Not {found}; if the robot held this payload then, make these estimates again.", "care"
+    )

@@ -1,0 +1,22 @@
+"""What was done to joint logs before their equations were written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.notation import significant
+from flexcal.report.page import Table
+
+
+def signals_table(signals: Mapping[str, Any]) -> Table:
+    """Cut-off and decimation, and who chose them, from `signals` of results.json."""
+
+    def origin(key: str) -> str:
+        return "chosen by flexcal" if key in signals["proposed"] else "robot.yaml"
+
+    rows = (
+        ("low-pass cut-off of the positions / Hz", significant(signals["cutoff_hz"]), origin("cutoff_hz")),
+        ("decimation: samples to one row", str(signals["decimation"]), origin("decimation")),
+    )
+    return Table("table-signals", "Signals used", ("what", "value", "from"), rows, text_columns=(2,))
