@@ -50,7 +50,7 @@ def test_quantiles_leave_out_uncertain_flanks(study: TwoStageStudy) -> None:
 
 def test_levels_show_response_noise_and_distortion(study: TwoStageStudy) -> None:
     response = study.responses[0]
-    figure = response_levels(response)
+    figure = response_levels([response], ["pose 1"])
     assert len(figure.data) == 27
     np.testing.assert_allclose(figure.data[0].y, np.abs(response.response[:, 0, 0]), rtol=1e-6)
     np.testing.assert_allclose(figure.data[3 * 5 + 2].y, response.noise_std[:, 1, 2], rtol=1e-6)

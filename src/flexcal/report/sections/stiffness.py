@@ -8,11 +8,11 @@ import numpy as np
 
 from flexcal.estimation import Estimate
 from flexcal.report.figures.response_fit import response_fit
-from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.spring_intervals import spring_intervals
 from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.notation import percent, significant
 from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text
+from flexcal.report.sections.responses import levels_block
 from flexcal.report.sections.springs import spring_table, unseen_springs
 from flexcal.report.study import TwoStageStudy
 from flexcal.units import DEGREE
@@ -57,7 +57,12 @@ def response_blocks(responses: Sequence[FittedResponse], estimate: Estimate) -> 
     """Figs. 5 and 7-9, and how well the model fits in every pose."""
     labels = tuple(f"Pose {response.pose + 1}" for response in responses)
     return (
-        _measured_figure(responses[0], labels[0]),
+        levels_block(
+            "figure-5",
+            f"Figure 5: the measured frequency response, {labels[0].lower()}",
+            responses[:1],
+            labels[:1],
+        ),
         FigureBlock(
             "figure-7",
             "Figures 7 to 9: measured responses against the fitted model",
@@ -71,19 +76,6 @@ def response_blocks(responses: Sequence[FittedResponse], estimate: Estimate) -> 
     )
 
 
-def _measured_figure(response: FittedResponse, label: str) -> FigureBlock:
-    """Fig. 5: one measured frequency response."""
-    return FigureBlock(
-        "figure-5",
-        f"Figure 5: the measured frequency response, {label.lower()}",
-        response_levels(response),
-        f"How strongly each motor accelerates (row) for a torque on each motor (column), at {len(response.frequencies_hz)} frequencies. "
-        "Valleys and peaks are the arm swinging on its springs. The lower curves are one standard deviation of the mean: noise of "
-        "the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
-        _levels_in_words(response),
-    )
-
-
 def _experiment(study: TwoStageStudy) -> str:
     plan = study.plan
     minutes = len(plan.poses) * plan.recordings_per_pose * plan.duration / 60
@@ -91,16 +83,6 @@ def _experiment(study: TwoStageStudy) -> str:
     return (
         f"Here: {len(plan.poses)} poses, {len(plan.lines)} frequencies from {low:.1f} to {high:.1f} Hz, {plan.realisations} random draws, "
         f"{minutes:.0f} minutes of shaking in all."
-    )
-
-
-def _levels_in_words(response: FittedResponse) -> str:
-    size = np.abs(np.diagonal(response.response, axis1=1, axis2=2))
-    share = np.median(np.diagonal(response.std, axis1=1, axis2=2) / size)
-    noise = np.median(np.diagonal(response.noise_std, axis1=1, axis2=2) / size)
-    return (
-        f"Grid of {len(response.joints)} by {len(response.joints)} magnitudes against frequency. On the diagonal the standard deviation "
-        f"of the mean is {percent(float(share))} of the response at the median frequency, {percent(float(noise))} from noise alone."
     )
 
 

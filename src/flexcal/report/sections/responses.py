@@ -1,0 +1,25 @@
+"""Measured frequency responses in the report: how strongly motors accelerate, and how surely that is known."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flexcal.report.figures.response_levels import response_levels
+from flexcal.report.measured_response import MeasuredResponse, in_words
+from flexcal.report.page import FigureBlock, Selector
+
+
+def levels_block(
+    id: str, title: str, responses: Sequence[MeasuredResponse], labels: Sequence[str]
+) -> FigureBlock:
+    """Fig. 5 of each response, one shown at a time."""
+    return FigureBlock(
+        id,
+        title,
+        response_levels(responses, labels),
+        f"How strongly each motor accelerates (row) for a torque on each motor (column), at {len(responses[0].frequencies_hz)} "
+        "frequencies. Valleys and peaks are the arm swinging on its springs. The lower curves are one standard deviation of the mean: "
+        "noise of the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
+        in_words(responses),
+        (Selector("Pose", "pose", tuple(labels)),) if len(labels) > 1 else (),
+    )
