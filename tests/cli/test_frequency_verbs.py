@@ -21,7 +21,7 @@ from flexcal.cli.main import main
 from flexcal.cli.verbs import find_verb
 from flexcal.data import MultisinePlan, read_plan_of, write_plan
 from flexcal.elasticity import PopulationSearch
-from flexcal.estimates_file import read_estimates
+from flexcal.estimates_file import read_estimates, sha256_of
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -142,6 +142,11 @@ def test_responses(run, recorded: Path, tmp_path: Path) -> None:
     assert np.median(np.abs(first.std / first.response)[:, [0, 1, 2], [0, 1, 2]]) < 0.2
     document = run(*arguments, "--json").document
     assert [entry["pose"] for entry in document["responses"]] == [1, 2]
+    page = (tmp_path / "report.html").read_text("utf-8")
+    for file in (recorded / "robot.yaml", recorded / "recorded" / "plan.yaml", recorded / "recorded" / LOG):
+        assert sha256_of(file) in page, file
+    assert run("report", tmp_path).status == 0
+    assert (tmp_path / "report.html").read_text("utf-8") == page
 
 
 def test_one_realisation_takes_the_local_polynomial_method(run, recorded: Path, tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any, Literal, cast
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json, Robot, require_robot
 
@@ -21,7 +22,7 @@ class IdentifyResponse:
         Positional[Path], arg(metavar="DIR", help="folder with plan.yaml and one joint log per recording")
     ]
     out: Annotated[Path, arg(metavar="DIR")] = Path("responses")
-    """Folder for the responses."""
+    """Folder for the responses, report.html and results.json."""
     method: Literal[
         "arithmetic",
         "logarithmic",
@@ -43,7 +44,10 @@ class IdentifyResponse:
         console = Console(self.json)
         with console.progress() as progress:
             method = cast(Any, self.method.replace("-", "_"))
-            found = identify_response(self.robot, self.folder, self.out, method=method, progress=progress)
+            found = identify_response(
+                self.robot, self.folder, self.out, method=method, command=command_line(), progress=progress
+            )
         document = found.document()
         console.show(response_table(document["responses"]))
+        console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify stiffness {self.robot} {self.out}")

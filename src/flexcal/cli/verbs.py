@@ -154,7 +154,7 @@ STEPS = (
                 "IdentifyResponse",
                 "recordings to frequency responses with their covariance",
                 "flexcal identify response robot.yaml frequency --out responses",
-                ("plan.yaml", "response_pose_*.npz", "results.json"),
+                ("plan.yaml", "response_pose_*.npz", "results.json", "report.html"),
             ),
             Verb(
                 ("identify", "stiffness"),

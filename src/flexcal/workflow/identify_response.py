@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.data import FolderCell, MultisinePlan, Recording, write_plan
-from flexcal.data.experiment_folder import PLAN
+from flexcal.data import FolderCell, MultisinePlan, Recording, labels, write_plan
+from flexcal.data.experiment_folder import PLAN, existing_file
 from flexcal.errors import InputError
+from flexcal.estimates_file import provenance
 from flexcal.frequency import (
     Average,
     FrequencyResponse,
@@ -20,19 +21,31 @@ from flexcal.frequency import (
 )
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.measured_response import relative_to_diagonal
 from flexcal.workflow.results import write_results
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedResponses:
-    """The responses by pose, and the files they are in."""
+    """The responses by pose, and the files they are in.
+
+    `provenance` has all files that they come from, with their hashes, `command` the command line, where there was one.
+    """
 
     responses: tuple[FrequencyResponse, ...]
     files: tuple[Path, ...]
+    robot: str
+    provenance: Mapping[str, str]
+    command: str = ""
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; the relative numbers are medians over lines and diagonal elements."""
-        return {"responses": [_summary(r, f) for r, f in zip(self.responses, self.files, strict=True)]}
+        return {
+            "robot": self.robot,
+            "responses": [_summary(r, f) for r, f in zip(self.responses, self.files, strict=True)],
+            "provenance": dict(self.provenance),
+            "command": self.command,
+        }
 
 
 def identify_response(
@@ -41,12 +54,13 @@ def identify_response(
     out: Path,
     *,
     method: Average | Literal["local_polynomial"] = "arithmetic",
+    command: str = "",
     progress: Progress = silent,
 ) -> IdentifiedResponses:
     """Reduce the joint logs in `folder` to response_pose_<p>.npz in `out`, streaming: no two recordings are ever in memory.
 
     `method` averages the realisations in one of the ways of `frequency_response`, or is the local polynomial method. The plan goes with
-    the responses: the fit of stage 1 needs its reference motion.
+    the responses: the fit of stage 1 needs its reference motion. results.json and report.html go there too.
     Raises `FlexcalError` where a log is missing, has gaps or does not fit the plan.
     """
     model = RobotModel.from_yaml(robot, estimates=False)
@@ -67,8 +81,13 @@ def identify_response(
     for response, file in zip(responses, files, strict=True):
         response.save(file)
     write_plan(out / PLAN, plan)
-    result = IdentifiedResponses(responses, files)
+    logs = [existing_file(folder, label.name) for label in labels(plan)]
+    origin = provenance([robot, model.urdf, folder / PLAN, *logs], {"method": method})
+    result = IdentifiedResponses(responses, files, model.name, origin, command)
+    from flexcal.workflow.report_folder import report_folder
+
     write_results(out, result.document())
+    report_folder(out)
     return result
 
 
@@ -81,8 +100,7 @@ def _counted(recordings: Iterable[Recording], total: int, progress: Progress) ->
 
 def _summary(response: FrequencyResponse, file: Path) -> dict[str, Any]:
     def relative(std: np.ndarray) -> float:
-        diagonal = np.diagonal(std / np.abs(response.response), axis1=1, axis2=2)
-        return float(np.median(diagonal))
+        return float(np.median(relative_to_diagonal(std, response.response)))
 
     return {
         "pose": response.pose + 1,

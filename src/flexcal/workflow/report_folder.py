@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from flexcal.data import MultisinePlan, read_plan_of
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
+from flexcal.frequency import FrequencyResponse
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.report.gains import write_gains_report
 from flexcal.report.inertials import InertialsStudy, write_inertials_report
 from flexcal.report.payload import PayloadStudy, write_payload_report
 from flexcal.report.publication import TX90L_PAPER
+from flexcal.report.response import ResponseStudy, write_response_report
 from flexcal.report.stiffness import StiffnessStudy, write_stiffness_report
 from flexcal.report.study import TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
@@ -30,10 +34,10 @@ from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
 
 REPORT = "report.html"
 _DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"
-_PAYLOAD = "declaration"
+_PAYLOAD, _RESPONSES = "declaration", "responses"
 OF_CALIBRATION, OF_VERIFICATION, OF_DEMO = "term_selection", "rms_mm", "calibration_fit"
-"""What results.json of `identify dynamics`, `inertials`, `gains`, `stiffness` and `payload`, of `calibrate`, of `verify` and of `demo`
-holds, and no other; the demo has a `stage1` too."""
+"""What results.json of `identify dynamics`, `inertials`, `gains`, `stiffness`, `payload` and `response`, of `calibrate`, of `verify` and of
+`demo` holds, and no other; the demo has a `stage1` too."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -67,9 +71,11 @@ def report_folder(folder: Path) -> Path:
         elif _STIFFNESS in results:
             stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted(folder))
             write_stiffness_report(path, stiffness)
+        elif _RESPONSES in results:
+            write_response_report(path, ResponseStudy(results, _responses(folder, results)))
         else:
             raise InputError(
-                f"{folder / RESULTS} holds no calibration, verification, stiffness, dynamics or payload; give the folder of one of these."
+                f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these."
             )
     except KeyError as problem:
         raise lacking(folder, problem) from problem
@@ -103,6 +109,10 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
         fresh=read_verification(folder / VERIFICATION),
         paper=TX90L_PAPER if results["robot"] == "tx90l" else None,
     )
+
+
+def _responses(folder: Path, results: Mapping[str, Any]) -> tuple[FrequencyResponse, ...]:
+    return tuple(FrequencyResponse.load(folder / Path(entry["file"]).name) for entry in results[_RESPONSES])
 
 
 def _block(folder: Path, block: Block) -> Estimate:

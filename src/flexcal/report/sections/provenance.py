@@ -10,6 +10,9 @@ from flexcal.estimation import Estimate
 from flexcal.report.page import Block as PageBlock
 from flexcal.report.page import Section, Table, Text
 
+_MANY = 20
+"""Input files from which they have a table of their own, folded: an experiment of several poses has hundreds."""
+
 
 def provenance_section(
     command: str, seed: int | None, seconds: Mapping[str, float], origin: Mapping[str, str]
@@ -18,10 +21,16 @@ def provenance_section(
     rows = [] if "program" in origin else [("program", f"flexcal {version('flexcal')}")]
     rows += [("command", command)] if command else []
     rows += [("seed of all random numbers", str(seed))] if seed is not None else []
-    rows += [(name, value) for name, value in origin.items()]
+    files = [(name, value) for name, value in origin.items() if name.startswith("input.")]
+    many = files if len(files) > _MANY else []
+    rows += [(name, value) for name, value in origin.items() if (name, value) not in many]
     blocks: list[PageBlock] = [
         Table("table-provenance", "What made this report", ("what", "value"), tuple(rows), text_columns=(1,))
     ]
+    if many:
+        caption, columns = f"The {len(many)} files that it was made from", ("file", "SHA-256")
+        named = tuple((name.removeprefix("input."), value) for name, value in many)
+        blocks.append(Table("table-inputs", caption, columns, named, text_columns=(1,), folded=True))
     if seconds:
         spent = {name: value for name, value in seconds.items() if value > 0}
         spent |= {"total": sum(spent.values())} if "total" not in spent else {}

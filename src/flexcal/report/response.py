@@ -1,0 +1,146 @@
+"""The report of measured frequency responses (`flexcal identify response`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.frequency import FrequencyResponse
+from flexcal.report.measured_response import relative_to_diagonal
+from flexcal.report.notation import NOTHING, percent
+from flexcal.report.page import Fact, Page, Section, Status, Table, Verdict, tally, worst
+from flexcal.report.render import write_page
+from flexcal.report.response_checks import limit_of, response_checks, worst_pose
+from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.sections.responses import levels_block
+from flexcal.units import DEGREE
+
+_TRUST: dict[Status, tuple[str, str]] = {
+    "good": ("Yes", "Measured, and springs can be fitted to them"),
+    "care": ("With care", "Measured; read what is not sure below before fitting springs to them"),
+    "bad": ("No", "These responses are too uncertain to fit springs to"),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseStudy:
+    """Measured responses as the folder has them: the document of results.json, and its `responses` in the same order."""
+
+    results: Mapping[str, Any]
+    responses: Sequence[FrequencyResponse]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """What a reader calls the poses."""
+        return tuple(f"Pose {response.pose + 1}" for response in self.responses)
+
+
+def write_response_report(path: str | Path, study: ResponseStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, response_page(study))
+
+
+def response_page(study: ResponseStudy) -> Page:
+    """The page before it becomes HTML."""
+    results, first = study.results, study.responses[0]
+    poses = "pose" if len(study.responses) == 1 else "poses"
+    return Page(
+        title=f"{results['robot']}: frequency response report",
+        subtitle=f"From motor torque to motor acceleration of {', '.join(first.joints)} in {len(study.responses)} {poses}",
+        verdict=_verdict(study),
+        sections=(
+            Section(
+                "responses",
+                "Frequency responses",
+                "",
+                (
+                    _table(study),
+                    levels_block("figure-levels", "Measured responses", study.responses, study.labels),
+                ),
+            ),
+            provenance_section(results["command"], None, {}, results["provenance"]),
+        ),
+        document=results,
+    )
+
+
+def _verdict(study: ResponseStudy) -> Verdict:
+    entries = study.results["responses"]
+    checks = response_checks(entries, study.responses)
+    status = worst(checks)
+    answer, headline = _TRUST[status]
+    least, limit = worst_pose(entries), limit_of(entries)
+    advice = (
+        "More realisations lower it, more periods of the same do not."
+        if limit == "distortion"
+        else "More periods lower it, or larger torques."
+    )
+    facts = (
+        Fact(
+            "How well is the response known?",
+            percent(least["relative_std"]),
+            "1σ",
+            f"At the median line of the diagonal in pose {least['pose']}, the worst.",
+        ),
+        Fact(
+            "What limits it?",
+            limit.capitalize(),
+            "",
+            f"Noise alone would leave {percent(least['relative_noise_std'])} there. {advice}",
+        ),
+        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+    )
+    low, high = (function(entry[key] for entry in entries) for function, key in _BAND)
+    where = "1 pose" if len(entries) == 1 else f"{len(entries)} poses"
+    sentence = (
+        f"The motors were shaken in {where}, at {least['lines']} frequencies from {low:g} to {high:g} Hz; the "
+        "resonances of the springs must lie between them."
+    )
+    return Verdict(status, headline, sentence, facts, (), "", checks)
+
+
+_BAND = (min, "lowest_hz"), (max, "highest_hz")
+
+
+def _table(study: ResponseStudy) -> Table:
+    entries = study.results["responses"]
+    with_odd = any(entry["odd_distortion"] for entry in entries)
+    rows = []
+    for label, entry, response in zip(study.labels, entries, study.responses, strict=True):
+        distortion = float(np.median(relative_to_diagonal(response.distortion_std, response.response)))
+        angles = ", ".join(f"{q / DEGREE:z.1f}" for q in response.q_mean).replace("-", "−")
+        odd = percent(max(entry["odd_distortion"])) if entry["odd_distortion"] else NOTHING
+        rows.append(
+            (
+                label,
+                f"{angles}°",
+                "as declared" if response.payload is None else f"{response.payload:g} kg",
+                str(entry["lines"]),
+                f"{entry['lowest_hz']:g} to {entry['highest_hz']:g}",
+                percent(entry["relative_std"]),
+                percent(entry["relative_noise_std"]),
+                percent(distortion),
+                f"{entry['degrees_of_freedom']:.0f}",
+                *((odd,) if with_odd else ()),
+            )
+        )
+    columns = ("pose", "mean joint position", "payload", "lines", "band / Hz", "1σ", "of it noise")
+    columns += ("of it distortion", "degrees of freedom", *(("odd distortion",) if with_odd else ()))
+    return Table(
+        "table-responses",
+        "How well each pose is known",
+        columns,
+        tuple(rows),
+        "1σ is that of the mean over the response, at the median line of the diagonal; noise and distortion add up as squares, their "
+        f"medians nearly so. Realisations were averaged by the method '{entries[0]['method'].replace('_', '-')}'."
+        + (
+            " Odd distortion is what lines that were left out show, over the excited acceleration of the axis where it is largest."
+            if with_odd
+            else ""
+        ),
+        text_columns=(1,),
+    )

@@ -1,0 +1,115 @@
+"""The questions that decide whether measured frequency responses can be trusted."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.frequency import FrequencyResponse
+from flexcal.report.measured_response import relative_to_diagonal
+from flexcal.report.notation import percent, significant
+from flexcal.report.page import Check
+
+Limit = Literal["noise", "distortion"]
+
+_LARGE, _TOO_LARGE = 0.1, 0.3
+"""1σ over |G| from which a response is not known well, and from which its logarithm is not weighted right (to first order)."""
+_UNLIKE = 2.0
+"""Times the median pose's from which a pose stands out."""
+_FREEDOM = 20
+_SHOWN = 3
+_CURES: dict[Limit, str] = {
+    "noise": "Noise is what limits it: record more periods, or shake harder.",
+    "distortion": "Distortion is what limits it: record more realisations; more periods of the same do not lower it.",
+}
+
+
+def limit_of(entries: Sequence[Mapping[str, Any]]) -> Limit:
+    """What more than half of the variance is, of all poses together; `entries` are `responses` of results.json."""
+    noise, total = (
+        sum(entry[key] ** 2 for entry in entries) for key in ("relative_noise_std", "relative_std")
+    )
+    return "noise" if noise > total / 2 else "distortion"
+
+
+def worst_pose(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
+    """The one that is known least."""
+    return max(entries, key=lambda entry: entry["relative_std"])
+
+
+def response_checks(
+    entries: Sequence[Mapping[str, Any]], responses: Sequence[FrequencyResponse]
+) -> tuple[Check, ...]:
+    """The checks behind the verdict."""
+    return (
+        _check_known(entries),
+        _check_axes(responses),
+        _check_poses(entries),
+        _check_freedom(entries),
+    )
+
+
+def _check_known(entries: Sequence[Mapping[str, Any]]) -> Check:
+    question = "Are the responses known well?"
+    worst = worst_pose(entries)
+    answer = f"To {percent(worst['relative_std'])} (1σ, median over lines and axes) in pose {worst['pose']}, the worst."
+    if worst["relative_std"] > _TOO_LARGE:
+        return Check(question, f"{answer} {_CURES[limit_of(entries)]}", "bad")
+    if worst["relative_std"] > _LARGE:
+        return Check(question, f"{answer} {_CURES[limit_of(entries)]}", "care")
+    return Check(question, answer, "good")
+
+
+def _check_axes(responses: Sequence[FrequencyResponse]) -> Check:
+    question = "Is every axis seen in every pose?"
+    lost = [
+        f"{joint} in pose {response.pose + 1}"
+        for response in responses
+        for joint, share in zip(
+            response.joints,
+            np.median(relative_to_diagonal(response.std, response.response), axis=0),
+            strict=True,
+        )
+        if share > _TOO_LARGE
+    ]
+    if not lost:
+        return Check(question, f"Yes, to {100 * _TOO_LARGE:.0f} % or better at half of the lines.", "good")
+    more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
+    return Check(
+        question,
+        f"Not {', '.join(lost[:_SHOWN])}{more}: 1σ is more than {100 * _TOO_LARGE:.0f} % of the response at half of the lines. Shake these "
+        "axes harder.",
+        "care",
+    )
+
+
+def _check_poses(entries: Sequence[Mapping[str, Any]]) -> Check:
+    question = "Is every pose known as well as the others?"
+    if len(entries) == 1:
+        return Check(question, "There is one pose only.", "unknown")
+    worst, middle = worst_pose(entries), float(np.median([entry["relative_std"] for entry in entries]))
+    times = worst["relative_std"] / middle
+    if times > _UNLIKE:
+        return Check(
+            question,
+            f"Not pose {worst['pose']}: its standard deviation is {significant(times, 2)} times the median pose's; look at its recordings.",
+            "care",
+        )
+    return Check(
+        question, f"The worst is {significant(times, 2)} times as uncertain as the median one.", "good"
+    )
+
+
+def _check_freedom(entries: Sequence[Mapping[str, Any]]) -> Check:
+    question = "Is the uncertainty itself known?"
+    freedom = min(entry["degrees_of_freedom"] for entry in entries)
+    answer = (
+        f"It rests on {freedom:.0f} degrees of freedom, so it is known to {percent((2 * freedom) ** -0.5)}."
+    )
+    if freedom < _FREEDOM:
+        return Check(
+            question, f"{answer} Springs are weighted by it; measure more lines or realisations.", "care"
+        )
+    return Check(question, answer, "good")
