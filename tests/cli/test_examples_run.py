@@ -124,6 +124,7 @@ def virtual_robot(folder: Path, examples: Path) -> list[str]:
     run("flexcal design trajectory robot.yaml --loaded --out holding.yaml")
     run("flexcal measure holding.yaml --cell virtual --out loaded")
     run("flexcal identify payload robot.yaml loaded --out payload")
+    assert sha256_of("loaded/plan.yaml") in Path("payload/report.html").read_text("utf-8")
     run(example("identify payload"))
     for name in ("design frequency", "measure", "identify response", "identify stiffness", "design poses"):
         run(example(name))

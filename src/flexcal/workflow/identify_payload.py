@@ -168,7 +168,7 @@ def identify_robot_payload(
             "robot.yaml, and signs, units and gear ratios under `signals:`."
         )
     origin = provenance(
-        [robot, bare.urdf, *every],
+        [robot, bare.urdf, *loaded.plan_files, *unloaded.plan_files, *every],
         {"loaded": len(loaded.files), "free": len(unloaded.files)},
         source if blocks else None,
         tuple(blocks),

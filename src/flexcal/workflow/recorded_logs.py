@@ -14,23 +14,26 @@ from flexcal.model import RobotModel
 
 @dataclass(frozen=True)
 class RecordedLogs:
-    """Their `files`; of those in folders the `plans`, which say what a torque is over its sample."""
+    """Their `files`; of those in folders the `plans`, which say what a torque is over its sample, and the `plan_files` that have them."""
 
     files: tuple[Path, ...]
     plans: tuple[TrajectoryPlan, ...]
+    plan_files: tuple[Path, ...]
 
     @classmethod
     def of(cls, paths: Sequence[Path]) -> RecordedLogs:
         """Files, and folders as 'measure' leaves them; raises `InputError` for a folder that holds no trajectories."""
         files: list[Path] = []
         plans: list[TrajectoryPlan] = []
+        plan_files: list[Path] = []
         for path in paths:
             if path.is_dir():
+                plan_files.append(path / PLAN)
                 plans.append(read_plan_of(path / PLAN, TrajectoryPlan))
                 files += [existing_file(path, label.name) for label in labels(plans[-1])]
             else:
                 files.append(path)
-        return cls(tuple(files), tuple(plans))
+        return cls(tuple(files), tuple(plans), tuple(plan_files))
 
 
 def recorded_with(model: RobotModel, plans: Sequence[TrajectoryPlan]) -> RobotModel:
