@@ -1,16 +1,24 @@
-"""One simulated run for all report tests."""
+"""One simulated run and one identified payload for all report tests."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+import polars as pl
 import pytest
+from two_links import GAINS, HELD, swings, two_links
 from virtual_study import leave_run, simulate_run
 
+from flexcal.dynamics import CLASSIC, Observation
 from flexcal.model import RobotModel
 from flexcal.report import TwoStageStudy
+from flexcal.workflow.identify_payload import identify_robot_payload
 from flexcal.workflow.report_folder import report_folder, two_stage_study
 from flexcal.workflow.two_stage_run import TwoStageRun
+
+ROBOT = "dynamics: {cutoff_hz: 20, decimation: 2, friction: classic}\n"
+DECLARED = "payload: {frame: lower, mass: 3.0, com: [0.3, 0.07, 0], mass_std: 0.05}\n"
 
 
 @pytest.fixture(scope="session")
@@ -31,3 +39,23 @@ def report(simulated: TwoStageRun, tmp_path_factory: pytest.TempPathFactory) -> 
 def study(report: Path) -> TwoStageStudy:
     """What the folder holds."""
     return two_stage_study(report.parent)
+
+
+@pytest.fixture(scope="session")
+def payload_folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """What two links leave that hold 4 kg in one recording, nothing in another, and 3 kg in robot.yaml."""
+    home = tmp_path_factory.mktemp("arm")
+    observation = Observation(two_links(home, ROBOT), CLASSIC)
+    rng = np.random.default_rng(1)
+    for name, held, seed in (("free", 0 * HELD, 7), ("loaded", HELD, 9)):
+        motion = swings(observation, held, seed)
+        torque = motion.torque * GAINS + 0.1 * rng.normal(size=motion.torque.shape)
+        columns = {"t": motion.time} | {f"q{i + 1}": motion.q[:, i] for i in range(2)}
+        pl.DataFrame(columns | {f"tau{i + 1}": torque[:, i] for i in range(2)}).write_csv(
+            home / f"{name}.csv"
+        )
+    robot = home / "robot.yaml"
+    robot.write_text(robot.read_text() + DECLARED)
+    out, command = home / "out", "flexcal identify payload r l"
+    identify_robot_payload(robot, [home / "loaded.csv"], free=[home / "free.csv"], out=out, command=command)
+    return out

@@ -33,7 +33,19 @@ const look = setInterval(async function () {{
     const legend = p.querySelector("g.legend"), panel = p.querySelector(".cartesianlayer .bglayer, .cartesianlayer .plot");
     return legend && panel && legend.getBoundingClientRect().bottom > panel.getBoundingClientRect().top;
   }}).map(p => p.id).join();
-  const choice = frame.contentDocument.querySelector('select[data-figure="figure-7"]');
+  {more}
+  for (const folded of frame.contentDocument.querySelectorAll("details")) folded.open = true;
+  frame.contentWindow.eval(await (await fetch("axe.js")).text());
+  const found = await frame.contentWindow.axe.run(frame.contentDocument, {{ resultTypes: ["violations"] }});
+  document.body.dataset.violations = JSON.stringify(
+    found.violations.map(v => [v.id, v.impact, v.nodes.map(n => n.target.join(" ")).slice(0, 3)]));
+  document.body.dataset.dark = frame.contentWindow.matchMedia("(prefers-color-scheme: dark)").matches;
+  document.body.dataset.rules = found.passes.length;
+}}, 100);
+</script></body></html>"""
+
+
+OF_DEMO = """const choice = frame.contentDocument.querySelector('select[data-figure="figure-7"]');
   choice.value = "Pose 2";
   choice.dispatchEvent(new Event("change"));
   const shown = frame.contentDocument.getElementById("figure-7").data.filter(t => t.visible).map(t => t.meta.pose);
@@ -45,16 +57,8 @@ const look = setInterval(async function () {{
   slider.value = Number(slider.value) + 3;
   slider.dispatchEvent(new Event("input"));
   document.body.dataset.stretched = longest() / before;
-  document.body.dataset.said = slider.getAttribute("aria-valuetext");
-  for (const folded of frame.contentDocument.querySelectorAll("details")) folded.open = true;
-  frame.contentWindow.eval(await (await fetch("axe.js")).text());
-  const found = await frame.contentWindow.axe.run(frame.contentDocument, {{ resultTypes: ["violations"] }});
-  document.body.dataset.violations = JSON.stringify(
-    found.violations.map(v => [v.id, v.impact, v.nodes.map(n => n.target.join(" ")).slice(0, 3)]));
-  document.body.dataset.dark = frame.contentWindow.matchMedia("(prefers-color-scheme: dark)").matches;
-  document.body.dataset.rules = found.passes.length;
-}}, 100);
-</script></body></html>"""
+  document.body.dataset.said = slider.getAttribute("aria-valuetext");"""
+"""What only the demo's page has: poses to choose from, and arrows to stretch."""
 
 
 def browse(page: Path, profile: Path, *flags: str) -> str:
@@ -68,25 +72,36 @@ def browse(page: Path, profile: Path, *flags: str) -> str:
     return subprocess.run(command, capture_output=True, text=True, timeout=240, check=True).stdout
 
 
-@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1400, "dark")])
-def test_figures_are_drawn_and_fit_and_nobody_is_shut_out(
-    report: Path, tmp_path: Path, width: int, scheme: str
-) -> None:
+def seen(page: str, folder: Path, width: int, scheme: str, more: str = "") -> dict[str, str]:
+    """What the frame around the page found, by `more` besides; no barrier, nothing that overflows, every figure."""
     axe = pytest.importorskip("axe_core_python")
-    (tmp_path / "axe.js").write_bytes(files(axe).joinpath("axe.min.js").read_bytes())
-    (tmp_path / "report.html").write_bytes(report.read_bytes())
-    (tmp_path / "frame.html").write_text(FRAME.format(width=width), "utf-8")
+    (folder / "axe.js").write_bytes(files(axe).joinpath("axe.min.js").read_bytes())
+    (folder / "report.html").write_bytes(page.encode())
+    (folder / "frame.html").write_text(FRAME.format(width=width, more=more), "utf-8")
     preferred = f"--blink-settings=preferredColorScheme={0 if scheme == 'dark' else 1}"
-    dom = browse(tmp_path / "frame.html", tmp_path / "profile", "--window-size=1600,1000", preferred)
+    dom = browse(folder / "frame.html", folder / "profile", "--window-size=1600,1000", preferred)
     body = dom[dom.index("<body") : dom.index(">", dom.index("<body"))]
     found = {key: html.unescape(value) for key, value in re.findall(r'data-(\w+)="([^"]*)"', body)}
-    figures = len(Outline(report.read_text("utf-8")).figures())
+    figures = len(Outline(page).figures())
     assert int(found["drawn"]) == figures
     assert int(found["width"]) <= width
     assert int(found["wide"]) == 0
     assert found["covered"] == ""
-    assert found["pose"] == "Pose 2"
-    assert float(found["stretched"]) == pytest.approx(10, rel=1e-5) and found["said"].endswith("0 times")
     assert found["dark"] == str(scheme == "dark").lower() and int(found["rules"]) > 20
     barriers = [v for v in json.loads(found["violations"]) if v[1] in ("serious", "critical")]
     assert barriers == []
+    return found
+
+
+@pytest.mark.parametrize(("width", "scheme"), [(390, "light"), (1400, "dark")])
+def test_figures_are_drawn_and_fit_and_nobody_is_shut_out(
+    report: Path, tmp_path: Path, width: int, scheme: str
+) -> None:
+    found = seen(report.read_text("utf-8"), tmp_path, width, scheme, OF_DEMO)
+    assert found["pose"] == "Pose 2"
+    assert float(found["stretched"]) == pytest.approx(10, rel=1e-5) and found["said"].endswith("0 times")
+
+
+def test_a_long_name_of_a_recording_fits_a_telephone(payload_folder: Path, tmp_path: Path) -> None:
+    page = (payload_folder / "report.html").read_text("utf-8")
+    seen(page.replace("loaded.csv", f"{'loaded_' * 9}.csv"), tmp_path, 390, "light")

@@ -12,56 +12,34 @@ import numpy as np
 import polars as pl
 import pytest
 from outline import Outline
-from two_links import GAINS, HELD, swings, two_links
 
-from flexcal.dynamics import CLASSIC, Observation
 from flexcal.errors import InputError
 from flexcal.estimates_file import read_estimates
 from flexcal.report.notation import to_half_width
 from flexcal.report.payload import PayloadStudy, payload_page
 from flexcal.report.payload_checks import payload_checks
-from flexcal.workflow.identify_payload import identify_robot_payload
 from flexcal.workflow.prediction_files import read_predictions
 from flexcal.workflow.report_folder import report_folder
 
-ROBOT = "dynamics: {cutoff_hz: 20, decimation: 2, friction: classic}\n"
-DECLARED = "payload: {frame: lower, mass: 3.0, com: [0.3, 0.07, 0], mass_std: 0.05}\n"
+
+@pytest.fixture(scope="module")
+def outline(payload_folder: Path) -> Outline:
+    return Outline((payload_folder / "report.html").read_text("utf-8"))
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """What two links leave that hold 4 kg in one recording, nothing in another, and 3 kg in robot.yaml."""
-    home = tmp_path_factory.mktemp("arm")
-    observation = Observation(two_links(home, ROBOT), CLASSIC)
-    rng = np.random.default_rng(1)
-    for name, held, seed in (("free", 0 * HELD, 7), ("loaded", HELD, 9)):
-        motion = swings(observation, held, seed)
-        torque = motion.torque * GAINS + 0.1 * rng.normal(size=motion.torque.shape)
-        columns = {"t": motion.time} | {f"q{i + 1}": motion.q[:, i] for i in range(2)}
-        pl.DataFrame(columns | {f"tau{i + 1}": torque[:, i] for i in range(2)}).write_csv(
-            home / f"{name}.csv"
-        )
-    robot = home / "robot.yaml"
-    robot.write_text(robot.read_text() + DECLARED)
-    out, command = home / "out", "flexcal identify payload r l"
-    identify_robot_payload(robot, [home / "loaded.csv"], free=[home / "free.csv"], out=out, command=command)
-    return out
-
-
-@pytest.fixture(scope="module")
-def outline(folder: Path) -> Outline:
-    return Outline((folder / "report.html").read_text("utf-8"))
-
-
-@pytest.fixture(scope="module")
-def study(folder: Path) -> PayloadStudy:
-    results = json.loads((folder / "results.json").read_text())
+def study(payload_folder: Path) -> PayloadStudy:
+    results = json.loads((payload_folder / "results.json").read_text())
     return PayloadStudy(
-        results, read_estimates(folder / "estimates.yaml")["payload"], read_predictions(folder)
+        results,
+        read_estimates(payload_folder / "estimates.yaml")["payload"],
+        read_predictions(payload_folder),
     )
 
 
-def test_numbers_are_those_of_the_results(outline: Outline, study: PayloadStudy, folder: Path) -> None:
+def test_numbers_are_those_of_the_results(
+    outline: Outline, study: PayloadStudy, payload_folder: Path
+) -> None:
     """Written here in another way: by the decimals that two digits of half the interval have."""
     assert outline.unbalanced == []
     words, results = outline.words, study.results
@@ -74,14 +52,14 @@ def test_numbers_are_those_of_the_results(outline: Outline, study: PayloadStudy,
     assert "1 recording with the payload and 1 without" in words and "robot.yaml: 3 kg" in words
     assert "samples to one row 2 robot.yaml" in words and "flexcal identify payload r l" in words
     for file in ("loaded.csv", "free.csv", "robot.yaml", "two_links.urdf"):
-        assert hashlib.sha256((folder.parent / file).read_bytes()).hexdigest() in words
+        assert hashlib.sha256((payload_folder.parent / file).read_bytes()).hexdigest() in words
 
 
-def test_torques_are_those_of_the_logs(outline: Outline, study: PayloadStudy, folder: Path) -> None:
+def test_torques_are_those_of_the_logs(outline: Outline, study: PayloadStudy, payload_folder: Path) -> None:
     """Measured ones as the log has them but for its filter, and what is predicted misses as much as the results say."""
     loaded, free = study.predictions
     for log, name in ((loaded, "loaded"), (free, "free")):
-        table = pl.read_csv(folder.parent / f"{name}.csv")
+        table = pl.read_csv(payload_folder.parent / f"{name}.csv")
         tau = np.array([np.interp(log.time, table["t"], table[f"tau{i}"]) for i in (1, 2)]).T
         assert np.abs(log.measured - tau).max() < 1.0 and not log.held_out.any() and log.stride == 1
     missed = np.concatenate([log.measured - log.predicted for log in (loaded, free)])
@@ -97,14 +75,14 @@ def test_torques_are_those_of_the_logs(outline: Outline, study: PayloadStudy, fo
     }
 
 
-def test_the_folder_gives_the_same_page_again(folder: Path) -> None:
-    before = (folder / "report.html").read_bytes()
-    assert report_folder(folder).read_bytes() == before
+def test_the_folder_gives_the_same_page_again(payload_folder: Path) -> None:
+    before = (payload_folder / "report.html").read_bytes()
+    assert report_folder(payload_folder).read_bytes() == before
 
 
-def test_a_folder_without_its_torques_is_refused(folder: Path, tmp_path: Path) -> None:
+def test_a_folder_without_its_torques_is_refused(payload_folder: Path, tmp_path: Path) -> None:
     for name in ("results.json", "estimates.yaml", "estimates.npz"):
-        (tmp_path / name).write_bytes((folder / name).read_bytes())
+        (tmp_path / name).write_bytes((payload_folder / name).read_bytes())
     with pytest.raises(
         InputError, match=r"predictions.npz cannot be read .* run the verb that leaves it again"
     ):
