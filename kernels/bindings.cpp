@@ -1,6 +1,7 @@
 #include "bindings.hpp"
 
 NB_MODULE(KERNELS, m) {
+    nanobind::set_leak_warnings(false);  // the process ends without a search for cycles
     m.doc() = "flexcal's C++ kernels";
 #if defined(__x86_64__)
     m.attr("avx2") = static_cast<bool>(__builtin_cpu_supports("avx2"));

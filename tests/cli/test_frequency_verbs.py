@@ -189,7 +189,7 @@ def test_stiffness(run, recorded: Path, tmp_path: Path) -> None:
     first = estimates.read_bytes()
     document = run("identify", "stiffness", robot, tmp_path / "responses", "--json").document
     assert estimates.read_bytes() == first
-    assert document["fit"]["reference_motion_modelled"]
+    assert document["fit"]["reference_motion_modelled"] and document["fit"]["missing_poses"] == []
     truth = read_truth(recorded / "recorded" / "truth.yaml")
     pulls = []
     for joint, springs in document["stage1"]["stiffness"].items():
@@ -397,3 +397,11 @@ def test_no_verb_reads_the_truth(run, recorded: Path, tmp_path: Path) -> None:
     for truth in truths:
         truth.unlink()
     assert estimates() == found
+
+
+def test_a_pose_without_response_is_named(run, recorded: Path, tmp_path: Path) -> None:
+    robot = copied(recorded, tmp_path / "tx90l") / "robot.yaml"
+    run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
+    (tmp_path / "responses" / "response_pose_1.npz").unlink()
+    done = run("identify", "stiffness", robot, tmp_path / "responses")
+    assert done.status == 0 and "poses without a response, which the fit is without too: 1" in done.out

@@ -85,6 +85,15 @@ def test_the_printed_line_says_the_same(arm: Path, run: Run) -> None:
     assert set(read_estimates(out / "estimates.yaml")) == {"payload"}
 
 
+def test_a_recording_that_the_dynamics_were_made_from_tells_no_payload(arm: Path, run: Run) -> None:
+    robot, loaded = arm / "robot.yaml", arm / "loaded.csv"
+    declare(arm)
+    with_column(loaded, 3.0)
+    assert run("identify", "dynamics", robot, loaded).status == 0
+    done = run("identify", "payload", robot, loaded)
+    assert done.status == 2 and "would count twice" in done.err
+
+
 def test_from_identified_dynamics(arm: Path, run: Run) -> None:
     """The block in place of recordings without payload; those that it was made from would count twice, others help."""
     robot, loaded = arm / "robot.yaml", arm / "loaded.csv"

@@ -18,7 +18,7 @@ from test_bad_input import refused
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth
 from flexcal.cli.main import main
 from flexcal.data import FourierPaths, TrajectoryPlan, read_plan_of, write_plan
-from flexcal.estimates_file import read_estimates
+from flexcal.estimates_file import read_estimates, sha256_of
 from flexcal.model import RobotModel
 from flexcal.progress import silent
 from flexcal.report.notation import significant
@@ -242,3 +242,14 @@ def test_a_plan_of_more_trajectories_needs_all_logs(run, recorded: Path, tmp_pat
     write_plan(folder / "plan.yaml", replace(plan, paths=twice))
     arguments = ("identify", "inertials", recorded / "robot.yaml", folder)
     assert "realisation_2_experiment_1_plus" in refused(run, tmp_path, *arguments)
+
+
+def test_measurements_of_another_plan_are_kept(run, recorded: Path, tmp_path: Path) -> None:
+    """Without the refusal, the files of one plan would take the names of the other's."""
+    robot, folder = recorded / "robot.yaml", copied(recorded / "exciting", tmp_path / "exciting")
+    before = sha256_of(folder)
+    plan = tmp_path / "points.yaml"
+    assert run("design", "poses", robot, "--random", "--count", 3, "--out", plan).status == 0
+    done = run("measure", plan, "--robot", robot, "--cell", "virtual", "--out", folder)
+    assert done.status == 2 and "holds what was measured by another plan" in done.err
+    assert sha256_of(folder) == before

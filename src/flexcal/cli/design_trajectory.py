@@ -105,4 +105,5 @@ class DesignTrajectory:
             + ", ".join(f"{merit:.4g}" for merit in document["merits"])
         )
         console.say(f"pictures: {document['page']}")
-        console.finish(document, f"{measuring(self.out, self.robot, 'exciting')}, or record it on the robot")
+        folder = "loaded" if self.loaded else "exciting"
+        console.finish(document, f"{measuring(self.out, self.robot, folder)}, or record it on the robot")

@@ -57,7 +57,7 @@ class Export(ABC):
             console.say(sentence)
         following = self.following()
         if not found.calibrated:
-            console.say("there are no estimates: this is the nominal robot")
+            console.say("there is no calibration: the joints are where the nominal robot has them")
             following = f"flexcal calibrate {self.robot} POSES…, and export again"
         console.finish(document, following)
 

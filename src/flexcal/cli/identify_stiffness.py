@@ -76,6 +76,9 @@ class IdentifyStiffness:
             console.say(
                 "there is no plan.yaml beside the responses: the reference motion is ignored, damping comes out too large"
             )
+        if fit["missing_poses"]:
+            numbers = ", ".join(map(str, fit["missing_poses"]))
+            console.say(f"the plan has poses without a response, which the fit is without too: {numbers}")
         if fit["reduced_chi2"] is not None:
             console.say(
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"

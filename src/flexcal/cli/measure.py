@@ -66,6 +66,8 @@ class Measure:
             following = f"flexcal identify response {robot} {self.out} --out responses"
         else:
             console.say(f"wrote {found.poses} measured points to {self.out / 'poses.csv'}")
-            verb = "verify" if found.for_verification else "calibrate"
-            following = f"flexcal {verb} {robot} {self.out / 'poses.csv'}"
+            points = f"{robot} {self.out / 'poses.csv'}"
+            following = f"flexcal {'verify' if found.for_verification else 'calibrate'} {points}"
+            if self.plan.suffix not in (".yaml", ".yml"):
+                following = f"flexcal verify {points} to check a calibration on them, or flexcal calibrate {points} to make one"
         console.finish(found.document(), following)

@@ -46,7 +46,7 @@ def outputs(verb: str, out: Path | None, names: Sequence[str] = (), *, page: boo
             if digest != sha256_of(path):
                 raise InputError(
                     f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
-                    "give another --out, or move it away."
+                    f"{'' if verb == _REPORT else 'give another --out, or '}move it away."
                 )
             if writer not in ("", verb, _REPORT) and verb != _REPORT:
                 place = "a folder" if names else "a file"

@@ -89,6 +89,8 @@ class FrequencyResponse:
     def load(cls, path: str | Path) -> "FrequencyResponse":
         """Read what `save` wrote; `InputError` where the file is missing or something else."""
         names = [field.name for field in fields(cls)]
+        if not Path(path).exists():
+            raise InputError(f"{path} does not exist; run 'flexcal identify response' to make it.")
         try:
             with np.load(path, allow_pickle=False) as stored:
                 values = {name: stored[name] for name in names}

@@ -34,7 +34,7 @@ def _check_torques(error: Mapping[str, Any]) -> Check:
     train, best = error["train"], error["best"]
     answer = f"{significant(train, 3)} % of their norm is missed"
     answer += (
-        f"; fitted by itself, every joint of every recording would leave {significant(best, 3)} %."
+        f"; noise alone, as fits of every joint of every recording by itself have it, would be {significant(best, 3)} %."
         if best
         else "."
     )

@@ -10,12 +10,18 @@ from typing import Any
 from flexcal.estimation import Estimate
 from flexcal.report.checks import check_residual, check_springs
 from flexcal.report.fitted_response import FittedResponse
-from flexcal.report.page import Block, Check, Fact, Page, Section, Text, Verdict, tally, worst
+from flexcal.report.page import Block, Check, Fact, Page, Section, Status, Text, Verdict, tally, worst
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.springs import spring_table, unseen_springs
 from flexcal.report.sections.stiffness import response_blocks
-from flexcal.report.two_stage import TRUST
+
+_TRUST: dict[Status, tuple[str, str]] = {
+    "good": ("Yes", "Springs identified, and the numbers can be trusted"),
+    "care": ("With care", "Springs identified; read what is not sure below before relying on them"),
+    "bad": ("No", "Do not rely on these springs yet"),
+    "unknown": ("Unknown", "Springs identified; nothing could be checked"),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +69,7 @@ def stiffness_checks(study: StiffnessStudy) -> tuple[Check, ...]:
 def _verdict(study: StiffnessStudy) -> Verdict:
     checks = stiffness_checks(study)
     status = worst(checks)
-    answer, headline = TRUST[status]
+    answer, headline = _TRUST[status]
     facts = (Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),)
     sentence = "Stiffness and damping were identified; how accurate the tool is, positions have to tell."
     return Verdict(status, headline, sentence, facts, (), "", checks)

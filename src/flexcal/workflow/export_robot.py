@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.errors import InputError
+from flexcal.estimates_file import read_estimates
 from flexcal.export.dh import Convention, render_dh
 from flexcal.export.exported import Exported, Rendered, write_rendered
 from flexcal.export.json_document import render_json
@@ -26,7 +27,7 @@ Render = Callable[[RobotModel, RobotModel], Rendered]
 
 @dataclass(frozen=True)
 class ExportedRobot:
-    """What was written; `calibrated` is False where there were no estimates and the nominal robot was exported."""
+    """What was written; `calibrated` is False where there is no calibration: where the joints are is as in the nominal robot."""
 
     export: Exported
     calibrated: bool
@@ -118,6 +119,7 @@ def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> E
             raise InputError(f"{out} is the {what} of {robot}, which is never changed; give another --out.")
     if estimates is not None and not path.exists():
         raise InputError(f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out.")
-    calibrated = path.exists()
-    model = apply_estimates(nominal, path) if calibrated else nominal
+    stored = path.exists()
+    model = apply_estimates(nominal, path) if stored else nominal
+    calibrated = stored and "calibration" in read_estimates(path)
     return ExportedRobot(write_rendered(model, out, render(model, nominal)), calibrated)

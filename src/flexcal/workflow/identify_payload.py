@@ -139,7 +139,7 @@ def identify_robot_payload(
             f"{source} has no block 'dynamics', so the payload cannot be told from the robot; run 'flexcal identify dynamics {robot} "
             "LOGS…' on recordings without payload first, or give such recordings with --free."
         )
-    _require_news(unloaded.files, blocks)
+    _require_news(every, blocks)
     model = with_blocks(bare, blocks, source)
     if "dynamics" in blocks:
         model = model.with_estimate(
@@ -222,15 +222,15 @@ def _slow(treatment: Treatment, model: RobotModel, logs: Sequence[Path]) -> Trea
     return replace(treatment, decimation=slowest, proposed=chosen)
 
 
-def _require_news(free: Sequence[Path], blocks: Mapping[Block, Estimate]) -> None:
+def _require_news(logs: Sequence[Path], blocks: Mapping[Block, Estimate]) -> None:
     """Raises `InputError` for a log that the block `dynamics` was made from: it would count twice."""
     if "dynamics" not in blocks:
         return
     used = {digest for key, digest in blocks["dynamics"].provenance.items() if key.startswith("input.")}
-    for log in free:
+    for log in logs:
         if sha256_of(log) in used:
             raise InputError(
-                f"{log}: the block 'dynamics' was made from this recording, which would count twice; leave --free out, or give another."
+                f"{log}: the block 'dynamics' was made from this recording, which would count twice; leave it out, or give another."
             )
 
 

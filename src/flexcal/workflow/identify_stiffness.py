@@ -46,12 +46,13 @@ _GEOMETRIC = (*GEOMETRY, "backlash")
 
 @dataclass(frozen=True, eq=False)
 class RobotStiffness:
-    """The result of stage 1 of the robot of that name, whether it knew the reference motion, the file that its estimate was written to, and
-    the command line."""
+    """The result of stage 1 of the robot of that name, whether it knew the reference motion, the numbers of the plan's poses without a
+    response, the file that its estimate was written to, and the command line."""
 
     robot: str
     result: StiffnessResult
     reference_known: bool
+    missing_poses: tuple[int, ...]
     estimate: Estimate
     estimates: Path
     command: str = ""
@@ -67,6 +68,7 @@ class RobotStiffness:
                 "reduced_chi2": estimate.reduced_chi2,
                 "rank": estimate.rank,
                 "reference_motion_modelled": self.reference_known,
+                "missing_poses": list(self.missing_poses),
                 "dropped": dropped_parameters(estimate.dropped),
             },
             "parameters": quantities(estimate),
@@ -133,7 +135,9 @@ def identify_robot_stiffness(
     )
     estimate = replace(result.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
-    found = RobotStiffness(bare.name, result, plan is not None, estimate, target, command)
+    seen = {response.pose for response in responses}
+    missing = () if plan is None else tuple(k + 1 for k in range(len(plan.poses)) if k not in seen)
+    found = RobotStiffness(bare.name, result, plan is not None, missing, estimate, target, command)
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
         from flexcal.report.fitted_response import fitted_responses

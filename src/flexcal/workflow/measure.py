@@ -20,6 +20,7 @@ from flexcal.data import (
     write_measured_poses,
     write_recordings,
 )
+from flexcal.data.experiment_folder import PLAN
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -27,6 +28,7 @@ from flexcal.workflow.design_poses import VERIFICATION
 from flexcal.workflow.experiment_files import read_fitting_plan
 from flexcal.workflow.results import write_results
 from flexcal.yaml_reader import read_yaml
+from flexcal.yaml_writer import yaml_text
 
 VIRTUAL = "virtual"
 
@@ -74,12 +76,16 @@ def measure(
 
     `cell` is "virtual", or a folder with measurements by this very plan, which are checked and copied in the standard form. The virtual
     cell takes `config` (default: cell.yaml beside robot.yaml, where there is one); its hidden truth is drawn from `seed`, or taken from the
-    file `truth`, and left in `out`/truth.yaml. Raises `FlexcalError` where files do not fit.
+    file `truth`, and left in `out`/truth.yaml. Raises `FlexcalError` where files do not fit, and where `out`
+    holds the measurements of another plan.
     """
     model = RobotModel.from_yaml(robot, estimates=False)
     plan = read_fitting_plan(plan_file, model)
     if cell != VIRTUAL and Path(cell).resolve() == out.resolve():
         raise InputError(f"{out} is the folder measured before; give another --out.")
+    before = out / PLAN
+    if before.is_file() and yaml_text(read_fitting_plan(before, model)) != yaml_text(plan):
+        raise InputError(f"{out} holds what was measured by another plan; give another --out.")
     drawn: dict[str, float] = {}
     source: Cell
     if cell == VIRTUAL:
