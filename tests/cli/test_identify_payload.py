@@ -87,8 +87,6 @@ def test_the_printed_line_says_the_same(arm: Path, run: Run) -> None:
 
 def test_a_recording_that_the_dynamics_were_made_from_tells_no_payload(arm: Path, run: Run) -> None:
     robot, loaded = arm / "robot.yaml", arm / "loaded.csv"
-    declare(arm)
-    with_column(loaded, 3.0)
     assert run("identify", "dynamics", robot, loaded).status == 0
     done = run("identify", "payload", robot, loaded)
     assert done.status == 2 and "would count twice" in done.err
