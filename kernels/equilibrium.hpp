@@ -57,7 +57,7 @@ inline void cholesky_solve(const std::vector<double>& l, int d, double* x) {
     }
 }
 
-// axes: elastic axes from base to tool, and within a joint twist, tilt_y, tilt_x. stiffness: one per axis.
+// axes: elastic axes from base to tool, within a joint too, as the tree has them. stiffness: one per axis.
 // deflection of joints without springs is left at what it is (zero). Returns the largest last step, in rad.
 inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis>& axes, const double* stiffness, const double* geometry,
                                  const Masses& masses, Vector3 gravity, const double* q, std::ptrdiff_t samples,
@@ -159,9 +159,13 @@ inline double static_equilibrium(const Tree& tree, const std::vector<ElasticAxis
                     // a misalignment turns about the joint's place before the prismatic motion
                     const double slid = slides ? q[s * n + i] + prepared[i].offset + deflection[3 * i + 2] : 0.0;
                     const Vector3 moved = moment[i] - mass[i] * (f.origin - slid * f.axis);
-                    for (int g = 0; g < 3; ++g)
-                        row[geometry_size * i + g] = inside ? -dot(gravity, cross(turns[g], own))
+                    // fixed to the parent, the bearing tilts the offset with everything beyond
+                    const bool tilted = i == joint && tree.tilts_first && axes[k].component != 2;
+                    for (int g = 0; g < 3; ++g) {
+                        const bool before = inside && !(g == 0 && tilted);
+                        row[geometry_size * i + g] = before ? -dot(gravity, cross(turns[g], own))
                                                             : -dot(gravity, cross(axis[k], cross(turns[g], moved)));
+                    }
                     if (slides) row[geometry_size * i] = inside ? 0.0 : -mass[i] * dot(gravity, cross(axis[k], f.axis));
                     if (!beyond[joint * n + i]) continue;
                     const double carried = mass[i] - masses.mass[i] - (i == masses.payload_joint ? masses.payload[s] : 0.0);

@@ -46,13 +46,14 @@ struct Buffer {
 };
 
 Tree make_tree(const std::vector<int>& parents, const std::vector<bool>& prismatic, Array placements, Array translations, Array normals,
-               Array bearings) {
+               Array bearings, bool tilts_first) {
     const std::size_t n = parents.size();
     expect(placements, {n, 3, 3}, "placements must be (n, 3, 3)");
     expect(translations, {n, 3}, "translations must be (n, 3)");
     expect(normals, {n, 2, 3}, "normals must be (n, 2, 3)");
     expect(bearings, {n, 3, 3}, "bearings must be (n, 3, 3)");
     Tree tree;
+    tree.tilts_first = tilts_first;
     for (std::size_t i = 0; i < n; ++i) {
         if (parents[i] >= static_cast<int>(i)) throw nb::value_error("a parent must come before its child");
         tree.joints.push_back({parents[i], prismatic[i], rotation(placements.data() + 9 * i), vector3(translations.data() + 3 * i),
@@ -155,7 +156,7 @@ Result torques_adjoint(const Tree& tree, Array geometry, Array gravity, Array q,
 void bind_tree(nb::module_& m) {
     nb::class_<Tree>(m, "Tree", "A kinematic tree with geometric errors, twists and bearing tilts; arrays are C-contiguous float64.")
         .def_static("build", &make_tree, nb::arg("parents"), nb::arg("prismatic"), nb::arg("placements"), nb::arg("translations"),
-                    nb::arg("normals"), nb::arg("bearings"))
+                    nb::arg("normals"), nb::arg("bearings"), nb::arg("tilts_first") = false)
         .def("point", &point, nb::arg("joint"), nb::arg("placement"), nb::arg("translation"), nb::arg("target"), nb::arg("geometry"),
              nb::arg("tool"), nb::arg("q"), nb::arg("deflection"), nb::arg("jacobians"),
              "Position (samples, 3), orientation (samples, 3, 3), Jacobians by geometry (samples, 6, 6 n + 6) and motion (samples, 6, 3 n).")

@@ -3,6 +3,7 @@
 // One joint, parent to child (Eqs. 1 and 15-18 of the two-stage paper, read as parent-to-child transforms):
 //   Trans(t + length of the parent joint) · R · R_n2(misalignment_2) · R_n1(misalignment_1)
 //   · F R_z(q + offset + twist) R_y(tilt_y) R_x(tilt_x) Fᵀ
+// or, where the bearings are fixed to the parent link, F R_y(tilt_y) R_x(tilt_x) R_z(q + offset + twist) Fᵀ.
 #pragma once
 #include <vector>
 
@@ -39,6 +40,7 @@ struct Prepared {
 
 struct Tree {
     std::vector<Joint> joints;
+    bool tilts_first = false;  // the tilts come before the joint's rotation
 
     int size() const { return static_cast<int>(joints.size()); }
 
@@ -65,6 +67,7 @@ struct Tree {
         f.misalignment_2 = base * joint.normal_2;
         f.misalignment_1 = base * joint.normal_1;
         Rotation r = base * joint.aligned;
+        if (tilts_first) tilt(f, r, deflection);
         f.axis = r.z;
         const double motion = q + joint.offset + deflection[2];
         if (joints[i].prismatic) {
@@ -72,12 +75,16 @@ struct Tree {
         } else {
             turn_z(r, motion);
         }
+        if (!tilts_first) tilt(f, r, deflection);
+        f.link = r * joint.bearing_inverse;
+        return f;
+    }
+
+    static void tilt(Frames& f, Rotation& r, const double* deflection) {
         f.tilt_y = r.y;
         if (deflection[1] != 0) turn_y(r, deflection[1]);
         f.tilt_x = r.x;
         if (deflection[0] != 0) turn_x(r, deflection[0]);
-        f.link = r * joint.bearing_inverse;
-        return f;
     }
 
     std::vector<int> path(int joint) const {

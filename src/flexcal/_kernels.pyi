@@ -11,6 +11,7 @@ class Tree:
         translations: np.ndarray,
         normals: np.ndarray,
         bearings: np.ndarray,
+        tilts_first: bool = False,
     ) -> Tree: ...
     def point(
         self,

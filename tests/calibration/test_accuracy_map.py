@@ -23,6 +23,7 @@ from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.config import Bearings
 from flexcal.model.joint_space import joint_ranges
 from flexcal.model.names import unit_of
 from flexcal.model.posterior import Posterior
@@ -78,7 +79,11 @@ def poses_of(model: RobotModel, count: int, rng: np.random.Generator) -> np.ndar
     return rng.uniform(lower, upper, (count, model.n))
 
 
-def test_covariance_is_that_of_all_derivatives(tx90l: RobotModel, rng: np.random.Generator) -> None:
+@pytest.mark.parametrize("bearings", ["after", "before"])
+def test_covariance_is_that_of_all_derivatives(
+    tx90l: RobotModel, rng: np.random.Generator, bearings: Bearings
+) -> None:
+    tx90l = tx90l.with_bearings(bearings)
     model = uncertain(placed(tx90l), rng)
     q = poses_of(model, 300, rng)
     names = moving_parameters(model)

@@ -13,6 +13,12 @@ from flexcal.model.loading import kinematic_tree
 from flexcal.model.names import GEOMETRY
 
 
+@pytest.fixture(params=["after", "before"])
+def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
+    """The TX90L with bearings that turn with the child link, and with bearings fixed to the parent."""
+    return tx90l.with_bearings(request.param)
+
+
 def slope(model: RobotModel, poses, name: str, step: float, flank: np.ndarray) -> np.ndarray:
     ends = [
         predict(model.with_values({name: model.value(name) + s * step}), poses, flank=flank).position
@@ -66,7 +72,8 @@ def with_slide(model: RobotModel, joint: int) -> RobotModel:
     """The robot with one joint sliding along its axis in place of turning about it, and no spring there."""
     joints = tuple(replace(j, kind="prismatic") if i == joint else j for i, j in enumerate(model.joints))
     frames = {i: frame for i, frame in model.bearing_frames.items() if i != joint}
-    return replace(model, joints=joints, bearing_frames=frames, tree=kinematic_tree(joints, frames))
+    tree = kinematic_tree(joints, frames, model.config.bearings)
+    return replace(model, joints=joints, bearing_frames=frames, tree=tree)
 
 
 @pytest.mark.parametrize("joint", range(6))

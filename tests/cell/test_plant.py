@@ -20,6 +20,12 @@ NO_GAP = SpreadConfig(backlash=(0.0, 0.0))
 POSE = np.array([10, 45, 60, 20, -45, 30]) * DEGREE
 
 
+@pytest.fixture(params=["after", "before"])
+def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
+    """The TX90L with bearings that turn with the child link, and with bearings fixed to the parent."""
+    return tx90l.with_bearings(request.param)
+
+
 def rotor_and_arm_coordinates(plant: Plant, model: RobotModel) -> np.ndarray:
     """Matrix from (rotors, arm coordinates of the elastic joints) to the plant's, whose twist is the arm beyond the rotor."""
     names = list(plant.coordinates)

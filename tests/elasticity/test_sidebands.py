@@ -94,9 +94,10 @@ def test_friction_pulses(tx90l, poses, motion):
     check(system, motion, change, shift)
 
 
-def test_moving_arm_and_open_gaps(tx90l, poses, motion):
+@pytest.mark.parametrize("bearings", ["after", "before"])
+def test_moving_arm_and_open_gaps(tx90l, poses, motion, bearings):
     """Together: what the motion couples at the sidebands, the gaps bring back to the line, also between axes at right angles."""
-    q = poses["default"][5]
+    q, tx90l = poses["default"][5], tx90l.with_bearings(bearings)
     system, arm = linearise(tx90l, q), ElasticArm(tx90l)
     phases = 2 * np.pi * np.arange(64) / 64
     share = np.zeros((64, 3))

@@ -11,11 +11,14 @@ import pytest
 from flexcal.estimation import Parameter, Parameters
 from flexcal.export.json_document import render_json
 from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.config import Bearings
 from flexcal.model.posterior import Posterior
 
 
-def stand(document: dict, q: dict[str, float]) -> np.ndarray:
-    """The first point's frame from nothing but the document."""
+def stand(
+    document: dict, q: dict[str, float], tilts: dict[str, tuple[float, float]] | None = None
+) -> np.ndarray:
+    """The first point's frame from nothing but the document; `tilts` (rad) about the bearing's x and y by joint."""
     joints = {joint["name"]: joint for joint in document["joints"]}
     point = next(iter(document["points"].values()))
     at, name = np.array(point["placement"]["matrix"]), point["joint"]
@@ -27,7 +30,14 @@ def stand(document: dict, q: dict[str, float]) -> np.ndarray:
         else:
             cosine, sine = np.cos(q[name]), np.sin(q[name])
             across = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-            motion[:3, :3] = cosine * np.eye(3) + sine * across + (1 - cosine) * np.outer(axis, axis)
+            spin = cosine * np.eye(3) + sine * across + (1 - cosine) * np.outer(axis, axis)
+            motion[:3, :3] = spin
+            if tilts and name in tilts:
+                frame, (x, y) = np.array(joint["springs"]["frame"]), tilts[name]
+                about_y = np.array([[np.cos(y), 0, np.sin(y)], [0, 1, 0], [-np.sin(y), 0, np.cos(y)]])
+                about_x = np.array([[1, 0, 0], [0, np.cos(x), -np.sin(x)], [0, np.sin(x), np.cos(x)]])
+                tilt = frame @ about_y @ about_x @ frame.T
+                motion[:3, :3] = tilt @ spin if joint["springs"]["bearings"] == "before" else spin @ tilt
         at, name = np.array(joint["placement"]["matrix"]) @ motion @ at, joint["parent"]
     return at
 
@@ -45,6 +55,18 @@ def test_numpy_stands_where_the_model_does(
         at = stand(document, dict(zip(model.joint_names, own, strict=True)))
         np.testing.assert_allclose(at[:3, 3], expected.position[k], atol=1e-12)
         np.testing.assert_allclose(at[:3, :3], expected.orientation[k], atol=1e-12)
+
+
+@pytest.mark.parametrize("bearings", ["after", "before"])
+def test_bearings_tilt_as_the_document_says(tx90l: RobotModel, erroneous, bearings: Bearings) -> None:
+    model = erroneous(tx90l.with_bearings(bearings))
+    document = json.loads(render_json(model, model).text)
+    q, deflection = np.array([0.4, -0.7, 1.1, 0.3, 0.8, -0.2]), np.zeros((1, 6, 3))
+    deflection[0, :3, :2] = [[0.02, -0.03], [0.05, 0.01], [-0.04, 0.03]]
+    tilts = {model.joint_names[i]: (deflection[0, i, 0], deflection[0, i, 1]) for i in range(3)}
+    at = stand(document, dict(zip(model.joint_names, q, strict=True)), tilts)
+    expected = point_kinematics(model, q[None], deflection, jacobians=False).position[0]
+    np.testing.assert_allclose(at[:3, 3], expected, atol=1e-12)
 
 
 def test_the_three_ways_to_say_a_placement_agree(tx90l: RobotModel, erroneous) -> None:

@@ -14,6 +14,12 @@ from flexcal.model import RobotModel, static_equilibrium
 mujoco = pytest.importorskip("mujoco")
 
 
+@pytest.fixture(params=["after", "before"])
+def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
+    """The TX90L with bearings that turn with the child link, and with bearings fixed to the parent."""
+    return tx90l.with_bearings(request.param)
+
+
 def test_the_arm_comes_to_rest_where_the_model_rests(
     tx90l: RobotModel, erroneous, rng: np.random.Generator, tmp_path: Path
 ) -> None:

@@ -12,6 +12,12 @@ from flexcal.model.equilibrium import elastic_axes
 Q = np.random.default_rng(0).uniform(-2, 2, (30, 6))
 
 
+@pytest.fixture(params=["after", "before"])
+def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
+    """The TX90L with bearings that turn with the child link, and with bearings fixed to the parent."""
+    return tx90l.with_bearings(request.param)
+
+
 def test_springs_balance_gravity_in_pinocchio(tx90l: RobotModel) -> None:
     for payload in (0.0, 6.0):
         arm = ElasticArm(tx90l, payload)

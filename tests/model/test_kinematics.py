@@ -14,6 +14,12 @@ NAMES_OF_GEOMETRY = [f"joint_{i}.{key}" for i in range(1, 7) for key in GEOMETRY
 ]
 
 
+@pytest.fixture(params=["after", "before"])
+def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
+    """The TX90L with bearings that turn with the child link, and with bearings fixed to the parent."""
+    return tx90l.with_bearings(request.param)
+
+
 @pytest.fixture
 def crooked(tx90l: RobotModel) -> RobotModel:
     rng = np.random.default_rng(5)
@@ -37,7 +43,11 @@ def written_out(model: RobotModel, q: np.ndarray, deflection: np.ndarray) -> np.
         )
         tilt_x, tilt_y, twist = deflection[i]
         turn = axis_rotation(joint.normals[1], second) @ axis_rotation(joint.normals[0], first)
-        motion = axis_rotation(z, q[i] + offset + twist) @ axis_rotation(y, tilt_y) @ axis_rotation(x, tilt_x)
+        spin, tilts = (
+            axis_rotation(z, q[i] + offset + twist),
+            axis_rotation(y, tilt_y) @ axis_rotation(x, tilt_x),
+        )
+        motion = tilts @ spin if model.config.bearings == "before" else spin @ tilts
         total = (
             total
             @ matrix(joint.rotation, joint.translation + length)

@@ -6,6 +6,7 @@ from scipy.linalg import eigh
 
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
+from flexcal.model.config import Bearings
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
 from flexcal.units import DEGREE
@@ -14,20 +15,27 @@ LINES = np.arange(3.25, 80, 2.0)
 
 
 @pytest.mark.parametrize(
-    ("pose", "modes_hz"),
+    ("bearings", "pose", "modes_hz"),
     [
-        ((0, 90, 0, 0, 0, 0), (11.1, 13.3, 39.7, 63.7)),
-        ((0, 45, 60, 0, 45, 0), (12.9, 14.7, 32.6, 44.0)),
-        ((0, 0, 90, 0, 0, 0), (16.3, 17.9, 28.0, 34.4)),
+        ("after", (0, 90, 0, 0, 0, 0), (11.1, 13.3, 39.7, 63.7)),
+        ("after", (0, 45, 60, 0, 45, 0), (12.9, 14.7, 32.6, 44.0)),
+        ("after", (0, 0, 90, 0, 0, 0), (16.3, 17.9, 28.0, 34.4)),
+        ("before", (0, 90, 0, 0, 0, 0), (11.0, 13.3, 39.9, 63.7)),
+        ("before", (0, 45, 60, 0, 45, 0), (12.7, 14.7, 32.7, 43.3)),
+        ("before", (0, 0, 90, 0, 0, 0), (16.3, 17.7, 28.0, 33.9)),
     ],
 )
-def test_locked_motor_modes_of_the_bare_arm(tx90l: RobotModel, pose: tuple, modes_hz: tuple) -> None:
-    system = linearise(tx90l, np.array(pose) * DEGREE, 0.0)
+def test_locked_motor_modes_of_the_bare_arm(
+    tx90l: RobotModel, bearings: Bearings, pose: tuple, modes_hz: tuple
+) -> None:
+    system = linearise(tx90l.with_bearings(bearings), np.array(pose) * DEGREE, 0.0)
     squares = eigh(system.stiffness[3:, 3:], system.mass[3:, 3:], eigvals_only=True)
     np.testing.assert_allclose(np.sqrt(squares[:4]) / (2 * np.pi), modes_hz, atol=0.06)
 
 
-def test_every_derivative_of_the_transfer_matrix(tx90l: RobotModel) -> None:
+@pytest.mark.parametrize("bearings", ["after", "before"])
+def test_every_derivative_of_the_transfer_matrix(tx90l: RobotModel, bearings: Bearings) -> None:
+    tx90l = tx90l.with_bearings(bearings)
     q = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2])
     endings = ("stiffness", "damping", "rotor_inertia", "viscous", "mass", "com_x", "com_y", "com_z")
     names = [

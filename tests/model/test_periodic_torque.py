@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from flexcal.model import (
     RobotModel,
@@ -27,6 +28,12 @@ def swing(joints: int, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
     q = np.sum(size * np.sin(angle), axis=1)
     dq = np.sum(size * omega * np.cos(angle), axis=1)
     return q, dq, -np.sum(size * omega**2 * np.sin(angle), axis=1)
+
+
+@pytest.fixture(params=["after", "before"])
+def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
+    """The TX90L with bearings that turn with the child link, and with bearings fixed to the parent."""
+    return tx90l.with_bearings(request.param)
 
 
 def test_stiff_springs_make_the_rigid_robot(tx90l: RobotModel) -> None:

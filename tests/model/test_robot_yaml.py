@@ -37,6 +37,7 @@ MISTAKES = [
     (SPRING, "drive: {stiffness: 143.7e3, dampening: 1}", ["unknown key 'dampening'", "'damping'"]),
     (SPRING, "drive: {damping: 115.1}", ["'stiffness'", "missing"]),
     (SPRING, SPRING + "\n    drive: {stiffness: 1}", ["'drive'", "keep one"]),
+    (GRAVITY, f"{GRAVITY}\nbearings: parent", ["bearings", "'before'", "'after'", "'parent'"]),
     # numbers
     (SPRING, "drive: {stiffness: '143.7e3', damping: 1}", ["a number is expected", "'143.7e3'"]),
     (SPRING, "drive: {stiffness: stiff, damping: 1}", ["a number is expected", "'stiff'"]),

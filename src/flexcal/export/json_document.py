@@ -12,7 +12,7 @@ from flexcal.export.frames import transform
 from flexcal.export.loss import ToolMap, tool_positions
 from flexcal.model import RobotModel
 from flexcal.model.names import unit_of
-from flexcal.model.placement import link_placement, point_placement
+from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz, vector_rotation
 
 FORMAT = "flexcal robot"
@@ -74,7 +74,8 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
         "springs": None
         if spring is None
         else {
-            "frame": spring.frame.tolist(),
+            "frame": bearing_placement(model, spring).tolist(),
+            "bearings": model.config.bearings,
             **{
                 ("bearing_x", "bearing_y", "drive")[c]: {
                     kind: _quantity(model, f"{joint.name}.{('bearing_x', 'bearing_y', 'drive')[c]}.{kind}")

@@ -1,7 +1,8 @@
 """RobotModel to MuJoCo: rotors, drive springs and bearings as joints of one kinematic tree.
 
 A joint with springs is up to four hinges on the link's body, outermost first: the motor about the joint axis with the rotor's
-`armature`, the twist of the drive spring about the same axis, the tilts about the bearing's y and x. So the rotor carries the
+`armature`, the twist of the drive spring about the same axis, the tilts about the bearing's y and x; bearings that are fixed to the
+parent link (`bearings: before`) come first, tilts about y and x, motor, twist. So the rotor carries the
 kinetic energy of its own spin only, the spring is an ordinary joint spring (no tendon between two trees, whose damping
 `implicitfast` would get wrong) and the geometry is the chain of `flexcal.model`: misalignments and offset lie in the body's
 placement, the length errors in the placement of the next body.
@@ -18,13 +19,12 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model import Inertia, RobotModel
 from flexcal.model.inertia import parallel_axis
-from flexcal.model.placement import link_placement, point_placement
+from flexcal.model.names import SPRINGS
+from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz
 
 if TYPE_CHECKING:
     import mujoco
-
-TILTS = ("bearing_x", "bearing_y")
 
 
 def mjcf_spec(
@@ -65,9 +65,7 @@ def mjcf_spec(
         body.ipos = inertia.com
         body.fullinertia = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
         body.explicitinertial = True
-        if i in motors:
-            _add_motor(spec, body, model, i)
-        _add_springs(body, model, i)
+        _add_joints(spec, body, model, i, None if i in motors else at[i])
         bodies.append(body)
     for name in model.points:
         joint, position, rotation = point_placement(model, name)
@@ -95,6 +93,24 @@ def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[I
     return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
 
 
+def _add_joints(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int, locked: float | None
+) -> None:
+    """Motor and springs of a joint, outermost first; the motor is left out where it is locked, at that angle (rad or m)."""
+    import mujoco
+
+    spring = next((e for e in model.elastic if e.index == i), None)
+    for component in spring.components if spring else (2,):
+        if component == 2 and locked is None:
+            _add_motor(spec, body, model, i)
+        if spring:
+            name = f"{spring.name}.{SPRINGS[component]}"
+            axis = bearing_placement(model, spring, locked or 0.0)[:, component]
+            joint = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+            joint.stiffness = _linear(joint.stiffness, float(spring.stiffness[component]))
+            joint.damping = _linear(joint.damping, float(spring.damping[component]))
+
+
 def _add_motor(spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int) -> None:
     import mujoco
 
@@ -109,18 +125,6 @@ def _add_motor(spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: 
     drive = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
     if np.isfinite(joint.effort) and joint.effort > 0:
         drive.ctrlrange = [-joint.effort, joint.effort]
-
-
-def _add_springs(body: mujoco.MjsBody, model: RobotModel, i: int) -> None:
-    import mujoco
-
-    hinge = mujoco.mjtJoint.mjJNT_HINGE
-    for spring in (e for e in model.elastic if e.index == i):
-        for component in spring.components:
-            name = f"{spring.name}.{(*TILTS, 'drive')[component]}"
-            joint = body.add_joint(name=name, type=hinge, axis=spring.frame[:, component])
-            joint.stiffness = _linear(joint.stiffness, float(spring.stiffness[component]))
-            joint.damping = _linear(joint.damping, float(spring.damping[component]))
 
 
 def _linear(default: float | np.ndarray, value: float) -> float | np.ndarray:

@@ -13,6 +13,7 @@ from flexcal.export.exported import Exported, Rendered, write_rendered
 from flexcal.export.loss import BACKLASH, GRAVITY_COMPLIANCE, TRANSMISSION, ToolMap
 from flexcal.export.mjcf import mjcf_spec
 from flexcal.model import RobotModel
+from flexcal.model.names import SPRINGS
 
 if TYPE_CHECKING:
     import mujoco
@@ -55,9 +56,7 @@ def render_mjcf(model: RobotModel) -> Rendered:
     if model.coulomb[np.isfinite(model.coulomb)].any():
         remarks.append("Coulomb friction of the drives is MuJoCo's frictionloss, which holds an arm at rest.")
     springs = [
-        f"{joint.name}.{key}"
-        for joint in model.elastic
-        for key in ("drive", "bearing_y", "bearing_x")[: len(joint.components)]
+        f"{joint.name}.{SPRINGS[component]}" for joint in model.elastic for component in joint.components
     ]
     about = (
         "Joints: NAME is the motor's, referred to the joint; the actuator of that name is its torque, N m.",

@@ -8,6 +8,8 @@ from typing import Literal
 from flexcal.errors import FlexcalError
 
 Triple = tuple[float, float, float]
+Bearings = Literal["before", "after"]
+"""Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
 
 
 @dataclass(frozen=True)
@@ -239,7 +241,10 @@ class SignalConfig:
 
 @dataclass(frozen=True)
 class RobotConfig:
-    """The whole of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and where (rad or m)."""
+    """The whole of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and where (rad or m).
+
+    `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after).
+    """
 
     robot: str
     points: dict[str, PointConfig] = field(default_factory=dict)
@@ -249,6 +254,7 @@ class RobotConfig:
     prior: PriorConfig = PriorConfig()
     drives: DrivesConfig = DrivesConfig()
     elastic: tuple[ElasticConfig, ...] = ()
+    bearings: Bearings = "after"
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)

@@ -1,4 +1,7 @@
-"""The arm with its springs as a Pinocchio model: every elastic joint is three revolutes, twist, tilt about y, tilt about x (Eq. 1)."""
+"""The arm with its springs as a Pinocchio model: every elastic joint is three revolutes, twist, tilt about y, tilt about x (Eq. 1).
+
+Where the bearings are fixed to the parent link the two tilts come first.
+"""
 
 from __future__ import annotations
 
@@ -9,6 +12,7 @@ import numpy as np
 from flexcal.model.equilibrium import elastic_axes
 from flexcal.model.inertia import Inertia
 from flexcal.model.loading import bearing_frame
+from flexcal.model.names import SPRINGS
 from flexcal.model.placement import joint_placement
 from flexcal.model.robot_model import RobotModel
 
@@ -29,7 +33,8 @@ class ElasticArm:
         self.model.gravity = pin.Motion(robot.gravity, np.zeros(3))
         self.bodies: list[int] = []
         self.turns: list[np.ndarray] = []
-        first: list[int] = []
+        velocity: dict[tuple[int, int], int] = {}
+        components = {e.index: e.components for e in robot.elastic}
         for i, joint in enumerate(robot.joints):
             frame = robot.bearing_frames.get(i)
             frame = bearing_frame(joint) if frame is None else frame
@@ -37,23 +42,20 @@ class ElasticArm:
             placement = pin.SE3(aligned @ frame, position)
             if joint.parent >= 0:
                 placement = pin.SE3(self.turns[joint.parent].T, np.zeros(3)) * placement
-            parent = self.bodies[joint.parent] if joint.parent >= 0 else 0
-            kind = pin.JointModelPZ() if joint.kind == "prismatic" else pin.JointModelRZ()
-            body = self.model.addJoint(parent, kind, placement, joint.name)
-            first.append(self.model.joints[body].idx_v)
-            if i in robot.bearing_frames and np.isfinite(robot.stiffness[i, 0]):
-                body = self.model.addJoint(
-                    body, pin.JointModelRY(), pin.SE3.Identity(), f"{joint.name}.bearing_y"
-                )
-                body = self.model.addJoint(
-                    body, pin.JointModelRX(), pin.SE3.Identity(), f"{joint.name}.bearing_x"
-                )
+            body = self.bodies[joint.parent] if joint.parent >= 0 else 0
+            motion = pin.JointModelPZ() if joint.kind == "prismatic" else pin.JointModelRZ()
+            kinds = (pin.JointModelRX(), pin.JointModelRY(), motion)
+            for c in components.get(i, (2,)):
+                name = joint.name if c == 2 else f"{joint.name}.{SPRINGS[c]}"
+                body = self.model.addJoint(body, kinds[c], placement, name)
+                velocity[i, c] = self.model.joints[body].idx_v
+                placement = pin.SE3.Identity()
             self.bodies.append(body)
             self.turns.append(frame)
             self.set_inertia(i, robot.inertias[i])
         self.data: Any = self.model.createData()
-        self.joint_velocity = np.array(first)
-        self.elastic = np.array([first[i] + (2 - c) for i, c in elastic_axes(robot)], dtype=int)
+        self.joint_velocity = np.array([velocity[i, 2] for i in range(robot.n)])
+        self.elastic = np.array([velocity[axis] for axis in elastic_axes(robot)], dtype=int)
 
     def set_inertia(self, joint: int, link: Inertia) -> None:
         """Give the link of a joint another inertia; the payload is added where it hangs on that link."""

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.kernels import Tree
-from flexcal.model.config import ElasticConfig, RobotConfig
+from flexcal.model.config import Bearings, ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
 from flexcal.model.names import COUPLED, FRICTION
 from flexcal.model.point import Payload, Point
@@ -82,7 +82,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         points=points,
         nominal_payload=payload,
         bearing_frames=bearing_frames,
-        tree=kinematic_tree(joints, bearing_frames),
+        tree=kinematic_tree(joints, bearing_frames, config.bearings),
         stations=stations,
         harmonics=HARMONICS,
         geometry=np.zeros((n, 6)),
@@ -173,8 +173,10 @@ def bearing_frame(joint: Joint) -> np.ndarray:
     return np.column_stack([x, np.cross(joint.axis, x), joint.axis])
 
 
-def kinematic_tree(joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray]) -> Tree:
-    """The kernels' view of some joints, and of the bearing frames (3, 3) of the elastic ones by joint index."""
+def kinematic_tree(
+    joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings = "after"
+) -> Tree:
+    """The kernels' view of some joints, of the bearing frames (3, 3) of the elastic ones by joint index, and of where bearings tilt."""
     return Tree.build(
         [j.parent for j in joints],
         [j.kind == "prismatic" for j in joints],
@@ -182,6 +184,7 @@ def kinematic_tree(joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndar
         np.array([j.translation for j in joints]),
         np.array([j.normals for j in joints]),
         np.array([bearing_frames.get(i, bearing_frame(j)) for i, j in enumerate(joints)]),
+        bearings == "before",
     )
 
 

@@ -1,13 +1,15 @@
 """Where joints and points lie in the links that carry them, geometric errors included: the chain that every exporter writes down.
 
 One joint, parent to child (Eqs. 15-17; docs: the full chain of one axis): length error of the parent, nominal placement,
-misalignment_2, misalignment_1, the joint's motion with its offset; bearing tilts follow. The kernels hold the same chain for speed.
+misalignment_2, misalignment_1, the joint's motion with its offset; bearing tilts follow, or come before the motion where robot.yaml
+says `bearings: before`. The kernels hold the same chain for speed.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import axis_rotation
 
@@ -27,6 +29,14 @@ def link_placement(model: RobotModel, joint: int, q: float = 0.0) -> tuple[np.nd
     if model.joints[joint].kind == "prismatic":
         return position + rotation @ axis * motion, rotation
     return position, rotation @ axis_rotation(axis, motion)
+
+
+def bearing_placement(model: RobotModel, spring: ElasticJoint, q: float = 0.0) -> np.ndarray:
+    """Axes (3, 3) about which the bearing tilts, and the joint's, in the axes of its link at `link_placement`."""
+    if not spring.tilts_first:
+        return spring.frame
+    motion = q + model.geometry[spring.index, 0]
+    return axis_rotation(model.joints[spring.index].axis, -motion) @ spring.frame
 
 
 def point_placement(model: RobotModel, name: str) -> tuple[int, np.ndarray, np.ndarray]:

@@ -15,7 +15,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.kernels import Tree
-from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
+from flexcal.model.config import Bearings, ControllerConfig, PriorConfig, RobotConfig
 from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis
 from flexcal.model.joint import Joint
@@ -86,7 +86,17 @@ class RobotModel:
     def __setstate__(self, state: dict[str, Any]) -> None:
         from flexcal.model.loading import kinematic_tree
 
-        self.__dict__.update(state, tree=kinematic_tree(state["joints"], state["bearing_frames"]))
+        self.__dict__.update(
+            state, tree=kinematic_tree(state["joints"], state["bearing_frames"], state["config"].bearings)
+        )
+
+    def with_bearings(self, bearings: Bearings) -> RobotModel:
+        """The robot whose bearings tilt before or after the joint's rotation, its parameters and posterior as they are."""
+        from flexcal.model.loading import kinematic_tree
+
+        config = replace(self.config, bearings=bearings)
+        tree = kinematic_tree(self.joints, self.bearing_frames, bearings)
+        return replace(self, config=config, tree=tree)
 
     @property
     def n(self) -> int:
@@ -129,6 +139,7 @@ class RobotModel:
                 self.stiffness[i],
                 self.damping[i],
                 bool(np.isfinite(self.stiffness[i, 0])),
+                self.config.bearings == "before",
             )
             for i, frame in sorted(self.bearing_frames.items())
         )

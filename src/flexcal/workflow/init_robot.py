@@ -129,6 +129,7 @@ gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot 
 # elastic:
 #   - joint: {first}
 #     drive: {{stiffness: 1.0e5, damping: 100}}
+# bearings: after     # their axes turn with the child link; before: they are fixed to the parent link
 
 # Only for files that are read as they are; 'flexcal import' makes files in the usual columns and units instead.
 # signals:
