@@ -71,6 +71,7 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     )
     assert set(document["sources"]) == {"geometry", "instrument's place"}
     check = document["verification"]
+    assert document["verdict"]["trusted"] is None and "claimed_uncertainty" in document["verdict"]["reasons"]
     # the files state no sigma: the tracker's noise and what no rigid model can follow count as the robot's
     assert check["verdict"] == "unknown" and check["low"] > 1 and check["applied"] == check["factor"]
     assert any("no sigma" in remark for remark in document["remarks"])
@@ -78,7 +79,8 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     assert "accuracy map" in page and "figure-predicted" in page and "nothing is made smaller" in page
     seen = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "some.csv", "--json")
     assert seen.document["verification"]["fitted"] == ["some.csv"]
-    assert "Were these poses unknown" in (ur5 / "map.html").read_text(encoding="utf-8")
+    assert seen.document["verdict"]["trusted"] is None
+    assert "it was fitted to some.csv" in (ur5 / "map.html").read_text(encoding="utf-8")
     bare = run("map", ur5 / "robot.yaml", *arguments, "--json").document
     ratio = document["predicted"]["p95"]["worst_mm"] / bare["predicted"]["p95"]["worst_mm"]
     assert ratio == pytest.approx(check["factor"], rel=1e-9) and bare["verification"] is None

@@ -90,11 +90,14 @@ def test_out_leaves_the_robots_folder_alone(run, ur5_folder: Path, some: Path, t
         "results.json",
     ]
     assert json.loads((out / "results.json").read_text()) == found.document
+    assert found.document["verdict"]["trusted"] is None and "left_out" in found.document["verdict"]["reasons"]
     checked = run(
         "verify", robot, ur5_folder / "random.csv", "--estimates", out, "--out", out / "check", "--json"
     )
     assert checked.document["verification"]["measured"]["mean_mm"] < 0.2
     assert json.loads((out / "check" / "results.json").read_text()) == checked.document
+    assert checked.document["verdict"] == {"trusted": None, "reasons": ["claimed_uncertainty"]}
+    assert "Trusted: cannot be judged — because " in checked.err
 
 
 def test_provenance_names_inputs_and_options(run, ur5_folder: Path, some: Path) -> None:

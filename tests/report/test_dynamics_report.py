@@ -122,7 +122,7 @@ def test_the_verdict_turns_with_the_results(study: DynamicsStudy) -> None:
     error = study.results["error_percent"]
 
     def statuses(changed: DynamicsStudy) -> list[str]:
-        return [check.status for check in dynamics_checks(changed)]
+        return [check.status for check in dynamics_checks(changed.results)]
 
     per_joint = dict.fromkeys(error["per_joint"], 3.0)
     fine = with_results(
@@ -136,11 +136,14 @@ def test_the_verdict_turns_with_the_results(study: DynamicsStudy) -> None:
         worse = with_results(fine, error_percent={**fine.results["error_percent"], "held_out": unseen})
         assert statuses(worse)[0] == dynamics_verdict(worse).status == status
     blind = with_results(fine, hold_out={"share": 0.0, "logs": []})
-    assert statuses(blind)[0] == "care" and "not known" in dynamics_verdict(blind).sentence
+    assert (
+        statuses(blind)[0] == dynamics_verdict(blind).status == "unknown"
+        and "not known" in dynamics_verdict(blind).sentence
+    )
     other = with_results(fine, hold_out={"share": 0.0, "logs": ["there/fresh.csv"]})
     assert "fresh.csv" in dynamics_verdict(other).sentence
     off = {**fine.results["error_percent"], "per_joint": {**per_joint, "joint_5": 26.0}}
-    assert "joint_5" in dynamics_checks(with_results(fine, error_percent=off))[1].answer
+    assert "joint_5" in dynamics_checks(with_results(fine, error_percent=off).results)[1].answer
     assert statuses(with_results(fine, error_percent=off))[1] == "care"
     assert statuses(with_results(fine, rank=60))[2] == "care"
     assert statuses(with_results(fine, bodiless_links=["link_2"]))[3] == "care"

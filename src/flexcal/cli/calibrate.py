@@ -87,6 +87,7 @@ class Calibrate:
         )
         for remark in document["remarks"]:
             console.say(remark)
+        console.say(found.trust.sentence)
         where = with_estimates(self.out)
         console.say(f"wrote {found.estimates}")
         if self.out is not None:

@@ -40,7 +40,7 @@ class Certificate:
 
         require_robot(self.robot, self.targets, self.before, self.after)
         console = Console(self.json)
-        document = certify_robot(
+        found = certify_robot(
             self.robot,
             self.targets,
             self.before,
@@ -48,7 +48,8 @@ class Certificate:
             self.out,
             estimates=self.estimates,
             command=command_line(),
-        ).document()
+        )
+        document = found.document()
         labels = {
             "before": "before, targets laid as well as they go",
             "after": "after, where the calibration has them",
@@ -63,5 +64,6 @@ class Certificate:
                 )
         for remark in document["remarks"]:
             console.say(remark)
+        console.say(found.trust.sentence)
         console.say(f"wrote {self.out}: {document['targets']} targets")
         console.finish(document, f"open {self.out} and print it, and sign it")

@@ -45,7 +45,7 @@ class Demo:
         console = Console(self.json)
         robot = example_robot("tx90l") if self.robot is None else self.robot
         with console.progress() as progress:
-            run_two_stage(
+            found = run_two_stage(
                 robot,
                 self.out,
                 seed=self.seed,
@@ -68,6 +68,7 @@ class Demo:
         console.show(error_table("distance between prediction and point", rows))
         if document["cad_alone"] is not None:
             console.show(gain_table(document))
+        console.say(found.trust.sentence)
         console.say(f"took {document['seconds']['total']:.0f} s; everything is in {self.out}")
         console.finish(document, f"open {self.out / 'report.html'}")
 

@@ -131,6 +131,7 @@ class IdentifyDynamics:
             )
         for remark in document["remarks"]:
             console.say(remark)
+        console.say(found.trust.sentence)
         console.say(f"wrote {found.estimates}")
         if learned and learned["file"]:
             console.say(f"wrote {learned['file']}")

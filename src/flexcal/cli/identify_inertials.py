@@ -48,6 +48,7 @@ class IdentifyInertials:
         console.say(
             f"torques missed by {error['train']:.2f} % of their norm in the fit, by {error['nominal']:.2f} % with the values of robot.yaml"
         )
+        console.say(found.trust.sentence)
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")

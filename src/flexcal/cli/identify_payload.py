@@ -74,6 +74,7 @@ class IdentifyPayload:
         console.say(f"torques missed by {document['error_percent']['train']:.2f} % of their norm")
         for remark in document["remarks"]:
             console.say(remark)
+        console.say(found.trust.sentence)
         console.say(f"the same as a line of robot.yaml, if you want to keep it there: {found.declaration}")
         console.say(f"wrote {found.estimates}")
         if self.out is not None:

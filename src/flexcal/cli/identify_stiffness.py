@@ -83,6 +83,7 @@ class IdentifyStiffness:
             console.say(
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"
             )
+        console.say(found.trust.sentence)
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")

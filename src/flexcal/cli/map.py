@@ -90,6 +90,7 @@ class Map:
             )
         for remark in document["remarks"]:
             console.say(remark)
+        console.say(found.trust.sentence)
         pages = dict.fromkeys([self.out, page_beside(self.out)])
         console.say(f"wrote {' and '.join(str(path) for path in pages)}: {document['poses']} poses")
         where = with_estimates(self.estimates)

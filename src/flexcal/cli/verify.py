@@ -53,6 +53,7 @@ class Verify:
         )
         for remark in document["remarks"]:
             console.say(remark)
+        console.say(found.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         where = with_estimates(self.estimates)

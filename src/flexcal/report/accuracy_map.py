@@ -18,7 +18,6 @@ from flexcal.report.figures.variance_shares import variance_shares
 from flexcal.report.notation import document_millimetres, scaled, significant
 from flexcal.report.page import (
     Block,
-    Check,
     Fact,
     FigureBlock,
     Page,
@@ -26,12 +25,11 @@ from flexcal.report.page import (
     Table,
     Text,
     Verdict,
-    worst,
 )
+from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
-
-_FEW = 20
+from flexcal.report.trust import Trust
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +52,13 @@ def write_map_page(path: Path, study: MapStudy) -> None:
 
 def map_page(study: MapStudy) -> Page:
     """The page before it becomes HTML."""
-    results = study.results
+    results, verified = study.results, study.results["verification"]
+    fitted = [] if verified is None else verified["fitted"]
     p95, mean = results["predicted"]["p95"], results["predicted"]["mean"]
-    checks = _checks(study)
+    trust = Trust(prediction_checks(study.scale, fitted))
     leading = max(results["sources"], key=results["sources"].__getitem__)
     verdict = Verdict(
-        worst(checks),
+        trust.status,
         f"The tool is within {document_millimetres(p95['p90_mm'])} mm",
         f"At nine of ten of {results['poses']} poses, {_where(study)}, the point '{results['target']}' is within "
         f"{document_millimetres(p95['p90_mm'])} mm of where the calibrated model says, in 95 of 100 cases; "
@@ -71,7 +70,7 @@ def map_page(study: MapStudy) -> Page:
         ),
         (),
         "",
-        checks,
+        trust.checks,
     )  # fmt: skip
     sections = [_numbers(study), _space(study), _sources(study)]
     if study.verification is not None:
@@ -100,43 +99,12 @@ _UP_ONLY = (
 )
 
 
-def _checks(study: MapStudy) -> tuple[Check, ...]:
-    scale = study.scale
-    question = "Can the prediction be believed?"
-    if scale is None:
-        answer = "Not known: nothing was verified. Measure poses that the calibration never saw and give them with --verification."
-        return (Check(question, answer, "care"),)
-    said = (
-        f"Errors at {len(scale.probability)} measured poses are {scale.factor:.2f} times the predicted size (95 % interval {scale.low:.2f} "
-        f"to {scale.high:.2f}), and {100 * scale.inside:.0f} % of them lie within the bound for 95 %."
-    )
-    said = {
-        "right": f"Yes. {said}",
-        "optimistic": f"No, it was too optimistic. {said} All numbers here are multiplied by {scale.factor:.2f}.",
-        "unknown": f"Not known: the instrument's noise is in the errors. {said} All numbers here are multiplied by {scale.factor:.2f}.",
-        "cautious": f"It is cautious. {said} The numbers here were left as they are.",
-    }[scale.verdict]
-    checks = [Check(question, said, "care" if scale.low > 1 else "good")]
-    if fitted := study.results["verification"]["fitted"]:
-        answer = f"No: it was fitted to {' and '.join(fitted)}. Verify on poses that it never saw."
-        checks.append(Check("Were these poses unknown to the calibration?", answer, "bad"))
-    if not scale.noise_known:
-        checks.append(
-            Check(
-                "Is the instrument's noise known?",
-                "No: the files state no sigma, so it counts as the robot's. State it with flexcal import --sigma.",
-                "care",
-            )
-        )
-    if len(scale.probability) < _FEW:
-        checks.append(
-            Check(
-                "Were enough poses verified?",
-                f"{len(scale.probability)} are few; measure {_FEW} or more.",
-                "care",
-            )
-        )
-    return tuple(checks)
+def _applied(study: MapStudy) -> str:
+    """By what the predictions were multiplied."""
+    verified = study.results["verification"]
+    if verified is None or verified["applied"] == 1:
+        return ""
+    return f"Multiplied by {verified['applied']:.2f}, the observed over the predicted size of the errors at the verification poses."
 
 
 def _numbers(study: MapStudy) -> Section:
@@ -166,7 +134,11 @@ def _numbers(study: MapStudy) -> Section:
         )
     blocks: list[Block] = [
         Table(
-            "table-errors", "Predicted error / mm", ("", "median pose", "9 of 10 poses", "worst pose"), rows
+            "table-errors",
+            "Predicted error / mm",
+            ("", "median pose", "P90 over poses", "worst pose"),
+            rows,
+            _applied(study),
         ),
         Table(
             "table-worst",

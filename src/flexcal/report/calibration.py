@@ -14,7 +14,7 @@ from flexcal.report.figures.term_scores import TermStep
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, ArmPoses, MeasuredPoints
 from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
-from flexcal.report.page import Check, Page, Section, Table, Text, Verdict, worst
+from flexcal.report.page import Check, Page, Section, Table, Text, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.sections.geometry import arm_figure, error_figure
 from flexcal.report.sections.identifiability import Determined, identifiability_blocks
@@ -22,7 +22,8 @@ from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.terms import terms_section
-from flexcal.report.two_stage import TRUST
+from flexcal.report.trust import Trust
+from flexcal.report.two_stage import HEADLINES
 from flexcal.units import MILLIMETRE
 
 
@@ -39,18 +40,18 @@ class CalibrationStudy:
     points: MeasuredPoints
     arms: ArmPoses
 
-    @property
-    def determined(self) -> Determined:
-        """What the poses determine of the calibrated model."""
-        return Determined.stored(self.results["identifiability"]["selected"])
 
-    @property
-    def steps(self) -> tuple[TermStep, ...]:
-        """What the selection of terms tried; empty where the terms were given."""
-        return tuple(
-            TermStep(tuple(step["terms"]), step["order_mm"] * MILLIMETRE, step["workspace_mm"] * MILLIMETRE)
-            for step in self.results["term_selection"]
-        )
+def determined(results: Mapping[str, Any]) -> Determined:
+    """What the poses determine of the calibrated model."""
+    return Determined.stored(results["identifiability"]["selected"])
+
+
+def term_steps(results: Mapping[str, Any]) -> tuple[TermStep, ...]:
+    """What the selection of terms tried; empty where the terms were given."""
+    return tuple(
+        TermStep(tuple(step["terms"]), step["order_mm"] * MILLIMETRE, step["workspace_mm"] * MILLIMETRE)
+        for step in results["term_selection"]
+    )
 
 
 def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
@@ -61,9 +62,9 @@ def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
 def calibration_page(study: CalibrationStudy) -> Page:
     """The page before it becomes HTML."""
     results, points = study.results, study.points
-    sections = [_accuracy_section(study)]
-    if study.steps:
-        sections.append(terms_section(study.steps, results["terms"]))
+    sections, steps = [_accuracy_section(study)], term_steps(results)
+    if steps:
+        sections.append(terms_section(steps, results["terms"]))
     sections += [
         residuals_section(results["joints"], points.poses, points.calibrated, study.estimate.outliers),
         Section(
@@ -72,7 +73,7 @@ def calibration_page(study: CalibrationStudy) -> Page:
             "Not every length and angle can be seen from the points that were measured. What cannot is held at its nominal value, named "
             "here with what stands in for it.",
             (
-                *identifiability_blocks(study.determined, None),
+                *identifiability_blocks(determined(results), None),
                 parameter_table(study.estimate, tuple(results["identifiability"]["selected"]["kept"]), None),
             ),
         ),
@@ -93,43 +94,46 @@ def calibration_page(study: CalibrationStudy) -> Page:
 def calibration_verdict(study: CalibrationStudy) -> Verdict:
     """How accurate it was, how accurate it is at the measured poses, and whether that can be trusted."""
     before, after = study.points.statistics(NOMINAL), study.points.statistics(CALIBRATED)
-    checks = calibration_checks(study)
-    status = worst(checks)
-    answer, headline = TRUST[status]
+    checks = calibration_checks(study.results, study.estimate, study.points)
+    trust = Trust(checks)
     rungs = [rung("as delivered", before, "nominal")]
     if RIGID in study.points.errors:
         rungs.append(rung("rigid geometry", study.points.statistics(RIGID), "rigid"))
     rungs.append(rung("calibrated", after, "elastic"))
     return Verdict(
-        status,
-        headline,
+        trust.status,
+        HEADLINES[trust.status],
         f"As delivered, and after the best placement of the instrument, points were up to {millimetres(before.max)} mm from where the "
         f"robot should have been. The calibrated model is within {millimetres(after.p90)} mm at nine of ten of the same {after.poses} "
         f"points and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} better.",
-        three_facts(before, after, checks, answer, "points"),
+        three_facts(before, after, trust, "points"),
         tuple(rungs),
         f"Error of the robot at the {after.poses} measured points",
         checks,
     )
 
 
-def calibration_checks(study: CalibrationStudy) -> tuple[Check, ...]:
-    """The checks behind the verdict."""
-    results, found, errors = study.results, study.determined, study.points.statistics(CALIBRATED)
+def calibration_checks(
+    results: Mapping[str, Any], estimate: Estimate, points: MeasuredPoints
+) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
+    found, errors = determined(results), points.statistics(CALIBRATED)
     terms = tuple(results["terms"])
-    left_out = next(((step.order, step.place) for step in study.steps if step.terms == terms), None)
+    left_out = next(((step.order, step.place) for step in term_steps(results) if step.terms == terms), None)
     drift = results["drift"]
     distance = math.nan if drift["distance_mm"] is None else drift["distance_mm"] * MILLIMETRE
     return (
-        check_left_out(errors.mean, left_out),
-        check_residual(
-            "Does noise explain what the fit leaves?",
-            study.estimate,
-            sigma_given=results["fit"]["sigma_given"],
+        check_left_out(errors.mean, left_out, found.rank / (3 * errors.poses)).named(
+            "left_out", independent=True
         ),
-        check_rank(found.parameters, found.rank, found.gap),
-        check_drift(distance, certain=drift["certain"]),
-        check_outliers(len(study.estimate.outliers), errors),
+        check_residual(
+            "Does the measurement noise explain the residuals?",
+            estimate,
+            sigma_given=results["fit"]["sigma_given"],
+        ).named("residual"),
+        check_rank(found.parameters, found.rank, found.gap).named("rank"),
+        check_drift(distance, certain=drift["certain"]).named("drift"),
+        check_outliers(len(estimate.outliers), errors).named("outliers"),
     )
 
 

@@ -42,6 +42,31 @@ def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
     return Check(question, answer, "good")
 
 
+def check_unseen(fitted: Sequence[str]) -> Check:
+    """Whether the calibration was fitted to none of the files; `fitted` names those that it was fitted to."""
+    question = "Did the calibration never see these points?"
+    if fitted:
+        which = " and ".join(fitted)
+        return Check(
+            question,
+            f"No: it was fitted to {which}, so this says little about other poses; verify on poses that it never saw.",
+            "unknown",
+        )
+    return Check(question, "None of the files is one that it was fitted to.", "good")
+
+
+def check_enough(poses: int) -> Check:
+    """Whether so many poses are enough for a 90 % value."""
+    question = "Were enough fresh poses measured?"
+    if poses >= FEW_POSES:
+        return Check(
+            question, f"{poses} points; the 90 % value rests on about {max(1, poses // 10)} of them.", "good"
+        )
+    return Check(
+        question, f"{poses} points are few; with {FEW_POSES} or more the worst ones mean something.", "care"
+    )
+
+
 def check_claimed_uncertainty(
     verification: Verification, noise: np.ndarray | None = None, *, noise_given: bool = True
 ) -> Check:
@@ -160,19 +185,30 @@ def check_truth(covered: int, total: int) -> Check:
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
 
 
-def check_left_out(mean: float, left_out: tuple[float, float] | None) -> Check:
-    """Whether poses left out of the fit, by order and by place, were predicted as well as those in it; mean errors in m."""
-    question = "Does it hold at poses that the fit did not see?"
-    if left_out is None:
+def check_left_out(mean: float, left_out: tuple[float, float] | None, share: float) -> Check:
+    """Whether cross-validation errors are as small as those of the fit let expect.
+
+    `mean` is the mean error (m) of the fit, `left_out` those of poses left out by order and by place, `share` the number of parameters
+    over that of measured coordinates. A fit of p parameters to n numbers of variance σ² leaves σ² (1 − p/n) and predicts others with
+    σ² (1 + p/n), to first order.
+    """
+    question = "Are poses left out of the fit predicted?"
+    if left_out is None or share >= 1:
         return Check(
             question,
-            "Not known: nothing was left out. Measure some fresh poses and run flexcal verify before relying on it.",
-            "care",
+            "Cannot be judged: no pose was left out. Measure fresh poses and run flexcal verify before relying on it.",
+            "unknown",
         )
-    answer = f"Left out in turn, poses are {millimetres(left_out[1])} mm off on average, {millimetres(mean)} mm when part of the fit."
-    if max(left_out) > 1.5 * mean:
+    expected = float(np.sqrt((1 + share) / (1 - share))) * mean
+    answer = (
+        f"In cross-validation the mean error is {millimetres(max(left_out))} mm; {millimetres(mean)} mm in the fit let "
+        f"{millimetres(expected)} mm expect."
+    )
+    if max(left_out) > CHANCE * expected:
         return Check(
-            question, f"{answer} That is a large step: the model is too rich for these poses.", "care"
+            question,
+            f"{answer} That is {max(left_out) / expected:.2f} times as much: the model overfits or lacks a term.",
+            "care",
         )
     return Check(question, answer, "good")
 

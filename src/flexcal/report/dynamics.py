@@ -17,7 +17,7 @@ from flexcal.report.dynamics_checks import (
     check_unseen,
 )
 from flexcal.report.notation import significant
-from flexcal.report.page import Check, Fact, Page, Section, Status, Verdict, tally, worst
+from flexcal.report.page import Check, Fact, Page, Section, Status, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.sections.base_parameters import base_parameters_section
 from flexcal.report.sections.friction import friction_section
@@ -25,11 +25,13 @@ from flexcal.report.sections.learned_residual import learned_section
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.signals import signals_table
 from flexcal.report.sections.torques import recording_labels, torque_blocks
+from flexcal.report.trust import Trust
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Identified, and the torques can be trusted"),
-    "care": ("With care", "Identified; read what is not sure below before relying on it"),
-    "bad": ("No", "Do not rely on these dynamics yet"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Identified, and the torques can be trusted",
+    "care": "Identified, with reservations: read the checks below before relying on it",
+    "bad": "Do not rely on these dynamics yet",
+    "unknown": "Identified; torques of other motions were not checked",
 }
 
 
@@ -44,13 +46,13 @@ class DynamicsStudy:
     estimate: Estimate
     predictions: Sequence[TorquePrediction]
 
-    @property
-    def held_out(self) -> str:
-        """What the fit never saw, in words; empty for nothing."""
-        found = self.results.get("hold_out", {})
-        if found.get("logs"):
-            return " and ".join(PurePath(log).name for log in found["logs"])
-        return f"the last {100 * found['share']:.0f} % of every recording" if found.get("share") else ""
+
+def held_out(results: Mapping[str, Any]) -> str:
+    """What was kept out of the fit, in words; empty for nothing."""
+    found = results.get("hold_out", {})
+    if found.get("logs"):
+        return " and ".join(PurePath(log).name for log in found["logs"])
+    return f"the last {100 * found['share']:.0f} % of every recording" if found.get("share") else ""
 
 
 def write_dynamics_report(path: str | Path, study: DynamicsStudy) -> None:
@@ -73,14 +75,14 @@ def dynamics_page(study: DynamicsStudy) -> Page:
                 "Torques: predicted against measured",
                 "What counts is whether the robot's torques are predicted in motions that the fit never saw.",
                 (
-                    *torque_blocks(results["error_percent"], study.held_out, logs),
+                    *torque_blocks(results["error_percent"], held_out(results), logs),
                     signals_table(results["signals"]),
                 ),
             ),
             base_parameters_section(results, study.estimate),
             friction_section(results),
             *(
-                [learned_section(learned, study.held_out)]
+                [learned_section(learned, held_out(results))]
                 if (learned := results.get("learned_residual"))
                 else []
             ),
@@ -94,13 +96,12 @@ def dynamics_page(study: DynamicsStudy) -> Page:
 
 def dynamics_verdict(study: DynamicsStudy) -> Verdict:
     """How well torques are predicted, what is determined, and whether that can be trusted."""
-    results, checks = study.results, dynamics_checks(study)
+    results, checks = study.results, dynamics_checks(study.results)
     error, base = results["error_percent"], results["base_parameters"]
-    status = worst(checks)
-    answer, headline = _TRUST[status]
-    unseen = error["held_out"] if study.held_out else None
+    trust = Trust(checks)
+    unseen = error["held_out"] if held_out(results) else None
     shown = error["train"] if unseen is None else unseen
-    where = study.held_out or "the recordings of the fit"
+    where = held_out(results) or "the recordings of the fit"
     fitted = f" In the fit it is {significant(error['train'], 3)} %." if unseen is not None else ""
     facts = (
         Fact("How well are torques predicted?", significant(shown, 3), "% missed", f"Of {where}.{fitted}"),
@@ -111,7 +112,7 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
             f"{len(results['essential_parameters']['parameters'])} of them are essential. A robot with viscous and Coulomb friction and "
             f"an offset alone would have {results['structural_rank']}.",
         ),
-        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+        trust.fact(),
     )
     sentence = (
         f"Of {where}, the identified robot misses {significant(shown, 3)} % of the norm of the measured torques."
@@ -119,16 +120,15 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
         else f"In the recordings of the fit, the identified robot misses {significant(shown, 3)} % of the norm of the measured torques; "
         "what it misses in other motions is not known."
     )
-    return Verdict(status, headline, sentence, facts, (), "", checks)
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
 
 
-def dynamics_checks(study: DynamicsStudy) -> tuple[Check, ...]:
-    """The checks behind the verdict."""
-    results = study.results
+def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
     return (
-        check_unseen(results["error_percent"], study.held_out),
-        check_joints(results["error_percent"]["per_joint"]),
-        check_base(results),
-        check_bodies(results["bodiless_links"]),
-        check_shown(results["remarks"]),
+        check_unseen(results["error_percent"], held_out(results)).named("held_out", independent=True),
+        check_joints(results["error_percent"]["per_joint"]).named("joints"),
+        check_base(results).named("base_parameters"),
+        check_bodies(results["bodiless_links"]).named("bodies"),
+        check_shown(results["remarks"]).named("drive_terms"),
     )

@@ -23,8 +23,8 @@ def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
     if not held_out:
         return Check(
             question,
-            "Not known: nothing was held out. Identify again with --hold-out last:0.3, or with --validate and another recording.",
-            "care",
+            "Cannot be judged: nothing was held out. Identify again with --hold-out last:0.3, or with --validate and another recording.",
+            "unknown",
         )
     unseen, train = error["held_out"], error["train"]
     answer = (

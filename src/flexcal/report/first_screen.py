@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Literal
 
 from flexcal.calibration import ErrorStatistics
 from flexcal.report.notation import NOTHING, millimetres
-from flexcal.report.page import Check, Fact, Rung, tally, worst
+from flexcal.report.page import Fact, Rung
+from flexcal.report.trust import Trust
 
 
 def three_facts(
-    before: ErrorStatistics | None, after: ErrorStatistics, checks: Sequence[Check], answer: str, noun: str
+    before: ErrorStatistics | None, after: ErrorStatistics, trust: Trust, noun: str
 ) -> tuple[Fact, ...]:
-    """How accurate it was, how accurate it is, and `answer` to whether it can be trusted; `noun` is poses or points."""
+    """How accurate it was, how accurate it is, and whether it can be trusted; `noun` is poses or points."""
     was = _fact("How accurate was it?", before, f"9 of 10 {noun} were within this, as delivered.")
     now = _fact("How accurate is it?", after, f"9 of 10 {noun} are within this, calibrated.")
-    trust = Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", worst(checks))
-    return (was, now, trust)
+    return (was, now, trust.fact())
 
 
 def rung(

@@ -11,14 +11,16 @@ from flexcal.estimation import Estimate
 from flexcal.report.checks import check_residual
 from flexcal.report.dynamics_checks import LARGE, TOO_LARGE
 from flexcal.report.notation import NOTHING, scaled, significant
-from flexcal.report.page import Check, Fact, Page, Section, Status, Table, Verdict, tally, worst
+from flexcal.report.page import Check, Fact, Page, Section, Status, Table, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.trust import Trust
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Identified, and both stages can begin from it"),
-    "care": ("With care", "Identified; read what is not sure below before relying on it"),
-    "bad": ("No", "Do not rely on these inertials yet"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Identified, and both stages can begin from it",
+    "care": "Identified, with reservations: read the checks below before relying on it",
+    "bad": "Do not rely on these inertials yet",
+    "unknown": "Identified; torques of other motions were not checked",
 }
 
 
@@ -58,9 +60,8 @@ _LEAD = (
 
 def _verdict(study: InertialsStudy) -> Verdict:
     error = study.results["error_percent"]
-    checks = (_check_error(error), check_residual("Does noise explain what the fit leaves?", study.estimate))
-    status = worst(checks)
-    answer, headline = _TRUST[status]
+    checks = inertials_checks(study.results, study.estimate)
+    trust = Trust(checks)
     before, after = (f"{significant(error[key], 3)}" for key in ("nominal", "train"))
     facts = (
         Fact(
@@ -75,13 +76,21 @@ def _verdict(study: InertialsStudy) -> Verdict:
             "% missed",
             "With the identified values, of the same recordings.",
         ),
-        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+        trust.fact(),
     )
     sentence = (
         f"Of the torques of the trajectories up to 5 Hz, the nominal robot misses {before} % of their norm and the identified one "
         f"{after} %."
     )
-    return Verdict(status, headline, sentence, facts, (), "", checks)
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
+
+
+def inertials_checks(results: Mapping[str, Any], estimate: Estimate) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
+    return (
+        _check_error(results["error_percent"]).named("torques"),
+        check_residual("Does the measurement noise explain the residuals?", estimate).named("residual"),
+    )
 
 
 def _check_error(error: Mapping[str, float]) -> Check:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
@@ -15,11 +15,20 @@ Status = Literal["good", "care", "bad", "unknown"]
 
 @dataclass(frozen=True)
 class Check:
-    """One question about trust, its answer in a sentence, and whether that is good news."""
+    """One question about trust, its answer in a sentence, and whether that is good news.
+
+    `code` names it in results.json; an `independent` check compares with data that the fit did not use.
+    """
 
     question: str
     answer: str
     status: Status
+    code: str = ""
+    independent: bool = False
+
+    def named(self, code: str, *, independent: bool = False) -> Check:
+        """The same check with its code."""
+        return replace(self, code=code, independent=independent)
 
 
 @dataclass(frozen=True)

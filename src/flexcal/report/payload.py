@@ -10,17 +10,19 @@ from typing import Any
 from flexcal.dynamics import TorquePrediction
 from flexcal.estimation import Estimate
 from flexcal.report.notation import NOTHING, scaled, to_half_width
-from flexcal.report.page import Fact, Page, Section, Status, Table, Text, Verdict, tally, worst
+from flexcal.report.page import Fact, Page, Section, Status, Table, Text, Verdict
 from flexcal.report.payload_checks import payload_checks
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.signals import signals_table
 from flexcal.report.sections.torques import recording_labels, torque_blocks
+from flexcal.report.trust import Trust
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Identified, and it can be relied on"),
-    "care": ("With care", "Identified; read what is not sure below before relying on it"),
-    "bad": ("No", "Do not rely on this payload yet"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Identified, and it can be relied on",
+    "care": "Identified, with reservations: read the checks below before relying on it",
+    "bad": "Do not rely on this payload yet",
+    "unknown": "Identified; there is nothing independent to compare it with",
 }
 _COM = tuple(f"payload.com_{axis}" for axis in "xyz")
 
@@ -82,8 +84,7 @@ def _logs(study: PayloadStudy) -> dict[str, TorquePrediction]:
 
 def _verdict(study: PayloadStudy) -> Verdict:
     results, checks = study.results, payload_checks(study.results)
-    status = worst(checks)
-    answer, headline = _TRUST[status]
+    trust = Trust(checks)
     estimate = study.estimate
     mass, com = _rounded(estimate, "payload.mass"), ", ".join(_rounded(estimate, name) for name in _COM)
     declared = results["declared"]
@@ -98,7 +99,7 @@ def _verdict(study: PayloadStudy) -> Verdict:
             "",
             f"In the frame {results['frame']}; 95 %: {widths} mm.",
         ),
-        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+        trust.fact(),
     )
     loaded, free = (len(results["recordings"][key]) for key in ("loaded", "free"))
     without = f" and {free} without" if free else ""
@@ -106,7 +107,7 @@ def _verdict(study: PayloadStudy) -> Verdict:
         f"Mass and centre of mass come from the torques of {loaded} {'recording' if loaded == 1 else 'recordings'} with the payload"
         f"{without}; deflection under load is computed with them."
     )
-    return Verdict(status, headline, sentence, facts, (), "", checks)
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
 
 
 def _table(study: PayloadStudy) -> Table:

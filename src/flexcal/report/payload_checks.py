@@ -20,12 +20,14 @@ _WIDE = 0.05
 def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     return (
-        _check_torques(results["error_percent"]),
-        _check_body(results["body_rise"]),
-        _check_mass(results["parameters"]["payload.mass"]),
-        _check_told(results["parameters"]),
-        _check_declared(results["parameters"]["payload.mass"], results["declared"]),
-        _check_others(results["other_payloads"]),
+        _check_torques(results["error_percent"]).named("torques"),
+        _check_body(results["body_rise"]).named("bodies"),
+        _check_mass(results["parameters"]["payload.mass"]).named("mass"),
+        _check_told(results["parameters"]).named("payload_parameters"),
+        _check_declared(results["parameters"]["payload.mass"], results["declared"]).named(
+            "declared_mass", independent=True
+        ),
+        _check_others(results["other_payloads"]).named("other_estimates"),
     )
 
 

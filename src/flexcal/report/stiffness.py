@@ -10,17 +10,18 @@ from typing import Any
 from flexcal.estimation import Estimate
 from flexcal.report.checks import check_residual, check_springs
 from flexcal.report.fitted_response import FittedResponse
-from flexcal.report.page import Block, Check, Fact, Page, Section, Status, Text, Verdict, tally, worst
+from flexcal.report.page import Block, Check, Page, Section, Status, Text, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.springs import spring_table, unseen_springs
 from flexcal.report.sections.stiffness import response_blocks
+from flexcal.report.trust import Trust
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Springs identified, and the numbers can be trusted"),
-    "care": ("With care", "Springs identified; read what is not sure below before relying on them"),
-    "bad": ("No", "Do not rely on these springs yet"),
-    "unknown": ("Unknown", "Springs identified; nothing could be checked"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Springs identified, and the numbers can be trusted",
+    "care": "Springs identified, with reservations: read the checks below before relying on them",
+    "bad": "Do not rely on these springs yet",
+    "unknown": "Springs identified; whether they can be trusted cannot be judged by this stage alone",
 }
 
 
@@ -32,9 +33,10 @@ class StiffnessStudy:
     estimate: Estimate
     responses: tuple[FittedResponse, ...]
 
-    def springs(self, kind: str) -> tuple[str, ...]:
-        """Names of all stiffnesses or dampings."""
-        return tuple(name for name in self.estimate.parameters.names if name.endswith(f".{kind}"))
+
+def springs_of(estimate: Estimate, kind: str) -> tuple[str, ...]:
+    """Names of all stiffnesses or dampings."""
+    return tuple(name for name in estimate.parameters.names if name.endswith(f".{kind}"))
 
 
 def write_stiffness_report(path: str | Path, study: StiffnessStudy) -> None:
@@ -58,26 +60,29 @@ def stiffness_page(study: StiffnessStudy) -> Page:
     )
 
 
-def stiffness_checks(study: StiffnessStudy) -> tuple[Check, ...]:
+def stiffness_checks(estimate: Estimate) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     return (
-        check_residual("Does noise explain what the fit leaves?", study.estimate),
-        check_springs(study.estimate, study.springs("stiffness"), study.springs("damping")),
+        check_residual("Does the measurement noise explain the residuals?", estimate).named(
+            "residual_stiffness"
+        ),
+        check_springs(estimate, springs_of(estimate, "stiffness"), springs_of(estimate, "damping")).named(
+            "springs"
+        ),
     )
 
 
 def _verdict(study: StiffnessStudy) -> Verdict:
-    checks = stiffness_checks(study)
-    status = worst(checks)
-    answer, headline = _TRUST[status]
-    facts = (Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),)
+    checks = stiffness_checks(study.estimate)
+    trust = Trust(checks)
+    facts = (trust.fact(),)
     sentence = "Stiffness and damping were identified; how accurate the tool is, positions have to tell."
-    return Verdict(status, headline, sentence, facts, (), "", checks)
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
 
 
 def _blocks(study: StiffnessStudy) -> tuple[Block, ...]:
     estimate = study.estimate
-    stiffness, damping = study.springs("stiffness"), study.springs("damping")
+    stiffness, damping = springs_of(estimate, "stiffness"), springs_of(estimate, "damping")
     unseen = unseen_springs(estimate, (*stiffness, *damping))
     return (
         spring_table(estimate, stiffness, "stiffness", None, {}, ""),

@@ -17,7 +17,7 @@ from flexcal.report.checks import (
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID
 from flexcal.report.notation import millimetres, ratio
-from flexcal.report.page import Check, Page, Rung, Status, Verdict, worst
+from flexcal.report.page import Check, Page, Rung, Status, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.sections.comparison import comparison_section
 from flexcal.report.sections.geometry import geometry_section
@@ -28,15 +28,16 @@ from flexcal.report.sections.stage_zero import stage_zero_section
 from flexcal.report.sections.stiffness import stiffness_section
 from flexcal.report.sections.verification import verification_section
 from flexcal.report.study import TwoStageStudy
+from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 
-TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Calibrated, and the numbers can be trusted"),
-    "care": ("With care", "Calibrated; read what is not sure below before relying on it"),
-    "bad": ("No", "Do not rely on this calibration yet"),
-    "unknown": ("Unknown", "Calibrated; nothing could be checked"),
+HEADLINES: dict[Status, str] = {
+    "good": "Calibrated, and the numbers can be trusted",
+    "care": "Calibrated, with reservations: read the checks below before relying on it",
+    "bad": "Do not rely on this calibration yet",
+    "unknown": "Calibrated; whether it can be trusted cannot be judged yet",
 }
-"""Answer and headline by what the worst check says."""
+"""Headline of a calibration by its verdict."""
 
 
 def write_two_stage_report(path: str | Path, study: TwoStageStudy) -> None:
@@ -71,47 +72,57 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
     """How accurate it was, how accurate it is, and whether that can be trusted."""
     before, rigid, after = (study.fresh.statistics(model) for model in (NOMINAL, RIGID, CALIBRATED))
     checks = two_stage_checks(study)
-    status = worst(checks)
-    answer, headline = TRUST[status]
+    trust = Trust(checks)
     sentence = (
         f"As delivered, the tool was up to {millimetres(before.max)} mm from where it should be. On {after.poses} fresh poses it is "
         f"now within {millimetres(after.p90)} mm at nine of ten and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} "
         f"better. The best calibration without elasticity would leave {millimetres(rigid.p90)} and {millimetres(rigid.max)} mm."
     )
     return Verdict(
-        status,
-        headline,
+        trust.status,
+        HEADLINES[trust.status],
         sentence,
-        three_facts(before, after, checks, answer, "poses"),
+        three_facts(before, after, trust, "poses"),
         _rungs(study),
         f"Error of the tool on {after.poses} poses that were not used for the fit, against the noise-free truth",
-        checks,
+        (*checks, *truth_checks(study)),
     )
 
 
 def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
-    """The checks behind the verdict."""
+    """The checks behind the verdict: those that a real robot would have too."""
     found, geometry, determined, fresh = study.stiffness, study.geometry, study.determined, study.verification
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
     drift = study.results["calibration_fit"]["drift"]
-    checks = [
-        check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all),
-        check_claimed_uncertainty(fresh, study.unpredicted_noise),
-        check_residual("Does noise explain what the geometric fit leaves?", geometry),
-        check_residual("Does noise explain what the elastic fit leaves?", found),
-        check_drift(drift["distance_mm"] * MILLIMETRE, certain=drift["certain"]),
-        check_springs(found, stiffness, damping),
-        check_rank(determined.parameters, determined.rank, determined.gap),
-        check_flanks(fresh),
-    ]
+    return (
+        check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all).named(
+            "fresh_poses", independent=True
+        ),
+        check_claimed_uncertainty(fresh, study.unpredicted_noise).named(
+            "claimed_uncertainty", independent=True
+        ),
+        check_residual("Does the measurement noise explain the residuals of the geometry?", geometry).named(
+            "residual"
+        ),
+        check_residual("Does the measurement noise explain the residuals of the responses?", found).named(
+            "residual_stiffness"
+        ),
+        check_drift(drift["distance_mm"] * MILLIMETRE, certain=drift["certain"]).named("drift"),
+        check_springs(found, stiffness, damping).named("springs"),
+        check_rank(determined.parameters, determined.rank, determined.gap).named("rank"),
+        check_flanks(fresh).named("flanks"),
+    )
+
+
+def truth_checks(study: TwoStageStudy) -> tuple[Check, ...]:
+    """Comparison with the hidden truth, which the verdict leaves out because a real robot has none to compare with."""
+    springs = study.springs("stiffness") + study.springs("damping")
     pairs = (
-        coverage(found, stiffness + damping, study.truth),
-        coverage(geometry, study.kept, study.truth),
+        coverage(study.stiffness, springs, study.truth),
+        coverage(study.geometry, study.kept, study.truth),
     )
     covered, total = (sum(pair[k] for pair in pairs) for k in (0, 1))
-    if total:
-        checks.append(check_truth(covered, total))
-    return tuple(checks)
+    return (check_truth(covered, total).named("truth"),) if total else ()
 
 
 def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:

@@ -2,32 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from flexcal.calibration import Verification
-from flexcal.report.checks import FEW_POSES, check_claimed_uncertainty, check_flanks
+from flexcal.report.checks import check_claimed_uncertainty, check_enough, check_flanks, check_unseen
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.measured_points import NOMINAL, ArmPoses, MeasuredPoints
 from flexcal.report.notation import millimetres, sentences, statistics_cells
-from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Text, Verdict, worst
+from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Text, Verdict
 from flexcal.report.palette import ELASTIC
 from flexcal.report.palette import NOMINAL as GREY
 from flexcal.report.render import write_page
 from flexcal.report.sections.geometry import arm_figure
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.residuals import residual_blocks
+from flexcal.report.trust import Trust
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Verified on fresh poses"),
-    "care": ("With care", "Verified; read what is not sure below before relying on it"),
-    "bad": ("No", "Less accurate than predicted"),
-    "unknown": ("Unknown", "Measured; nothing could be checked"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Verified on fresh poses",
+    "care": "Verified, with reservations: read the checks below before relying on it",
+    "bad": "Less accurate than predicted",
+    "unknown": "Measured; whether the calibration can be trusted cannot be judged",
 }
 
 
@@ -72,52 +73,36 @@ def verification_page(study: VerificationStudy) -> Page:
 
 
 def _verdict(study: VerificationStudy) -> Verdict:
-    result, poses, fitted = study.verification, study.points.poses, study.results["fitted"]
+    result, fitted = study.verification, study.results["fitted"]
     after = result.all
     before = study.points.statistics(NOMINAL) if study.points.nominal is not None else None
-    checks = [
-        _check_fresh(fitted),
-        _check_enough(after.poses),
-        check_claimed_uncertainty(result, poses.sigma, noise_given=poses.sigma_given),
-    ]
-    if study.results["backlash"]:
-        checks.append(check_flanks(result))
-    status = worst(checks)
-    answer, headline = _TRUST[status]
+    checks = verification_checks(study.results, study.points)
+    trust = Trust(checks)
     rungs = [] if before is None else [rung("as delivered", before, "nominal")]
     noun = "points" if fitted else "fresh points"
     return Verdict(
-        status,
-        headline,
+        trust.status,
+        _HEADLINES[trust.status],
         f"At nine of ten of {after.poses} {noun} the calibrated model is within {millimetres(after.p90)} mm of what the instrument "
         f"reads, and within {millimetres(after.max)} mm at all of them. The instrument's own noise is part of these numbers.",
-        three_facts(before, after, checks, answer, "points"),
+        three_facts(before, after, trust, "points"),
         (*rungs, rung("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} {noun}, against the instrument",
-        tuple(checks),
+        checks,
     )
 
 
-def _check_fresh(fitted: Sequence[str]) -> Check:
-    question = "Did the calibration never see these points?"
-    if fitted:
-        which = " and ".join(fitted)
-        return Check(
-            question,
-            f"It was fitted to {which}, so this says little about other poses; verify on poses that it never saw.",
-            "care",
-        )
-    return Check(question, "None of the files is one that it was fitted to.", "good")
-
-
-def _check_enough(poses: int) -> Check:
-    question = "Were enough fresh poses measured?"
-    if poses >= FEW_POSES:
-        return Check(
-            question, f"{poses} points; the 90 % value rests on about {max(1, poses // 10)} of them.", "good"
-        )
-    return Check(
-        question, f"{poses} points are few; with {FEW_POSES} or more the worst ones mean something.", "care"
+def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
+    found, poses = points.verification, points.poses
+    flanks = (check_flanks(found).named("flanks"),) if results["backlash"] else ()
+    return (
+        check_unseen(results["fitted"]).named("unseen_poses", independent=True),
+        check_enough(found.all.poses).named("enough_poses"),
+        check_claimed_uncertainty(found, poses.sigma, noise_given=poses.sigma_given).named(
+            "claimed_uncertainty", independent=True
+        ),
+        *flanks,
     )
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -28,8 +29,10 @@ from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.report.calibration import calibration_checks
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, MeasuredPoints
+from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
@@ -38,6 +41,7 @@ from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import (
     identifiability_block,
     identifiability_spectrum,
+    plain,
     quantities,
     write_results,
 )
@@ -72,8 +76,17 @@ class RobotCalibration:
             del errors[RIGID]
         return MeasuredPoints(fit.poses, errors, fit.ambiguous)
 
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(calibration_checks(plain(self._numbers), self.estimate, self.points))
+
     def document(self) -> dict[str, Any]:
         """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
+        return {**self._numbers, "verdict": self.trust.document()}
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
         selected, table = self.selected, self.selection.table if self.selection else ()
         found, drift = selected.identifiability, Drift.of(selected)
         return {

@@ -28,6 +28,8 @@ from flexcal.estimates_file import sha256_of
 from flexcal.model import RobotModel, carried_mass
 from flexcal.model.rotations import vector_rotation
 from flexcal.report.certificate import CertificateStudy, write_certificate
+from flexcal.report.prediction_checks import prediction_checks
+from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
 from flexcal.workflow.verify_robot import fitted_files, registrable, verification_poses
@@ -116,6 +118,11 @@ class RobotCertificate:
             )
         return tuple(remarks)
 
+    @property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as those of a map."""
+        return Trust(prediction_checks(self.scale, self.fitted))
+
     def document(self) -> dict[str, Any]:
         """The JSON document."""
         temperature = [
@@ -140,6 +147,7 @@ class RobotCertificate:
             "prediction": self.scale.document(),
             "rms_mm": {name: value / MILLIMETRE for name, value in self.rms.items()},
             "files": self.files,
+            "verdict": self.trust.document(),
             "remarks": list(self.remarks),
             "command": self.command,
         }

@@ -15,6 +15,8 @@ from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.inertials import inertials_checks
+from flexcal.report.trust import Trust
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
@@ -34,8 +36,17 @@ class RobotInertials:
     estimates: Path
     command: str = ""
 
+    @property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(inertials_checks(self._numbers, self.estimate))
+
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
+        return {**self._numbers, "verdict": self.trust.document()}
+
+    @property
+    def _numbers(self) -> dict[str, Any]:
         return {
             "robot": self.nominal.name,
             "trajectories": self.trajectories,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -25,6 +26,8 @@ from flexcal.model import RobotModel
 from flexcal.model.held_payload import holding, last_frame
 from flexcal.model.stored import PAYLOAD_FRAME, with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.report.payload_checks import payload_checks
+from flexcal.report.trust import Trust
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_systems import read_logs
 from flexcal.workflow.log_torques import require_joint_torques
@@ -62,8 +65,18 @@ class RobotPayload:
     estimates: Path
     command: str = ""
 
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(payload_checks(self._numbers))
+
     def document(self) -> dict[str, Any]:
-        """The content of results.json; `declaration` is the line of robot.yaml that says the same."""
+        """The content of results.json."""
+        return {**self._numbers, "verdict": self.trust.document()}
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        """Everything but the verdict; `declaration` is the line of robot.yaml that says the same."""
         fit, held = self.fit, self.declared.payload
         joints = self.declared.joint_names
         return {

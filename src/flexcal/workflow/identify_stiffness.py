@@ -26,6 +26,7 @@ from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.report.trust import Trust
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
@@ -57,6 +58,13 @@ class RobotStiffness:
     estimates: Path
     command: str = ""
 
+    @property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        from flexcal.report.stiffness import stiffness_checks
+
+        return Trust(stiffness_checks(self.estimate))
+
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         estimate = self.estimate
@@ -72,6 +80,7 @@ class RobotStiffness:
                 "dropped": dropped_parameters(estimate.dropped),
             },
             "parameters": quantities(estimate),
+            "verdict": self.trust.document(),
             "robot": self.robot,
             "estimates": self.estimates,
             "command": self.command,

@@ -28,6 +28,8 @@ from flexcal.errors import InputError
 from flexcal.estimates_file import provenance
 from flexcal.progress import Progress, silent
 from flexcal.report.accuracy_map import MapStudy, write_map_page
+from flexcal.report.prediction_checks import prediction_checks
+from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
@@ -78,6 +80,11 @@ class RobotMap:
             )
         return tuple(remarks)
 
+    @property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(prediction_checks(self.scale, self.fitted))
+
     def document(self) -> dict[str, Any]:
         """The JSON document."""
         found, scale = self.map, self.scale
@@ -107,6 +114,7 @@ class RobotMap:
                 "applied": applied_factor(scale),
                 "fitted": list(self.fitted),
             },
+            "verdict": self.trust.document(),
             "remarks": list(self.remarks),
             "provenance": dict(self.provenance),
             "command": self.command,

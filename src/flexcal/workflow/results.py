@@ -22,7 +22,7 @@ _ROUNDING = 1e-9
 
 def json_text(document: Mapping[str, Any]) -> str:
     """`document` as JSON, in ASCII letters; numbers that are not finite become null."""
-    return json.dumps(_plain(document), indent=2, allow_nan=False)
+    return json.dumps(plain(document), indent=2, allow_nan=False)
 
 
 def write_results(folder: Path, document: Mapping[str, Any]) -> None:
@@ -81,15 +81,16 @@ def identifiability_spectrum(found: Identifiability) -> dict[str, Any]:
     }
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
+    """`value` as JSON has it: lists for arrays, null for numbers that are not finite, text for paths."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, np.ndarray):
-        return _plain(value.tolist())
+        return plain(value.tolist())
     if isinstance(value, list | tuple):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, np.generic):
-        return _plain(value.item())
+        return plain(value.item())
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value

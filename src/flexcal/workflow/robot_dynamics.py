@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from flexcal.dynamics import EssentialParameters, FrictionSelection, RegressionData
 from flexcal.estimation import Estimate
 from flexcal.model.pseudo_inertia import is_body
+from flexcal.report.dynamics import dynamics_checks
+from flexcal.report.trust import Trust
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.estimators import EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
@@ -49,8 +52,17 @@ class RobotDynamics:
         links = (joint.link for joint in self.train.observation.model.joints)
         return tuple(link for link in links if not is_body(self.estimate.values, link))
 
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(dynamics_checks(self._numbers))
+
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
+        return {**self._numbers, "verdict": self.trust.document()}
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
         x = self.estimate.parameters.coordinates()
         error, each = self.train.errors(x)
         joints = self.train.observation.model.joint_names

@@ -24,11 +24,13 @@ from flexcal.progress import Progress, silent
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.fitted_response import fitted_responses
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
+from flexcal.report.trust import Trust
+from flexcal.report.two_stage import two_stage_checks
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.fitted_files import write_fitted
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.point_files import write_arm, write_points
-from flexcal.workflow.report_folder import report_folder
+from flexcal.workflow.report_folder import report_folder, two_stage_study
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
 from flexcal.workflow.two_stage_results import VERIFICATION, two_stage_document, write_verification
@@ -194,6 +196,9 @@ def run_two_stage(
     errors = {NOMINAL: run.nominal_at_calibration.errors, CALIBRATED: calibration.residuals}
     write_points(out, MeasuredPoints(measured, errors, calibration.ambiguous))
     write_arm(out, arms_at(calibration.model, measured, errors))
+    write_results(out, run.results)
+    trust = Trust(two_stage_checks(two_stage_study(out)))
+    run = replace(run, trust=trust, results={**run.results, "verdict": trust.document()})
     write_results(out, run.results)
     if report:
         report_folder(out)

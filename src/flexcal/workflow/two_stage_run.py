@@ -12,6 +12,7 @@ from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.report.trust import Trust
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class TwoStageRun:
     fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
     `verification_poses` are against the noise-free truth; `measured_verification`, at the same poses, is against the instrument. `floor` is
     the error that would remain with every parameter known. `truth` maps parameter names to SI values.
-    `results` is the document of results.json, `seconds` durations by stage.
+    `results` is the document of results.json, `trust` the verdict in it, `seconds` durations by stage.
     """
 
     nominal: RobotModel
@@ -54,5 +55,6 @@ class TwoStageRun:
     cad_alone: CadAlone | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
     results: Mapping[str, Any] = field(default_factory=dict)
+    trust: Trust = field(default_factory=Trust)
     seed: int = 0
     command: str = ""

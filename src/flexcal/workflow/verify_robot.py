@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,8 @@ from flexcal.estimates_file import provenance, sha256_of
 from flexcal.model import RobotModel
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
+from flexcal.report.trust import Trust
+from flexcal.report.verification import verification_checks
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrate_robot import nominal_errors
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
@@ -60,8 +63,18 @@ class RobotVerification:
             )
         return tuple(remarks)
 
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(verification_checks(self._numbers, self.points))
+
     def document(self) -> dict[str, Any]:
-        """The content of results.json; `rms_mm` has the root mean square distances.
+        """The content of results.json."""
+        return {**self._numbers, "verdict": self.trust.document()}
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        """Everything but the verdict; `rms_mm` has the root mean square distances.
 
         `parameters` is what the parameters' covariance predicts, `expected` with the measurement's sigma on top (null where the files give
         none), `measured` what was found.
