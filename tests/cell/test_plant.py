@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from flexcal.cell.config import CellConfig, MismatchConfig, SpreadConfig
-from flexcal.cell.plant import Plant, build_plant, linearise, unresolved
+from flexcal.cell.plant import WRIST_DAMPING, Plant, build_plant, linearise, unresolved
 from flexcal.cell.resolution import resolved_plant
 from flexcal.cell.rest import rest
 from flexcal.cell.truth import draw_truth
 from flexcal.model import RobotModel, static_equilibrium
+from flexcal.model.further_springs import with_drive_springs
 from flexcal.model.linearisation import linearise as pinocchio_linearise
 from flexcal.units import DEGREE
 
@@ -29,7 +30,7 @@ def tx90l(request: pytest.FixtureRequest, tx90l: RobotModel) -> RobotModel:
 def rotor_and_arm_coordinates(plant: Plant, model: RobotModel) -> np.ndarray:
     """Matrix from (rotors, arm coordinates of the elastic joints) to the plant's, whose twist is the arm beyond the rotor."""
     names = list(plant.coordinates)
-    columns = [*model.elastic, *((e, c) for e in model.elastic for c in e.components)]
+    columns = [*model.driven, *((e, c) for e in model.elastic for c in e.components)]
     matrix = np.zeros((len(names), len(columns)))
     for k, column in enumerate(columns):
         if isinstance(column, tuple):
@@ -41,12 +42,16 @@ def rotor_and_arm_coordinates(plant: Plant, model: RobotModel) -> np.ndarray:
     return matrix
 
 
-@pytest.mark.parametrize("payload", [0.0, 6.0])
+@pytest.mark.parametrize(("payload", "wrist"), [(0.0, 0.0), (6.0, 0.0), (6.0, 50e3)])
 def test_mass_damping_stiffness_and_gravity_are_pinocchios(
-    tx90l: RobotModel, rng: np.random.Generator, payload: float
+    tx90l: RobotModel, rng: np.random.Generator, payload: float, wrist: float
 ) -> None:
+    """`wrist`: stiffness of the drives of joints 4 to 6, whose motors are braked; 0 is rigid."""
     truth = tx90l.with_values(draw_truth(tx90l, NO_GAP, rng))
-    plant = build_plant(truth, CellConfig(), q=POSE, free=(0, 1, 2), payload=payload)
+    config = CellConfig(mismatch=MismatchConfig(elastic_wrist=wrist))
+    plant = build_plant(truth, config, q=POSE, free=(0, 1, 2), payload=payload)
+    if wrist > 0:
+        truth = with_drive_springs(truth, dict.fromkeys((3, 4, 5), (wrist, WRIST_DAMPING * wrist)))
     found = rest(plant, mujoco.MjData(plant.mjmodel), POSE[:3])
     ours = linearise(plant, found.position)
     theirs = pinocchio_linearise(truth, POSE, payload)
@@ -84,7 +89,7 @@ def test_the_wrist_is_locked_by_welding_it(tx90l: RobotModel) -> None:
 
 def test_an_elastic_wrist_adds_its_springs(tx90l: RobotModel) -> None:
     config = CellConfig(mismatch=MismatchConfig(elastic_wrist=30e3))
-    plant = build_plant(tx90l, config, q=POSE, free=(0, 1, 2), time_step=0.25e-3)
+    plant = build_plant(tx90l, config, q=POSE, free=(0, 1, 2), time_step=0.125e-3)
     assert unresolved(plant) is None
     assert [name for name in plant.coordinates if name[6] in "456"] == [
         "joint_4.drive",

@@ -7,6 +7,7 @@ from scipy.linalg import eigh
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 from flexcal.model.config import Bearings
+from flexcal.model.further_springs import with_drive_springs
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
 from flexcal.units import DEGREE
@@ -57,6 +58,26 @@ def test_every_derivative_of_the_transfer_matrix(tx90l: RobotModel, bearings: Be
         step = 1e-4 if ".com" in name else 1e-4 * tx90l.value(name)
         richardson = (4 * slope(name, step / 2) - slope(name, step)) / 3
         assert np.abs(richardson - exact[name]).max() < 1e-6 * np.abs(exact[name]).max(), name
+
+
+def test_derivatives_by_the_springs_of_a_braked_wrist(tx90l: RobotModel) -> None:
+    q = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2])
+    wrist = with_drive_springs(tx90l, dict.fromkeys((3, 4, 5), (5e4, 50.0)))
+    robot = wrist.with_values({"joint_4.held_inertia": 0.2})
+    names = [
+        f"joint_{i}.{key}" for i in (4, 5, 6) for key in ("drive.stiffness", "drive.damping", "held_inertia")
+    ]
+    names += ["link_5.mass", "payload.mass", "joint_1.bearing_x.stiffness"]
+    moved = transfer_matrix(linearise(robot, q, derivatives=names), LINES)
+    assert moved.response.shape == (len(LINES), 3, 3)
+    for name, exact in zip(moved.names, np.moveaxis(moved.derivatives, -1, 0), strict=True):
+        value, step = robot.value(name), 1e-3 * max(robot.value(name), 0.1)
+        ends = [
+            transfer_matrix(linearise(robot.with_values({name: value + s}), q), LINES).response
+            for s in (step, -step, step / 2, -step / 2)
+        ]
+        slope = (8 * (ends[2] - ends[3]) - (ends[0] - ends[1])) / (6 * step)
+        assert np.abs(slope - exact).max() < 1e-6 * np.abs(exact).max(), name
 
 
 def test_the_payloads_inertia_grows_with_its_mass(tx90l: RobotModel) -> None:

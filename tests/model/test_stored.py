@@ -9,7 +9,7 @@ import pytest
 from flexcal.errors import InputError
 from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.model import RobotModel
+from flexcal.model import RobotModel, static_equilibrium
 from flexcal.model.stored import apply_estimates
 
 
@@ -45,6 +45,26 @@ def test_values_and_covariance_come_with_the_robot(robot: Path) -> None:
     assert model.posterior.parameters.names == found.parameters.names
     assert np.array_equal(model.posterior.covariance, found.covariance)
     assert RobotModel.from_yaml(robot, estimates=False).value("elbow_joint.offset") == 0.0
+
+
+def test_a_spring_that_robot_yaml_does_not_declare_comes_with_its_estimate(robot: Path) -> None:
+    path = robot.parent / "estimates.yaml"
+    spring = [
+        Parameter("wrist_1_joint.drive.stiffness", "N m/rad", 5e4, scale="log"),
+        Parameter("wrist_1_joint.drive.damping", "N m s/rad", 40.0, scale="log"),
+        Parameter("wrist_1_joint.held_inertia", "kg m²", 0.1),
+    ]
+    write_estimates(path, "stiffness", estimate(*spring))
+    rigid, model = RobotModel.from_yaml(robot, estimates=False), RobotModel.from_yaml(robot)
+    assert not rigid.elastic
+    assert [joint.name for joint in model.elastic] == ["wrist_1_joint"]
+    assert model.value("wrist_1_joint.drive.stiffness") == 5e4
+    assert not model.driven  # nothing says that its motor can be excited
+    q = np.full((1, model.n), 0.4)
+    twist = static_equilibrium(model, q).deflection[0, 3, 2]
+    load = static_equilibrium(model, q).torque[0, 3]
+    assert load != 0
+    assert twist == pytest.approx(-load / 5e4, rel=1e-9)
 
 
 def test_own_block_can_be_left_out(robot: Path) -> None:

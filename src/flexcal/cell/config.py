@@ -102,9 +102,9 @@ class MismatchConfig:
     """What the identified model does not know, all off by default.
 
     `cubic_stiffness`: relative stiffening of every drive at 1 mrad of twist; `hysteresis`: Dahl hysteresis of every drive, its torque
-    over the drive stiffness (rad), reached over `hysteresis_width` (rad); `elastic_wrist`: stiffness (N m/rad) with which otherwise
-    rigid joints are held; `repeatability`: m, 1σ an axis, of the point from visit to visit; `temperature_drift`: m that the
-    point has drifted in one direction when the last pose is measured, `temperature_rise` K later.
+    over the drive stiffness (rad), reached over `hysteresis_width` (rad); `elastic_wrist`: stiffness (N m/rad) of drive springs at the
+    otherwise rigid joints, whose motors are braked unless they are excited; `repeatability`: m, 1σ an axis, of the point from visit to
+    visit; `temperature_drift`: m that the point has drifted in one direction when the last pose is measured, `temperature_rise` K later.
     """
 
     cubic_stiffness: float = 0.0

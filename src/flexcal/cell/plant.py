@@ -7,7 +7,7 @@ are applied to it, so that the laws are those of METHODS (a dead band, tanh fric
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from flexcal.cell.scheme import growth
 from flexcal.errors import FlexcalError
 from flexcal.export.mjcf import mjcf_spec
 from flexcal.model import RobotModel
+from flexcal.model.further_springs import with_drive_springs
 
 if TYPE_CHECKING:
     import mujoco
@@ -94,14 +95,12 @@ def build_plant(
     """The plant of a true robot, its joints outside `free` locked at `q` (n,), to be stepped by `time_step` s; see `mjcf_spec`."""
     import mujoco
 
-    held = set() if free is None else set(range(model.n)) - set(free)
     rigid = set(range(model.n)) - {e.index for e in model.elastic}
     wrist = rigid if config.mismatch.elastic_wrist > 0 else set()
     if wrist:
-        model = _with_drive_springs(model, wrist, config.mismatch.elastic_wrist)
+        stiffness = config.mismatch.elastic_wrist
+        model = with_drive_springs(model, dict.fromkeys(wrist, (stiffness, WRIST_DAMPING * stiffness)))
     spec = mjcf_spec(model, q=q, free=free, payload=payload)
-    for i in wrist & held:  # the rotor turns with the arm against the loop that holds it
-        spec.joint(f"{model.joint_names[i]}.drive").armature = float(np.nan_to_num(model.rotor_inertia[i]))
     spec.compiler.fusestatic = True
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", None) for name in _UNWANTED)
@@ -208,16 +207,6 @@ def _frictions(model: RobotModel, config: CellConfig, joints: np.ndarray) -> np.
         one * friction.stribeck_velocity,
     )
     return np.column_stack(columns)
-
-
-def _with_drive_springs(model: RobotModel, joints: Collection[int], stiffness: float) -> RobotModel:
-    from flexcal.model.loading import bearing_frame
-
-    frames, springs, dampers = dict(model.bearing_frames), model.stiffness.copy(), model.damping.copy()
-    for i in joints:
-        frames[i] = bearing_frame(model.joints[i])
-        springs[i, 2], dampers[i, 2] = stiffness, WRIST_DAMPING * stiffness
-    return replace(model, bearing_frames=frames, stiffness=springs, damping=dampers)
 
 
 def unresolved(plant: Plant) -> str | None:

@@ -51,7 +51,7 @@ def flat_multisine(
     `reference` (rad) is the amplitude of the slow motion, `payload` in kg, None for the declared. The torque is 4 % of the drives' effort,
     root mean square. Raises `InputError` where robot.yaml declares no elastic joint or no controller.
     """
-    if not model.elastic:
+    if not model.driven:
         raise InputError(
             f"{model.path} declares no elastic joint, so there is nothing to excite; add `elastic:`."
         )
@@ -60,7 +60,7 @@ def flat_multisine(
             f"{model.path} declares no controller; add `controller: {{kp: […], kd: […], rate_hz: 4000}}`."
         )
     lines = odd_lines(schedule.base_frequency_hz, *BAND_HZ)
-    joints = tuple(e.index for e in model.elastic)
+    joints = tuple(e.index for e in model.driven)
     efforts = np.array([model.joints[i].effort for i in joints])
     if not np.all(np.isfinite(efforts) & (efforts > 0)):
         joint = model.joint_names[joints[int(np.argmin(np.isfinite(efforts) & (efforts > 0)))]]
@@ -93,5 +93,5 @@ def flat_multisine(
 def room(model: RobotModel, reference: float) -> np.ndarray:
     """Free range (n,) rad that a pose needs on either side of every joint: the reference motion and `DROOP` on the excited axes."""
     needed = np.zeros(model.n)
-    needed[[e.index for e in model.elastic]] = reference + DROOP
+    needed[[e.index for e in model.driven]] = reference + DROOP
     return needed

@@ -52,7 +52,7 @@ class FrictionDisturbance:
         With v the motor's velocity by the multisine and V that of the reference, the half difference of the two signs is
         F (sgn(V + v) - sgn(V - v)) / 2 = F sgn(v) where |v| > |V|, else 0.
         """
-        axes = [joint.index for joint in robot.elastic]
+        axes = [joint.index for joint in robot.driven]
         coulomb = np.nan_to_num(robot.coulomb[axes])
         frequencies, lines = plan.frequencies_hz, np.asarray(plan.lines)
         samples = 1 << int(np.ceil(np.log2(_SAMPLES_PER_LINE * lines.max())))

@@ -93,7 +93,7 @@ def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
     Priors are those that robot.yaml declares; `known_before` takes what was estimated before instead.
     """
     delays = (
-        Parameter(f"{joint.name}.delay", "s", 0.0, prior_std=1 / plan.rate_hz) for joint in model.elastic
+        Parameter(f"{joint.name}.delay", "s", 0.0, prior_std=1 / plan.rate_hz) for joint in model.driven
     )
     inertials = elastic_inertials(model, loaded=plan.payload != 0)
     errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
@@ -152,12 +152,12 @@ def pose_response(
 
     Its own nuisances: the logarithm of every motor's viscous coefficient, and what its friction deviates from one at any frequency.
     """
-    if plan.joints != tuple(joint.index for joint in model.elastic):
+    if plan.joints != tuple(joint.index for joint in model.driven):
         raise FlexcalError(
             f"the plan must excite exactly the elastic joints of {model.path}, in their order."
         )
     frequencies = plan.frequencies_hz
-    rubbing = [f"{joint.name}.viscous" for joint in model.elastic]
+    rubbing = [f"{joint.name}.viscous" for joint in model.driven]
     viscous = np.nan_to_num(model.viscous[list(plan.joints)]) + friction.viscous
     robot = model.with_values(dict(zip(rubbing, viscous, strict=True)))
     own = [name for name in parameters.names if _in_linearisation(name)]
@@ -170,7 +170,7 @@ def pose_response(
         if item.name in geometric:
             columns.append(geometric[item.name])
         elif item.name.endswith(".delay"):
-            axis = [joint.name for joint in model.elastic].index(item.name.removesuffix(".delay"))
+            axis = [joint.name for joint in model.driven].index(item.name.removesuffix(".delay"))
             columns.append(_late(response, frequencies, axis))
         else:
             columns.append(by[item.name] * (item.value if item.scale == "log" else 1.0))

@@ -47,7 +47,7 @@ def _effect(
 ) -> ExperimentEffect:
     known, payload = pose.values(model.robot, natural)
     robot = model.robot.with_values(known)
-    axes = [joint.index for joint in robot.elastic]
+    axes = [joint.index for joint in robot.driven]
     excess = np.maximum(robot.viscous - np.nan_to_num(model.robot.viscous), 0.0)
     strength = np.where(model.robot.coulomb > 0, excess, 0.0)[axes]
     system = linearise(robot, pose.q, payload)

@@ -27,7 +27,7 @@ def gap_compliance(
     import pinocchio as pin
 
     arm = ElasticArm(robot, payload)
-    axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
+    axes = arm.joint_velocity[[joint.index for joint in robot.driven]]
     motion = ReferenceMotion.of(plan)
     states = motion.states(robot, arm, q, PHASES)
     slow = np.array(
@@ -35,5 +35,5 @@ def gap_compliance(
     )
     system = linearise(robot, q, payload)
     size = multisine_torque(robot, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
-    stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
+    stiffness = np.array([joint.stiffness[2] for joint in robot.driven])
     return 2 * stiffness * np.exp(-0.5 * (slow / size) ** 2) / (np.sqrt(2 * np.pi) * size)

@@ -8,27 +8,19 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.elasticity.experiment_effect import ExperimentEffect, experiment_effects
-from flexcal.elasticity.model_error import ModelError, Tolerances
-from flexcal.elasticity.parameters import stage_one_parameters
-from flexcal.elasticity.prediction import ResponseModel
+from flexcal.elasticity.fit import FINE, ResponseData, fit_responses
+from flexcal.elasticity.model_error import Tolerances
+from flexcal.elasticity.parameters import check_responses
 from flexcal.elasticity.profile import profile_stretch
-from flexcal.elasticity.reference_motion import ReferenceMotion
-from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
-from flexcal.estimation import Estimate, Parameters, Problem, solve
+from flexcal.estimation import Estimate, Problem, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.further_springs import with_brakes
 from flexcal.model.names import spring_names
 from flexcal.progress import Progress, silent
-
-ROUNDS = 2
-"""How often model error and reference motion are evaluated about the last estimate and the fit is repeated."""
-
-FINE, COARSE = 1e-7, 1e-3
-"""Tolerances of the last fit, and of those before it."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,36 +69,22 @@ def identify_stiffness(
     likelihood. The damping of a spring whose stiffness is not identifiable is not either. Raises `FlexcalError` where responses do
     not fit the robot.
     """
-    parameters, prior = model.posterior.prior(
-        stage_one_parameters(model, responses, inertias_known=inertias_known, gaps=plan is not None)
+    data = ResponseData(
+        tuple(responses),
+        plan,
+        CovarianceWeighting() if weighting is None else weighting,
+        Tolerances() if tolerances is None else tolerances,
+        inertias_known,
     )
-    reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
-    weighting = CovarianceWeighting() if weighting is None else weighting
-    tolerances = Tolerances() if tolerances is None else tolerances
+    check_responses(model, responses)
+    model = with_brakes(model, responses[0].joints)
     search = MultiStart() if search is None else search
-    x = search.find(model, responses, parameters, prior, rng, progress)
-    predicting = ResponseModel.of(model, responses, parameters)
-    measured = StageOneResidual.of(predicting, responses, weighting)
-    effects = [ExperimentEffect.none(response) for response in responses]
-    problem = fitted = None
-    rounds = ROUNDS if tolerances.any or plan is not None else 1
-    progress("fitting", 0.0)
-    for number in range(rounds):
-        if plan is not None:
-            predicting = predicting.with_open_gaps(x, plan)
-        if reference is not None:
-            effects = experiment_effects(predicting, x, reference)
-        residual = measured.shifted(predicting, [effect.shift for effect in effects])
-        error = ModelError.of(residual, responses, x, effects, tolerances) if tolerances.any else None
-        problem = _problem(residual, error, parameters, prior)
-        fitted = solve(problem, starts=x[None], tolerance=FINE if number == rounds - 1 else COARSE)
-        x = fitted.parameters.coordinates()
-        progress("fitting", (number + 1) / (rounds + 1))
-    assert problem is not None and fitted is not None
-    estimate = _widened(problem, fitted, tolerances.inflation(responses))
+    x = search.find(model, responses, *data.parameters(model), rng, progress)
+    fit = fit_responses(model, data, x, progress)
+    estimate = _widened(fit.problem, fit.estimate, data.tolerances.inflation(responses))
     progress("fitting", 1.0)
-    predicted = tuple(g + e.shift for g, e in zip(predicting.responses(x), effects, strict=True))
-    pairs = list(zip(measured.poses, predicted, strict=True))
+    predicted = fit.predicted()
+    pairs = zip(fit.residual.poses, predicted, strict=True)
     errors = tuple(pose.errors(g) for pose, g in pairs)
     misfit = np.array(
         [
@@ -115,25 +93,6 @@ def identify_stiffness(
         ]
     )
     return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
-
-
-def _problem(
-    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, prior: np.ndarray
-) -> Problem:
-    def whiten(rows: np.ndarray) -> np.ndarray:
-        return rows if error is None else error.whiten(rows)
-
-    def linearise(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        rows, jacobian = residual.linearise(at)
-        return whiten(rows), whiten(jacobian)
-
-    return Problem(
-        parameters,
-        linearise,
-        lambda at: whiten(residual.residual(at)),
-        prior_covariance=prior,
-        groups=residual.clusters(CLUSTER_LINES),
-    )
 
 
 def _widened(problem: Problem, fitted: Estimate, inflation: float) -> Estimate:

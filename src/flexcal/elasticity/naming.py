@@ -23,3 +23,8 @@ def viscous_name(joint: str, pose: str) -> str:
 def half_gap_name(joint: str) -> str:
     """Name of the half gap of a drive as its frequency response shows it."""
     return f"{joint}.drive.half_gap"
+
+
+def held_inertia_name(joint: str) -> str:
+    """Name of the inertia that moves with the arm of a joint whose motor is held."""
+    return f"{joint}.held_inertia"

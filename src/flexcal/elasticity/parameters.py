@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.elasticity.naming import half_gap_name, pose_labels, viscous_name
+from flexcal.elasticity.naming import half_gap_name, held_inertia_name, pose_labels, viscous_name
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
@@ -38,7 +38,8 @@ def stage_one_parameters(
     items = [*springs_and_rotors(model)]
     if not inertias_known:
         items += elastic_inertials(model, loaded=loaded)
-    for joint in model.elastic:
+    items += held_inertias(model)
+    for joint in model.driven:
         name = f"{joint.name}.delay"
         items.append(Parameter(name, "s", 0.0, prior_std=max(r.sample_time for r in responses)))
     for response, label in zip(responses, pose_labels(responses), strict=True):
@@ -47,7 +48,7 @@ def stage_one_parameters(
             Parameter(
                 viscous_name(joint.name, label), "N m s/rad", value, prior_std=FRICTION_LOG_STD, scale="log"
             )
-            for joint, value in zip(model.elastic, loss, strict=True)
+            for joint, value in zip(model.driven, loss, strict=True)
         ]
     if gaps:
         items += [
@@ -58,10 +59,21 @@ def stage_one_parameters(
                 lower=0.0,
                 prior_std=HALF_GAP_STD,
             )
-            for joint in model.elastic
+            for joint in model.driven
             if joint.index in model.backlash_joints
         ]
     return Parameters(items)
+
+
+def held_inertias(model: RobotModel) -> list[Parameter]:
+    """Inertia, kg m², that moves with the arm of every braked joint beyond that of its links: none, or the rotor's where the position loop
+    holds the motor in place of a brake. Joints whose rotor inertia is not declared have none."""
+    items = []
+    for joint in model.elastic:
+        rotor = float(model.rotor_inertia[joint.index])
+        if joint.index in model.braked and rotor > 0:
+            items.append(Parameter(held_inertia_name(joint.name), "kg m²", 0.0, lower=0.0, prior_std=rotor))
+    return items
 
 
 def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
@@ -75,7 +87,7 @@ def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
 
 def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
     """Raises `FlexcalError` where there is nothing to fit or a response is of other joints than the elastic ones."""
-    elastic = tuple(joint.name for joint in model.elastic)
+    elastic = [joint.name for joint in model.elastic]
     if not elastic:
         raise FlexcalError(
             f"{model.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses."
@@ -83,10 +95,15 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
     if not responses:
         raise FlexcalError("There is no frequency response to identify from; give at least one pose.")
     for response in responses:
-        if tuple(response.joints) != elastic:
+        if list(response.joints) != [name for name in elastic if name in response.joints]:
             raise FlexcalError(
                 f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, but the elastic joints of "
-                f"{model.path} are {', '.join(elastic)}; excite exactly these, in this order."
+                f"{model.path} are {', '.join(elastic)}; excite these, or some of them with the motors of the others braked, in this order."
+            )
+        if response.joints != responses[0].joints:
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, that of pose {responses[0].pose} of "
+                f"{', '.join(responses[0].joints)}; excite the same joints in all poses."
             )
         if response.q_mean.shape != (model.n,):
             raise FlexcalError(

@@ -56,8 +56,8 @@ def reference_shift(
         pull = drive_pull(robot, rest)
         released = np.einsum("kg,dg,eg->kgde", _harmonics(opening, 2 * sidebands), pull, pull)
         released[2 * sidebands] = 0.0
-        stiffness -= np.einsum("g,kgde->kde", [drive.stiffness[2] for drive in robot.elastic], released)
-        damping -= np.einsum("g,kgde->kde", [drive.damping[2] for drive in robot.elastic], released)
+        stiffness -= np.einsum("g,kgde->kde", [drive.stiffness[2] for drive in robot.driven], released)
+        damping -= np.einsum("g,kgde->kde", [drive.damping[2] for drive in robot.driven], released)
     orders = np.arange(-sidebands, sidebands + 1)
     s = 2j * np.pi * (frequencies_hz[:, None] + orders * motion.frequency_hz)
     system = np.empty((len(s), len(orders), size, len(orders), size), dtype=complex)

@@ -92,12 +92,12 @@ class ResponseModel:
         labels = pose_labels(responses)
         own = {
             viscous_name(joint.name, label): (f"{joint.name}.viscous", label)
-            for joint in robot.elastic
+            for joint in robot.driven
             for label in labels
         }
         gaps = {
             axis: parameters.index(half_gap_name(joint.name))
-            for axis, joint in enumerate(robot.elastic)
+            for axis, joint in enumerate(robot.driven)
             if half_gap_name(joint.name) in parameters
         }
         poses = []
@@ -109,7 +109,7 @@ class ResponseModel:
                     names[target] = number
             if response.payload == 0:
                 names.pop("payload.mass", None)
-            delays = [f"{joint.name}.delay" for joint in robot.elastic]
+            delays = [f"{joint.name}.delay" for joint in robot.driven]
             at = np.array([parameters.index(d) if d in parameters else -1 for d in delays])
             poses.append(
                 PoseModel(
@@ -118,7 +118,7 @@ class ResponseModel:
                     response.payload,
                     names,
                     gaps,
-                    np.zeros((1, len(robot.elastic))),
+                    np.zeros((1, len(robot.driven))),
                     at,
                 )
             )
@@ -186,5 +186,5 @@ class ResponseModel:
 
 
 def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:
-    drive = f"{robot.elastic[axis].name}.drive"
+    drive = f"{robot.driven[axis].name}.drive"
     return f"{drive}.stiffness", f"{drive}.damping"

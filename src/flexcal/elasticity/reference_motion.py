@@ -46,7 +46,7 @@ class ReferenceMotion:
         """The arm at `phases` instants of a cycle, following its motors rigidly about rest at `q` (n,) rad."""
         rest = static_equilibrium(robot, q, arm.payload)
         still = arm.configuration(np.asarray(q, dtype=float), rest.deflection[0])
-        axes = arm.joint_velocity[[joint.index for joint in robot.elastic]]
+        axes = arm.joint_velocity[[joint.index for joint in robot.driven]]
         omega = 2 * np.pi * self.frequency_hz
         for angle in 2 * np.pi * np.arange(phases) / phases:
             at, velocity, acceleration = still.copy(), np.zeros(arm.model.nv), np.zeros(arm.model.nv)

@@ -26,7 +26,10 @@ def closed_loop_motion(
 
 def drive_pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
     """Direction (E + d, E) in which each drive's spring is stretched: its twist less its motor."""
-    twists = [k for k, (_, component) in enumerate(elastic_axes(robot)) if component == 2]
+    driven = {joint.index for joint in robot.driven}
+    twists = [
+        k for k, (joint, component) in enumerate(elastic_axes(robot)) if component == 2 and joint in driven
+    ]
     pull = np.zeros((len(system.mass), system.inputs))
     pull[range(system.inputs), range(system.inputs)] = -1.0
     pull[system.inputs + np.array(twists), range(system.inputs)] = 1.0
@@ -37,7 +40,7 @@ def strain_power(
     robot: RobotModel, system: Linearisation, frequencies_hz: np.ndarray, kp: np.ndarray, kd: np.ndarray
 ) -> np.ndarray:
     """Mean square (L, E, E) of the torque in each elastic drive's spring by a cosine of 1 N m added to each motor (last)."""
-    stiffness = np.array([joint.stiffness[2] for joint in robot.elastic])
+    stiffness = np.array([joint.stiffness[2] for joint in robot.driven])
     moved = closed_loop_motion(system, frequencies_hz, kp, kd)
     return 0.5 * np.abs(stiffness[:, None] * (drive_pull(robot, system).T @ moved)) ** 2
 

@@ -50,12 +50,12 @@ def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
 
 
 def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
-    """Stiffness and damping of every spring, almost free, and the rotor inertias of the elastic joints with robot.yaml's prior.
+    """Stiffness and damping of every spring, almost free, and the rotor inertias of the driven joints with robot.yaml's prior.
 
     Raises `FlexcalError` for one without a positive value.
     """
     names = spring_names(model)
-    rotors = [f"{joint.name}.rotor_inertia" for joint in model.elastic]
+    rotors = [f"{joint.name}.rotor_inertia" for joint in model.driven]
     for name in (*names, *rotors):
         if not model.value(name) > 0:
             raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")

@@ -16,7 +16,9 @@ from flexcal.model.robot_model import RobotModel
 
 @dataclass(frozen=True, eq=False)
 class Linearisation:
-    """M q̈ + D q̇ + K q = B τ for E rotors followed by d elastic coordinates, at one rest position; the wrist is held.
+    """M q̈ + D q̇ + K q = B τ for E rotors followed by d elastic coordinates, at one rest position.
+
+    Joints that are not `driven` are held: rigidly, or by their drive spring where the motor is braked.
 
     `mass`, `damping`, `stiffness` are (E + d, E + d). `derivatives` maps a parameter name to (∂M, ∂D, ∂K), the motion of the rest
     position with the parameter included.
@@ -39,15 +41,15 @@ def linearise(
 ) -> Linearisation:
     """Linearise about the rest position of motors held at `q` (n,) with `payload` kg (None: the declared mass).
 
-    `derivatives` names parameters: `<joint>.<spring>.stiffness|damping`, `<joint>.rotor_inertia|viscous`, `<link>.mass|com_x…`,
-    `payload.mass|com_x…`. Setting a mass carries the inertia along as `RobotModel.with_values` does. Raises `FlexcalError` where a
-    rotor inertia is not declared, or a name is none of these.
+    `derivatives` names parameters: `<joint>.<spring>.stiffness|damping`, `<joint>.rotor_inertia|viscous|held_inertia`,
+    `<link>.mass|com_x…`, `payload.mass|com_x…`. Setting a mass carries the inertia along as `RobotModel.with_values` does. Raises
+    `FlexcalError` where a rotor inertia is not declared, or a name is none of these.
     """
     if not robot.elastic:
         raise FlexcalError(
             f"{robot.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses."
         )
-    count, axes = len(robot.elastic), elastic_axes(robot)
+    count, axes = len(robot.driven), elastic_axes(robot)
     size = count + len(axes)
     arm = ElasticArm(robot, payload)
     rest = static_equilibrium(robot, q, arm.payload, sensitivities=bool(derivatives))
@@ -55,33 +57,39 @@ def linearise(
     mass, damping, stiffness = np.zeros((size, size)), np.zeros((size, size)), np.zeros((size, size))
     mass[count:, count:] = arm.mass_matrix(at)
     stiffness[count:, count:] = arm.gravity_stiffness(at)
-    for r, joint in enumerate(robot.elastic):
+    for r, joint in enumerate(robot.driven):
         if not robot.rotor_inertia[joint.index] > 0:
             raise FlexcalError(
                 f"{robot.path} gives no rotor inertia for the elastic joint {joint.name}; add `drives: rotor_inertia:`."
             )
         mass[r, r] = robot.rotor_inertia[joint.index]
         damping[r, r] = np.nan_to_num(robot.viscous[joint.index])
+    for k, (joint, component) in enumerate(axes):
+        if component == 2 and joint in robot.braked:
+            mass[count + k, count + k] += robot.held_inertia[joint]
     for pattern, k, c in _springs(robot, axes).values():
         stiffness += k * pattern
         damping += c * pattern
     result: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
     if derivatives:
         result = _derivatives(robot, arm, at, rest, axes, derivatives)
-    return Linearisation(tuple(e.name for e in robot.elastic), mass, damping, stiffness, result)
+    return Linearisation(tuple(e.name for e in robot.driven), mass, damping, stiffness, result)
 
 
 def _springs(
     robot: RobotModel, axes: list[tuple[int, int]]
 ) -> dict[tuple[int, int], tuple[np.ndarray, float, float]]:
-    """Each spring's pattern (E + d, E + d), stiffness and damping, by its axis: a drive spring couples rotor and twist."""
-    count = len(robot.elastic)
-    rotor = {e.index: r for r, e in enumerate(robot.elastic)}
+    """Each spring's pattern (E + d, E + d), stiffness and damping, by its axis: a drive spring couples rotor and twist.
+
+    A braked rotor does not move, so its spring holds the twist against the ground.
+    """
+    count = len(robot.driven)
+    rotor = {e.index: r for r, e in enumerate(robot.driven)}
     result = {}
     for k, (joint, component) in enumerate(axes):
         stretch = np.zeros(count + len(axes))
         stretch[count + k] = 1.0
-        if component == 2:
+        if component == 2 and joint in rotor:
             stretch[rotor[joint]] = -1.0
         pattern = np.outer(stretch, stretch)
         result[joint, component] = (
@@ -100,7 +108,7 @@ def _derivatives(
     axes: list[tuple[int, int]],
     names: Sequence[str],
 ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    count, d = len(robot.elastic), len(axes)
+    count, d = len(robot.driven), len(axes)
     size = count + d
     by_motion_mass = arm.mass_matrix_derivatives(at)
     by_motion_stiffness = arm.gravity_stiffness_derivatives(at)
@@ -129,8 +137,13 @@ def _derivatives(
             stretch = _stretch(robot, rest, axis)
             mass, stiffness = moved(-rest.compliance[0][:, k] * stretch)
             result[name] = (widened(mass), zero, pattern + widened(stiffness))
+        elif key == "held_inertia":
+            k = count + axes.index((robot.joint_index(owner), 2))
+            unit = np.zeros((size, size))
+            unit[k, k] = 1.0
+            result[name] = (unit, zero, zero)
         elif key in ("rotor_inertia", "viscous"):
-            r = [e.name for e in robot.elastic].index(owner)
+            r = [e.name for e in robot.driven].index(owner)
             unit = np.zeros((size, size))
             unit[r, r] = 1.0
             result[name] = (unit, zero, zero) if key == "rotor_inertia" else (zero, unit, zero)

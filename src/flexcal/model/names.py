@@ -20,7 +20,7 @@ _UNITS = {
     "stiffness": "N m/rad", "damping": "N m s/rad", "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
-    "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
+    "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     "warm_up": "N m s/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
 }  # fmt: skip
 
@@ -73,6 +73,8 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
                 if key == "drive" or elastic[i].bearings:
                     table[f"{joint.name}.{key}.stiffness"] = ("stiffness", (i, k))
                     table[f"{joint.name}.{key}.damping"] = ("damping", (i, k))
+        if i in model.braked:
+            table[f"{joint.name}.held_inertia"] = ("held_inertia", (i,))
         table[f"{joint.link}.mass"] = ("mass", (i,))
         for k, key in enumerate("xyz"):
             table[f"{joint.link}.com_{key}"] = ("com", (i, k))

@@ -56,6 +56,7 @@ class RobotModel:
     transmission: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    held_inertia: np.ndarray
     rotor_inertia: np.ndarray
     viscous: np.ndarray
     coulomb: np.ndarray
@@ -71,6 +72,7 @@ class RobotModel:
     payload_com: np.ndarray
     payload_inertia: np.ndarray
     posterior: Posterior = NOTHING_ESTIMATED
+    braked: frozenset[int] = frozenset()
 
     @classmethod
     def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
@@ -143,6 +145,11 @@ class RobotModel:
             )
             for i, frame in sorted(self.bearing_frames.items())
         )
+
+    @cached_property
+    def driven(self) -> tuple[ElasticJoint, ...]:
+        """The elastic joints whose motors are excited in a frequency experiment: those that are not `braked`."""
+        return tuple(joint for joint in self.elastic if joint.index not in self.braked)
 
     @cached_property
     def inertias(self) -> tuple[Inertia, ...]:
@@ -265,7 +272,13 @@ class RobotModel:
         return first_moment / mass if mass != 0 else 0.0
 
     def with_estimate(self, estimate: Estimate) -> RobotModel:
-        """A robot with the values of an estimate that are the robot's own, carrying their joint covariance."""
-        own = tuple(name for name in estimate.parameters.names if name in self.values)
-        changed = self.with_values({name: estimate.values[name] for name in own})
+        """A robot with the values of an estimate that are the robot's own, carrying their joint covariance.
+
+        A rigid joint whose drive stiffness was estimated gets that spring.
+        """
+        from flexcal.model.further_springs import with_estimated_springs
+
+        widened = with_estimated_springs(self, estimate.values)
+        own = tuple(name for name in estimate.parameters.names if name in widened.values)
+        changed = widened.with_values({name: estimate.values[name] for name in own})
         return replace(changed, posterior=self.posterior.updated(estimate, own))

@@ -12,6 +12,7 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
+from flexcal.model.further_springs import with_estimated_springs
 from flexcal.model.held_payload import holding
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.robot_model import RobotModel
@@ -19,7 +20,7 @@ from flexcal.model.robot_model import RobotModel
 PAYLOAD_FRAME = "frame"
 """Of the provenance of the block `payload`: the URDF frame that its values are in."""
 NUISANCE = re.compile(
-    r".*\.(pose_[0-9]+|half_gap|arm_inertia|arm_viscous|arm_coulomb|drive\.torque_offset|drive\.gap_torque)"
+    r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|drive\.torque_offset|drive\.gap_torque)"
 )
 """Names of what was estimated for an experiment, and of what the flexible model tells apart: not the robot's own here."""
 
@@ -32,7 +33,8 @@ def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = No
 def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
     """`model` with the estimates of `blocks`, which come from the file `path`.
 
-    A joint whose backlash was estimated counts as declared to have backlash, and a payload that was identified as declared in its frame.
+    A joint whose backlash was estimated counts as declared to have backlash, one whose drive stiffness was estimated as elastic, and a
+    payload that was identified as declared in its frame.
     Raises `InputError` for a name that the robot does not have: the file is then of another robot, or robot.yaml has changed since; where
     robot.yaml declares the payload in another frame; and for an elastic robot where `dynamics` has links that no body can be, as linear
     least squares may: they give the right torques at the joints, and wrong ones everywhere else.
@@ -40,6 +42,7 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     if "payload" in blocks:
         model = _with_payload(model, blocks["payload"], path)
     for block, estimate in blocks.items():
+        model = with_estimated_springs(model, estimate.values)
         unknown = [
             n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
         ]

@@ -1,0 +1,122 @@
+"""One weighted fit of the linearised elastic robot to the frequency responses of all poses (Eqs. 26, 27)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexcal.data import MultisinePlan
+from flexcal.elasticity.experiment_effect import ExperimentEffect, experiment_effects
+from flexcal.elasticity.model_error import ModelError, Tolerances
+from flexcal.elasticity.parameters import stage_one_parameters
+from flexcal.elasticity.prediction import ResponseModel
+from flexcal.elasticity.reference_motion import ReferenceMotion
+from flexcal.elasticity.residual import CLUSTER_LINES, StageOneResidual
+from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
+from flexcal.estimation import Estimate, Parameters, Problem, solve
+from flexcal.frequency import FrequencyResponse
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+
+ROUNDS = 2
+"""How often model error and reference motion are evaluated about the last estimate and the fit is repeated."""
+
+FINE, COARSE = 1e-7, 1e-3
+"""Tolerances of the last fit, and of those before it."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseData:
+    """Measured responses, and how they were measured and are weighed.
+
+    With the `plan`, the reference motion is part of the prediction. `tolerances` are the standard deviations of what the model leaves out.
+    `inertias_known` keeps link and payload inertias at the model's.
+    """
+
+    responses: tuple[FrequencyResponse, ...]
+    plan: MultisinePlan | None = None
+    weighting: Weighting = field(default_factory=CovarianceWeighting)
+    tolerances: Tolerances = field(default_factory=Tolerances)
+    inertias_known: bool = False
+
+    def parameters(self, model: RobotModel) -> tuple[Parameters, np.ndarray]:
+        """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` where responses do not fit the robot."""
+        return model.posterior.prior(
+            stage_one_parameters(
+                model, self.responses, inertias_known=self.inertias_known, gaps=self.plan is not None
+            )
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseFit:
+    """The fit of one robot: `estimate` with the posterior covariance of `problem`.
+
+    `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest.
+    """
+
+    residual: StageOneResidual
+    effects: tuple[ExperimentEffect, ...]
+    problem: Problem
+    estimate: Estimate
+
+    @property
+    def x(self) -> np.ndarray:
+        """Estimation coordinates (p,) of the optimum."""
+        return self.estimate.parameters.coordinates()
+
+    def predicted(self) -> tuple[np.ndarray, ...]:
+        """Responses (L, E, E) of every pose at the optimum, effects of the experiment included."""
+        responses = self.residual.model.responses(self.x)
+        return tuple(g + effect.shift for g, effect in zip(responses, self.effects, strict=True))
+
+
+def fit_responses(
+    model: RobotModel, data: ResponseData, x: np.ndarray, progress: Progress = silent
+) -> ResponseFit:
+    """Levenberg–Marquardt from the coordinates `x` (p,), repeated with model error and experiment effects evaluated at the optimum."""
+    parameters, prior = data.parameters(model)
+    plan, responses = data.plan, data.responses
+    reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
+    predicting = ResponseModel.of(model, responses, parameters)
+    measured = StageOneResidual.of(predicting, responses, data.weighting)
+    effects = [ExperimentEffect.none(response) for response in responses]
+    rounds = ROUNDS if data.tolerances.any or plan is not None else 1
+    progress("fitting", 0.0)
+    fit = None
+    for number in range(rounds):
+        if plan is not None:
+            predicting = predicting.with_open_gaps(x, plan)
+        if reference is not None:
+            effects = experiment_effects(predicting, x, reference)
+        residual = measured.shifted(predicting, [effect.shift for effect in effects])
+        error = (
+            ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
+        )
+        problem = _problem(residual, error, parameters, prior)
+        fitted = solve(problem, starts=x[None], tolerance=FINE if number == rounds - 1 else COARSE)
+        fit = ResponseFit(residual, tuple(effects), problem, fitted)
+        x = fit.x
+        progress("fitting", (number + 1) / (rounds + 1))
+    assert fit is not None
+    return fit
+
+
+def _problem(
+    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, prior: np.ndarray
+) -> Problem:
+    def whiten(rows: np.ndarray) -> np.ndarray:
+        return rows if error is None else error.whiten(rows)
+
+    def linearise(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows, jacobian = residual.linearise(at)
+        return whiten(rows), whiten(jacobian)
+
+    return Problem(
+        parameters,
+        linearise,
+        lambda at: whiten(residual.residual(at)),
+        prior_covariance=prior,
+        groups=residual.clusters(CLUSTER_LINES),
+    )
