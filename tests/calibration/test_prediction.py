@@ -37,6 +37,7 @@ def slope(model: RobotModel, poses, name: str, step: float, flank: np.ndarray) -
         ),
         (("tracker.x", "tracker.y", "tracker.z", "tracker.rx", "tracker.ry", "tracker.rz"), 1e-5, 1e-7),
         (("transmission_2_sin", "transmission_3_cos", "gravity_compliance"), 1e-7, 1e-4),
+        (("gravity_compliance_1", "gravity_compliance_2"), 1e-8, 1e-5),
         (("com_x", "com_y", "com_z"), 1e-4, 1e-6),
         (("mass",), 1e-3, 1e-6),
         (("stiffness",), 10.0, 1e-5),

@@ -13,6 +13,7 @@ from .registration import register, rigid_motion
 from .scaled_errors import ErrorScale, error_scale
 from .sources import error_sources
 from .term_selection import TermSelection, select_terms
+from .term_trials import ConsideredTerm
 from .terms import geometric_parameters
 from .verification import Verification, verify, verify_jointly
 
@@ -21,6 +22,7 @@ __all__ = [
     "VISITS_A_SET",
     "AccuracyMap",
     "Calibration",
+    "ConsideredTerm",
     "Drift",
     "ElasticPrior",
     "ErrorScale",

@@ -5,6 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 
+_SAME = 0.01
+"""rad or m: joints that differ by less make the same pose."""
+
+
+def single_poses(q: np.ndarray) -> np.ndarray:
+    """Number (N,) of the pose that each row of joint positions `q` (N, n) repeats: those that differ by less than 0.01 rad or m are one."""
+    result = np.full(len(q), -1)
+    for row in range(len(q)):
+        if result[row] < 0:
+            near = (np.abs(q - q[row]).max(axis=1) < _SAME) & (result < 0)
+            result[near] = row
+    return np.unique(result, return_inverse=True)[1]
+
+
 def order_folds(samples: int, folds: int) -> np.ndarray:
     """Fold number (samples,) of consecutive blocks of nearly equal size."""
     return (np.arange(samples) * folds) // samples

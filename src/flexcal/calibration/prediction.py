@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model import Equilibrium, PointKinematics, RobotModel, carried_mass, tool_at_rest
-from flexcal.model.names import GEOMETRY, SPRINGS, STATION
+from flexcal.model.equilibrium import lateral_slopes
+from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
 
@@ -54,6 +56,10 @@ class Prediction:
             elif key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
                 i = self.model.joint_index(owner)
                 result[:, :, k] = self._twist(i, key)[:, None] * by_geometry[:, :, 6 * i]
+            elif key in LATERAL:
+                i = self.model.joint_index(owner)
+                tilt = self._lateral[:, i, LATERAL.index(key)]
+                result[:, :, k] = np.matmul(by_motion[:, :, i, :2], tilt[:, :, None])[:, :, 0]
             else:
                 result[:, :, k] = np.matmul(by_load, self.load(name)[:, :, None])[:, :, 0]
         return result
@@ -67,6 +73,12 @@ class Prediction:
         order, wave = key.split("_")[1:]
         phase = int(order) * self.poses.q[:, joint]
         return np.sin(phase) if wave == "sin" else np.cos(phase)
+
+    @cached_property
+    def _lateral(self) -> np.ndarray:
+        """Tilt about the bearing's x and y (N, n, axis, 2) of every joint by its lateral compliances, rad per rad/(N m)."""
+        masses = carried_mass(self.model, self.poses.payload, len(self.poses))
+        return lateral_slopes(self.model, self.poses.q, masses)
 
     def _turned(self, columns: np.ndarray) -> np.ndarray:
         return np.matmul(self.base, columns)

@@ -9,11 +9,11 @@ import numpy as np
 from flexcal.calibration.prediction import left_jacobian
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, carried_mass, gravity_torque, point_kinematics
-from flexcal.model.equilibrium import elastic_axes, spring_loads
-from flexcal.model.names import GEOMETRY, SPRINGS, STATION
+from flexcal.model.equilibrium import elastic_axes, lateral_slopes, spring_loads
+from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
-_GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance")
+_GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance", *LATERAL)
 
 
 def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
@@ -35,7 +35,8 @@ class Propagation:
     """A root of the parameters' covariance, sorted by how its rows reach the point `target` under `payload` kg.
 
     `rows` (6 n + 6 + d + 4 n + T + 6, p): by geometric errors of joints and tool, by the stiffness of each of the d elastic coordinates, by
-    mass and first moment of each link, by the T `twisting` parameters (joint and kind), by the place of the `station`; natural units.
+    mass and first moment of each link, by the T `twisting` parameters (joint and kind, those that tilt its axis included), by the place
+    of the `station`; natural units.
     """
 
     model: RobotModel
@@ -58,6 +59,7 @@ class Propagation:
         by_geometry = at.geometry_jacobian[:, :3]
         by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
         twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, loads)[:, None]
+        self._tilt(q, at.motion_jacobian[:, :3, :, :2], twists)
         columns = (
             by_geometry,
             by_load * (-loads / stiffness)[:, None],
@@ -78,14 +80,24 @@ class Propagation:
                 columns[:, k] = -np.sign(torque[:, joint])
             elif kind == "gravity_compliance":
                 columns[:, k] = -torque[:, joint]
+            elif kind in LATERAL:
+                columns[:, k] = 0.0
             else:
                 order, wave = kind.split("_")[1:]
                 columns[:, k] = (np.sin if wave == "sin" else np.cos)(int(order) * q[:, joint])
         return columns
 
+    def _tilt(self, q: np.ndarray, by_tilt: np.ndarray, twists: np.ndarray) -> None:
+        """Write the columns of lateral compliances into `twists` (N, 3, T), `by_tilt` (N, 3, n, 2) being those of the tilts."""
+        tilting = [(k, joint, LATERAL.index(kind)) for k, (joint, kind) in enumerate(self.twisting) if kind in LATERAL]
+        if tilting:
+            slopes = lateral_slopes(self.model, q, self.payload)
+            for k, joint, axis in tilting:
+                twists[:, :, k] = np.matmul(by_tilt[:, :, joint], slopes[:, joint, axis, :, None])[:, :, 0]
+
     def _torque(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """Gravity torque (N, n) on the joints with backlash or gravity compliance; that on drives with springs is among the `loads`."""
-        loaded = {joint for joint, kind in self.twisting if not kind.startswith("transmission")}
+        loaded = {joint for joint, kind in self.twisting if kind in ("backlash", "gravity_compliance")}
         springs = {
             joint: k for k, (joint, component) in enumerate(elastic_axes(self.model)) if component == 2
         }
@@ -164,7 +176,7 @@ def propagation(
 
 def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
     owner, _, key = name.rpartition(".")
-    if key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
+    if key in ("backlash", "gravity_compliance", *LATERAL) or key.startswith("transmission_"):
         return model.joint_index(owner), key
     return None
 

@@ -9,10 +9,14 @@ import numpy as np
 from flexcal.data import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY, unit_of
+from flexcal.model.names import GEOMETRY, LATERAL, unit_of
 
 TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6}
 """Size of a change that matters (1σ of manufacture), by unit: what makes parameters of different units comparable."""
+
+
+PER_JOINT = ("gravity_compliance", "lateral_compliance")
+"""Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
 
 
 def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:
@@ -20,9 +24,10 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared
-    with it. `gravity_compliance`, `transmission_1`…: one or two for every revolute joint on the way.
+    with it. `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances
+    only where no spring is declared in their place; `<joint>.gravity_compliance` that of one joint.
     """
-    joints = _moving(model, poses)
+    joints = moving_joints(model, poses)
     names: list[str] = []
     for k, station in enumerate(dict.fromkeys(poses.station)):
         names += [f"station.{station}.{key}" for key in ("x", "y", "z")]
@@ -39,16 +44,39 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
             for i in model.backlash_joints
             if i in joints
         ]
+    further: dict[str, None] = {}
     for term in terms:
-        for i in joints:
-            if model.joints[i].kind != "revolute":
-                continue
-            owner = model.joints[i].name
-            if term == "gravity_compliance":
-                items.append(_parameter(model, f"{owner}.gravity_compliance"))
-            elif term.startswith("transmission_"):
-                items += [_parameter(model, f"{owner}.{term}_{wave}") for wave in ("sin", "cos")]
-    return Parameters(items)
+        owner, _, kind = term.rpartition(".")
+        if kind in ("kinematic", "backlash"):
+            continue
+        own = [model.joint_index(owner)] if owner else free_joints(model, kind, joints)
+        for i in own:
+            further |= dict.fromkeys(f"{model.joints[i].name}.{key}" for key in _keys(kind))
+    return Parameters([*items, *(_parameter(model, name) for name in further)])
+
+
+def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int]:
+    """Those of some revolute joints that may have a term of this kind: without a spring that robot.yaml declares in its place."""
+    springs = {e.index: e.components for e in model.elastic}
+    taken = {"gravity_compliance": 2, "lateral_compliance": 0}.get(kind)
+    return [i for i in joints if model.joints[i].kind == "revolute" and taken not in springs.get(i, ())]
+
+
+def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:
+    """Joints between the base and any measured target, in chain order."""
+    found: set[int] = set()
+    for target in dict.fromkeys(poses.target):
+        joint = model.point(target).joint
+        while joint >= 0:
+            found.add(joint)
+            joint = model.joints[joint].parent
+    return sorted(found)
+
+
+def _keys(kind: str) -> tuple[str, ...]:
+    if kind == "lateral_compliance":
+        return LATERAL
+    return (f"{kind}_sin", f"{kind}_cos") if kind.startswith("transmission_") else (kind,)
 
 
 def tolerances(parameters: Parameters) -> np.ndarray:
@@ -59,13 +87,3 @@ def tolerances(parameters: Parameters) -> np.ndarray:
 def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Parameter:
     return Parameter(name, unit_of(name), model.value(name), lower=lower)
 
-
-def _moving(model: RobotModel, poses: PoseSet) -> list[int]:
-    """Joints between the base and any measured target, in chain order."""
-    found: set[int] = set()
-    for target in dict.fromkeys(poses.target):
-        joint = model.point(target).joint
-        while joint >= 0:
-            found.add(joint)
-            joint = model.joints[joint].parent
-    return sorted(found)

@@ -34,7 +34,8 @@ class Calibrate:
     terms: Annotated[
         tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml says)")
     ] = ()
-    """auto, or names out of: kinematic, backlash, gravity_compliance, transmission."""
+    """auto, or names out of: kinematic, backlash, gravity_compliance, lateral_compliance, transmission; JOINT.gravity_compliance is that of
+    one joint."""
     loss: Literal["squares", "huber", "cauchy"] = "squares"
     """cauchy finds outliers and lists them."""
     secant_scale: Annotated[float, arg(metavar="STD")] = 0.0
@@ -47,6 +48,7 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print what was found."""
+        from flexcal.cli.considered_terms import considered_lines
         from flexcal.cli.tables import dropped_table, error_table, weak_table
         from flexcal.workflow.calibrate_robot import calibrate_robot
         from flexcal.workflow.calibration_remarks import hardly_fits
@@ -79,6 +81,8 @@ class Calibrate:
             console.say(
                 f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
             )
+        for line in considered_lines(document["term_selection"]):
+            console.say(line)
         errors = document["calibration"]
         terms = ("elastic, " if found.selected.model.elastic else "") + " + ".join(found.selected.terms)
         labels = {"nominal": "before (registered only)", "rigid": "rigid", "selected": f"selected: {terms}"}

@@ -11,7 +11,7 @@ from flexcal.export.exported import Rendered
 from flexcal.export.frames import transform
 from flexcal.export.loss import ToolMap, tool_positions
 from flexcal.model import RobotModel
-from flexcal.model.names import unit_of
+from flexcal.model.names import LATERAL, unit_of
 from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz, vector_rotation
 
@@ -66,6 +66,7 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
         },
         "backlash": _quantity(model, f"{joint.name}.backlash"),
         "gravity_compliance": _quantity(model, f"{joint.name}.gravity_compliance"),
+        "lateral_compliance": [_quantity(model, f"{joint.name}.{key}") for key in LATERAL],
         "transmission": [
             {"order": order}
             | {key: _quantity(model, f"{joint.name}.transmission_{order}_{key}") for key in ("sin", "cos")}

@@ -15,9 +15,10 @@ from flexcal.units import MILLIMETRE
 DEFLECTION = "elastic deflection"
 BACKLASH = "backlash"
 GRAVITY_COMPLIANCE = "gravity compliance"
+LATERAL_COMPLIANCE = "lateral gravity compliance"
 TRANSMISSION = "transmission error"
 GEOMETRY = "axis misalignments and lengths"
-AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, TRANSMISSION)
+AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
 """The terms beyond rigid geometry, which hardly any format has a place for."""
 
 SAMPLES = 2000
@@ -173,6 +174,8 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
         return replace(model, backlash=np.zeros_like(model.backlash))
     if term == GRAVITY_COMPLIANCE and model.gravity_compliance.any():
         return replace(model, gravity_compliance=np.zeros_like(model.gravity_compliance))
+    if term == LATERAL_COMPLIANCE and model.lateral_compliance.any():
+        return replace(model, lateral_compliance=np.zeros_like(model.lateral_compliance))
     if term == TRANSMISSION and model.transmission.any():
         return replace(model, transmission=np.zeros_like(model.transmission))
     return model

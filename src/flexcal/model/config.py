@@ -139,13 +139,14 @@ class GeometryConfig:
     backlash: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        known = ("kinematic", "backlash", "gravity_compliance", "transmission")
+        known = ("kinematic", "backlash", "gravity_compliance", "lateral_compliance", "transmission")
         if isinstance(self.terms, str) and self.terms != "auto":
             raise FlexcalError(
                 f"geometry terms must be 'auto' or a list out of {', '.join(known)}, not '{self.terms}'."
             )
         for term in () if isinstance(self.terms, str) else self.terms:
-            if term not in known:
+            owner, _, kind = term.rpartition(".")
+            if kind not in (known[2:4] if owner else known):
                 raise FlexcalError(f"unknown geometry term '{term}'; known are {', '.join(known)}.")
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_batch
+from flexcal.model.lateral_compliance import lateral_axes
 from flexcal.model.robot_model import RobotModel
 
 _FLANK_PASSES = 5
@@ -97,6 +98,25 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
     return -_RIGID * deflection[:, :, 2]
 
 
+def gravity_moments(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
+    """Moments (samples, n, 2), N m, with which joints hold gravity about their axes of `misalignment_1` and `misalignment_2`.
+
+    As `gravity_torque` otherwise: of the undeflected robot, carrying everything beyond the joint; 0 for prismatic joints.
+    """
+    q = joint_batch(model, q)
+    tilts = [(i, component) for i, _ in _twists(model) for component in (1, 0)]
+    _, deflection, _, _ = _held_rigidly(model, q, payload, tilts, sensitivities=False)
+    return np.matmul(lateral_axes(model, q), -_RIGID * deflection[:, :, :2, None])[:, :, :, 0]
+
+
+def lateral_slopes(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
+    """Tilt (samples, n, 2, 2) of every joint by its two lateral compliances, about the tilt axes x and y (last), rad per rad/(N m).
+
+    Minus the moment that holds gravity, about an axis that is fixed to the parent link.
+    """
+    return -gravity_moments(model, q, payload)[:, :, :, None] * lateral_axes(model, joint_batch(model, q))
+
+
 def gravity_regressor(
     model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
 ) -> np.ndarray:
@@ -155,8 +175,8 @@ def static_equilibrium(
     `payload` (samples,) or a scalar in kg at the declared payload's centre of mass; None takes the declared mass. `flank` (samples, n)
     overrides the sign of the drive torque that places the arm in the backlash (q_arm = q_M - τ/c - b sign τ, b half the gap); it is that
     of the torque at rest itself, but for an arm that hangs within its gap, where either sign would pull it across: there one of the
-    two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Raises `FlexcalError`
-    where springs cannot carry the arm.
+    two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Lateral compliance tilts
+    axes without a change of the load on springs, some 1e-3 of it. Raises `FlexcalError` where springs cannot carry the arm.
     """
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
@@ -183,6 +203,9 @@ def static_equilibrium(
         rest = np.sign(torque)
     sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank
     deflection[:, :, 2] += slack
+    if model.lateral_compliance.any():
+        slopes = lateral_slopes(model, q, masses)
+        deflection[:, :, :2] += np.matmul(model.lateral_compliance[:, None, :], slopes)[:, :, 0]
     has_backlash = np.zeros(model.n)
     has_backlash[list(model.backlash_joints)] = 1.0
     return Equilibrium(

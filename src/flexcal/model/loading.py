@@ -91,6 +91,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         station=np.zeros((len(stations), 6)),
         backlash=np.zeros(n),
         gravity_compliance=np.zeros(n),
+        lateral_compliance=np.zeros((n, 2)),
         transmission=np.zeros((n, len(HARMONICS), 2)),
         stiffness=stiffness,
         damping=damping,

@@ -9,6 +9,7 @@ if TYPE_CHECKING:
 
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
 SPRINGS = ("bearing_x", "bearing_y", "drive")
+LATERAL = ("gravity_compliance_1", "gravity_compliance_2")
 FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_up")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -17,6 +18,7 @@ STATION = ("x", "y", "z", "rx", "ry", "rz")
 _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
     "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
+    "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad", "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
@@ -61,6 +63,8 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
             table[f"{joint.name}.{key}"] = ("geometry", (i, k))
         table[f"{joint.name}.backlash"] = ("backlash", (i,))
         table[f"{joint.name}.gravity_compliance"] = ("gravity_compliance", (i,))
+        for k, key in enumerate(LATERAL):
+            table[f"{joint.name}.{key}"] = ("lateral_compliance", (i, k))
         for h, order in enumerate(model.harmonics):
             for k, key in enumerate(("sin", "cos")):
                 table[f"{joint.name}.transmission_{order}_{key}"] = ("transmission", (i, h, k))

@@ -53,6 +53,7 @@ class RobotModel:
     station: np.ndarray
     backlash: np.ndarray
     gravity_compliance: np.ndarray
+    lateral_compliance: np.ndarray
     transmission: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray

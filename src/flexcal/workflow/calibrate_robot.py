@@ -12,6 +12,7 @@ import numpy as np
 
 from flexcal.calibration import (
     Calibration,
+    ConsideredTerm,
     Drift,
     ErrorStatistics,
     TermSelection,
@@ -22,6 +23,7 @@ from flexcal.calibration import (
     select_terms,
 )
 from flexcal.calibration.geometry_fit import LossName
+from flexcal.calibration.terms import PER_JOINT
 from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance, read_estimates
@@ -87,7 +89,7 @@ class RobotCalibration:
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
-        selected, table = self.selected, self.selection.table if self.selection else ()
+        selected, chosen = self.selected, self.selection
         found, drift = selected.identifiability, Drift.of(selected)
         return {
             "robot": selected.model.name,
@@ -95,10 +97,8 @@ class RobotCalibration:
             "identifiability": identifiability_block(self.rigid.identifiability)
             | {"selected": identifiability_block(found) | identifiability_spectrum(found)},
             "terms": list(selected.terms),
-            "term_selection": [
-                {"terms": list(terms), "order_mm": order / MILLIMETRE, "workspace_mm": workspace / MILLIMETRE}
-                for terms, order, workspace in table
-            ],
+            "term_selection": [considered_term(row) for row in chosen.considered] if chosen else [],
+            "term_selection_by": chosen.by if chosen else None,
             "calibration": {
                 "nominal": ErrorStatistics.of(self.before).in_millimetres(),
                 "rigid": self.rigid.errors.in_millimetres(),
@@ -116,7 +116,7 @@ class RobotCalibration:
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)
             ],
-            "remarks": list(calibration_remarks(selected)),
+            "remarks": [*([chosen.remark] if chosen and chosen.remark else []), *calibration_remarks(selected)],
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
             "command": self.command,
@@ -202,6 +202,25 @@ def calibrate_robot(
     return result
 
 
+def considered_term(row: ConsideredTerm) -> dict[str, Any]:
+    """A term that was considered, as results.json has it; null for what was not computed."""
+
+    def millimetres(value: float) -> float | None:
+        return value / MILLIMETRE if np.isfinite(value) else None
+
+    return {
+        "term": row.term,
+        "terms": list(row.terms),
+        "taken": row.taken,
+        "reason": row.reason,
+        "order_mm": millimetres(row.order),
+        "workspace_mm": millimetres(row.workspace),
+        "single_mm": millimetres(row.single),
+        "largest_mm": millimetres(row.largest),
+        "bic_difference": row.bic if np.isfinite(row.bic) else None,
+    }
+
+
 def nominal_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
     """Error vectors (N, 3) m of the uncalibrated, rigid robot after the best rigid registration."""
     bare = replace(model, station=np.zeros_like(model.station))
@@ -216,9 +235,12 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     if asked == (AUTO,):
         return None
     harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
-    known = ("kinematic", "backlash", "gravity_compliance", "transmission", *harmonics)
+    known = ("kinematic", "backlash", *PER_JOINT, "transmission", *harmonics)
     for term in asked:
-        if term not in known:
+        owner, _, kind = term.rpartition(".")
+        if owner:
+            model.joint_index(owner)
+        if kind not in (PER_JOINT if owner else known):
             raise FlexcalError(
                 f"there is no geometry term '{term}'; there are {', '.join(known)}, or {AUTO} alone."
             )

@@ -1,0 +1,76 @@
+"""Errors of a linear least-squares fit at poses left out of it, exactly, from its hat matrix."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+_REACH = 1e-2
+"""m: how far, in root mean square, one column may move the points; only directions that no other pose sees feel it."""
+
+
+@dataclass(frozen=True, eq=False)
+class LeftOut:
+    """A linear fit of p columns to the residuals of N points.
+
+    `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `bic` is the
+    Bayesian information criterion (Schwarz 1978) of Gaussian residuals of unknown variance.
+    """
+
+    distances: tuple[np.ndarray, ...]
+    bic: float
+
+    def mean(self, kinds: Sequence[int]) -> float:
+        """Mean distance at left-out poses over some kinds of folds, m."""
+        return float(np.mean([self.distances[k].mean() for k in kinds]))
+
+    def largest(self, kinds: Sequence[int]) -> float:
+        """Largest distance at a left-out pose in some kinds of folds, m."""
+        return float(max(self.distances[k].max() for k in kinds))
+
+
+def left_out(
+    columns: Sequence[np.ndarray], penalty: Sequence[float], residuals: np.ndarray, folds: Sequence[np.ndarray]
+) -> LeftOut:
+    """Fit blocks of `columns` (N, 3, k) to `residuals` (N, 3) m, and predict every fold of each kind (N,) from the others.
+
+    With the hat matrix H of the fit to all points and r what it leaves, fold g is off by (1 - H_gg)⁻¹ r_g when it is left out
+    (Allen 1974). `penalty` is the factor on the sum of squared coefficients of each block, m²: of a prior, with the columns in its
+    standard deviations; 0 for none. H_gg = Q_g Q_gᵀ is inverted in the space of its points or of its columns, whichever is smaller.
+    """
+    scaled = [block * _scale(block) if free == 0 else block for block, free in zip(columns, penalty, strict=True)]
+    stacked = np.concatenate(scaled, axis=2).reshape(residuals.size, -1)
+    variance = float(np.mean(residuals**2))
+    roots = [
+        np.full(block.shape[2], np.sqrt(factor if factor > 0 else variance / _REACH**2))
+        for block, factor in zip(columns, penalty, strict=True)
+    ]
+    basis, _ = np.linalg.qr(np.concatenate([stacked, np.diag(np.concatenate(roots))]))
+    seen = basis[: residuals.size]
+    left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
+    size = residuals.size
+    freedom = float((seen**2).sum())
+    bic = size * np.log(float(left @ residuals.ravel()) / size) + freedom * np.log(size)
+    q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
+    return LeftOut(tuple(_distances(q, r, fold) for fold in folds), bic)
+
+
+def _scale(block: np.ndarray) -> np.ndarray:
+    """Factors (k,) that make each column move the points by 1 in root mean square; 0 for columns that move nothing."""
+    size = np.sqrt((block**2).sum(axis=1).mean(axis=0))
+    return np.divide(1.0, size, out=np.zeros_like(size), where=size > 0)
+
+
+def _distances(basis: np.ndarray, left: np.ndarray, fold: np.ndarray) -> np.ndarray:
+    distance = np.empty(len(left))
+    for k in np.unique(fold):
+        own = fold == k
+        q, r = basis[own].reshape(-1, basis.shape[2]), left[own].ravel()
+        if len(r) <= q.shape[1]:
+            error = np.linalg.solve(np.eye(len(r)) - q @ q.T, r)
+        else:
+            error = r + q @ np.linalg.solve(np.eye(q.shape[1]) - q.T @ q, q.T @ r)
+        distance[own] = np.linalg.norm(error.reshape(-1, 3), axis=1)
+    return distance

@@ -1,0 +1,91 @@
+"""Which further terms a robot and its poses allow at all, and why others are not considered."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.terms import PER_JOINT, free_joints, moving_joints
+from flexcal.data import PoseSet
+from flexcal.model import RobotModel, carried_mass, gravity_torque
+from flexcal.model.equilibrium import gravity_moments
+
+_CLEAR = 0.2
+"""Share of its largest gravity torque that a joint must carry on both sides for a backlash to be considered."""
+_LOADED = 0.01
+"""Share of the most varied load of any joint by which that of a joint must vary for its compliance to be considered alone."""
+_LOAD = 1e-3
+"""N m: a robot whose gravity loads are below that has none."""
+
+
+@dataclass(frozen=True, eq=False)
+class Candidates:
+    """Terms that may be added to the kinematic ones.
+
+    `kinds` are whole terms, `single` terms of one joint by the kind that they belong to, `excluded` (term, reason) those that cannot be
+    considered. `model` has the joints declared whose backlash is a candidate.
+    """
+
+    model: RobotModel
+    kinds: tuple[str, ...]
+    single: dict[str, tuple[str, ...]]
+    excluded: tuple[tuple[str, str], ...]
+
+
+def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
+    """What gravity, the declared springs and the joints that move leave to be considered on some poses."""
+    joints = moving_joints(model, poses)
+    masses = carried_mass(model, poses.payload, len(poses))
+    torque = gravity_torque(model, poses.q, masses)
+    loads = {
+        "gravity_compliance": torque[:, :, None],
+        "lateral_compliance": gravity_moments(model, poses.q, masses),
+    }
+    kinds: list[str] = []
+    single: dict[str, tuple[str, ...]] = {}
+    excluded: list[tuple[str, str]] = []
+    most = max(float(np.abs(load[:, joints]).max(initial=0.0)) for load in loads.values())
+    varied = max(float(load[:, joints].std(axis=0).max(initial=0.0)) for load in loads.values())
+    for kind in PER_JOINT:
+        free = free_joints(model, kind, joints)
+        if most < _LOAD:
+            excluded.append((kind, _without_load(model)))
+        elif not free:
+            excluded.append((kind, "robot.yaml declares springs in their place for every joint"))
+        else:
+            kinds.append(kind)
+            changing = [i for i in free if loads[kind][:, i].std(axis=0).max() > _LOADED * varied]
+            single[kind] = tuple(f"{model.joints[i].name}.{kind}" for i in changing)
+    if not model.backlash_joints:
+        wider = _with_backlash(model, torque, joints)
+        if wider is None:
+            reason = "gravity loads no joint from both sides, so neither flank can be told from an offset"
+            excluded.append(("backlash", _without_load(model) if most < _LOAD else reason))
+        else:
+            model = wider
+            kinds.append("backlash")
+    kinds += [f"transmission_{order}" for order in model.harmonics]
+    return Candidates(model, tuple(kinds), single, tuple(excluded))
+
+
+def _without_load(model: RobotModel) -> str:
+    if not model.mass.any() and not model.payload_mass.any():
+        return (
+            f"{model.urdf.name} gives its links no mass, so gravity torques are not known; add <inertial> elements to consider it"
+        )
+    if not np.any(model.gravity):
+        return "robot.yaml says that there is no gravity"
+    return "gravity loads no joint"
+
+
+def _with_backlash(model: RobotModel, torque: np.ndarray, joints: Sequence[int]) -> RobotModel | None:
+    clear = _CLEAR * np.abs(torque).max(axis=0)
+    both = (torque.max(axis=0) > clear) & (torque.min(axis=0) < -clear) & (clear > 0.1)
+    names = tuple(model.joints[i].name for i in joints if both[i])
+    if not names:
+        return None
+    return replace(
+        model, config=replace(model.config, geometry=replace(model.config.geometry, backlash=names))
+    )

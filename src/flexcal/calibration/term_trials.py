@@ -1,0 +1,143 @@
+"""Comparison of sets of terms by the errors at poses left out of their fits."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.geometric_calibration import Calibration
+from flexcal.calibration.left_out import LeftOut, left_out
+from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.terms import geometric_parameters
+from flexcal.model import RobotModel
+from flexcal.units import MILLIMETRE
+
+_WORSE = 1.02
+"""Factor by which the largest error at a left-out pose may rise with a term."""
+
+
+@dataclass(frozen=True)
+class ConsideredTerm:
+    """A term that was considered; `term` is None for the base terms, with which all are compared.
+
+    `terms` are those fitted, it among them; `order`, `workspace` the mean errors (m) with folds contiguous in measuring order and in the
+    workspace, `single` with single poses left out, `largest` the largest of the errors that decide; NaN where it could not be tried.
+    `bic` is the change of the Bayesian information criterion by the term, `reason` says in a clause why it was taken or left.
+    """
+
+    term: str | None
+    terms: tuple[str, ...]
+    order: float
+    workspace: float
+    single: float
+    largest: float
+    bic: float
+    taken: bool
+    reason: str
+
+
+def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> ConsideredTerm:
+    """The row of a term that cannot be considered."""
+    nan = float("nan")
+    return ConsideredTerm(term, (*chosen, term), nan, nan, nan, nan, nan, False, reason)
+
+
+class TermTrials:
+    """Linear fits of sets of terms about the fit of the base terms to all poses.
+
+    `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses. With `many` the
+    first two decide, otherwise the third.
+    """
+
+    def __init__(
+        self, rigid: Calibration, model: RobotModel, folds: tuple[np.ndarray, ...], *, many: bool
+    ) -> None:
+        self.rigid = rigid
+        self.model = replace(rigid.model, config=model.config)
+        self.folds = folds
+        self.deciding = (0, 1) if many else (2,)
+        self._columns: dict[str, np.ndarray] = {}
+        self._fits: dict[tuple[str, ...], LeftOut] = {}
+
+    def start(self, base: tuple[str, ...]) -> ConsideredTerm:
+        """The row of the base terms."""
+        return self._row(None, base, 0.0, taken=True, reason="")
+
+    def compare(self, chosen: tuple[str, ...], term: str, extra: float) -> ConsideredTerm:
+        """Whether a term is taken beside those chosen; `extra` is what the criterion must fall by beyond 0."""
+        terms = (*chosen, term)
+        old, new = self.fit(chosen), self.fit(terms)
+        bic = new.bic - old.bic
+        gains = [self._gain(old, new, k) for k in self.deciding]
+        errors = f"{old.mean(self.deciding) / MILLIMETRE:.4f} to {new.mean(self.deciding) / MILLIMETRE:.4f} mm"
+        most = [fit.largest(self.deciding) for fit in (old, new)]
+        taken = False
+        if min(gain for gain, _ in gains) <= 0:
+            reason = f"the mean error at left-out poses does not fall ({errors})"
+        elif any(gain <= error for gain, error in gains):
+            reason = f"the mean error at left-out poses falls by less than its standard error ({errors})"
+        elif bic >= -extra:
+            reason = f"the BIC changes by {bic:+.0f}, where less than {-extra:.0f} would speak for it"
+        elif most[1] > _WORSE * most[0]:
+            reason = (
+                f"the largest error at a left-out pose would rise from {most[0] / MILLIMETRE:.4f} to {most[1] / MILLIMETRE:.4f} mm"
+            )
+        else:
+            taken = True
+            reason = f"lowers the mean error at left-out poses from {errors} and the BIC by {-bic:.0f}"
+        return self._row(term, terms, bic, taken=taken, reason=reason)
+
+    def fit(self, terms: tuple[str, ...]) -> LeftOut:
+        """The fit of some terms, with springs and inertia where the base fit has them."""
+        if terms not in self._fits:
+            blocks = [self._block(term) for term in terms] + [self._held]
+            penalty = [0.0] * len(terms) + [self._noise]
+            self._fits[terms] = left_out(blocks, penalty, self.rigid.residuals, self.folds)
+        return self._fits[terms]
+
+    def mean(self, terms: tuple[str, ...]) -> float:
+        """Mean error at left-out poses, m, over the kinds of folds that decide."""
+        return self.fit(terms).mean(self.deciding)
+
+    def _row(
+        self, term: str | None, terms: tuple[str, ...], bic: float, *, taken: bool, reason: str
+    ) -> ConsideredTerm:
+        fit = self.fit(terms)
+        order, workspace, single = (float(d.mean()) for d in fit.distances)
+        largest = fit.largest(self.deciding)
+        return ConsideredTerm(term, terms, order, workspace, single, largest, bic, taken, reason)
+
+    def _gain(self, old: LeftOut, new: LeftOut, kind: int) -> tuple[float, float]:
+        """Mean gain (m) over the folds of a kind, which are the independent units, and its standard error."""
+        fold, gain = self.folds[kind], old.distances[kind] - new.distances[kind]
+        gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])
+        return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains)))
+
+    @cached_property
+    def _prediction(self) -> Prediction:
+        return predict(self.model, self.rigid.poses, elastic=bool(self.model.elastic), jacobians=True)
+
+    @cached_property
+    def _noise(self) -> float:
+        freedom = max(self.rigid.residuals.size - self.rigid.identifiability.rank, 1)
+        return float((self.rigid.residuals**2).sum()) / freedom
+
+    @cached_property
+    def _held(self) -> np.ndarray:
+        """Columns (N, 3, k) of springs and inertia, in standard deviations of what is known of them beforehand."""
+        prior = self.rigid.prior
+        if not len(prior.parameters):
+            return np.zeros((len(self.rigid.poses), 3, 0))
+        found = self.rigid.estimate.parameters.subset(prior.parameters.names)
+        slope = found.natural_slope(found.coordinates())
+        return self._prediction.jacobian(found.names) * slope @ np.linalg.cholesky(prior.covariance)
+
+    def _block(self, term: str) -> np.ndarray:
+        if term not in self._columns:
+            names = geometric_parameters(self.model, self.rigid.poses, [term]).names
+            if term == "kinematic":
+                names = tuple(n for n in names if n in self.rigid.identifiability.kept_names)
+            self._columns[term] = self._prediction.jacobian(names)
+        return self._columns[term]
