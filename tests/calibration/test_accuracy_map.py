@@ -30,7 +30,8 @@ from flexcal.model.posterior import Posterior
 
 STD = {
     "offset": 3e-5, "misalignment_1": 3e-5, "misalignment_2": 3e-5, "length_x": 2e-5, "length_y": 2e-5, "length_z": 2e-5,
-    "backlash": 5e-6, "gravity_compliance": 2e-8, "gravity_compliance_1": 2e-8, "gravity_compliance_2": 2e-8, "stiffness": 0.02, "mass": 0.3, "com_x": 5e-3, "com_y": 5e-3,
+    "backlash": 5e-6, "gravity_compliance": 2e-8, "gravity_compliance_1": 2e-8, "gravity_compliance_2": 2e-8,
+    "stiffness": 0.02, "mass": 0.3, "com_x": 5e-3, "com_y": 5e-3,
     "com_z": 5e-3, "x": 2e-5, "y": 2e-5, "z": 2e-5, "rx": 1e-5, "ry": 1e-5, "rz": 1e-5, "transmission_2_sin": 1e-5,
     "transmission_3_cos": 1e-5,
 }  # fmt: skip

@@ -70,8 +70,9 @@ def test_the_term_that_is_there_is_found_alone(
     robot = replace(ur5, config=replace(ur5.config, geometry=geometry)).with_values(TERMS[term])
     found = select_terms(ur5, seen(robot, anywhere, rng))
     assert found.terms == ("kinematic", term)
-    before, after = found.table[0], found.table[1]
-    assert after[1] < before[1] and after[2] < before[2]
+    before, after = found.considered[:2]
+    assert after.order < before.order and after.workspace < before.workspace
+    assert after.taken and after.bic < -20 and not any(row.taken for row in found.considered[2:])
     if term == "backlash":
         assert set(joints) <= set(found.model.config.geometry.backlash)
 
@@ -82,5 +83,23 @@ def test_noise_alone_supports_no_term(ur5: RobotModel, anywhere: PoseSet, seed: 
 
 
 def test_too_few_poses_are_not_divided(ur5: RobotModel, anywhere: PoseSet) -> None:
-    found = select_terms(ur5, anywhere.subset(slice(0, 79)))
-    assert found.terms == ("kinematic",) and found.table == ()
+    found = select_terms(ur5, anywhere.subset(slice(0, 19)))
+    assert found.terms == ("kinematic",) and found.considered == ()
+    assert "19 different poses" in found.remark and "measure 1 more" in found.remark
+
+
+def test_repeated_poses_count_once(ur5: RobotModel, anywhere: PoseSet) -> None:
+    """Thirty visits of ten poses are ten poses, however the encoders jitter."""
+    few = anywhere.subset(np.resize(np.arange(10), 30))
+    jitter = np.random.default_rng(1).uniform(-1e-3, 1e-3, few.q.shape)
+    assert "10 different poses" in select_terms(ur5, replace(few, q=few.q + jitter)).remark
+
+
+def test_a_robot_without_masses_says_why_compliance_is_not_considered(
+    ur5: RobotModel, anywhere: PoseSet
+) -> None:
+    light = replace(ur5, mass=np.zeros(ur5.n))
+    found = select_terms(light, seen(light, anywhere.subset(slice(0, 40)), np.random.default_rng(0)))
+    reasons = {row.term: row.reason for row in found.considered}
+    for term in ("gravity_compliance", "lateral_compliance", "backlash"):
+        assert "gives its links no mass" in reasons[term]

@@ -12,9 +12,11 @@ import pytest
 from outline import Outline
 from scipy.spatial.transform import Rotation
 
+from flexcal.calibration import ConsideredTerm
 from flexcal.errors import InputError
 from flexcal.report import CalibrationStudy, write_calibration_report
 from flexcal.report.calibration import calibration_page
+from flexcal.report.considered_terms import considered_document
 from flexcal.report.measured_points import CALIBRATED
 from flexcal.report.notation import millimetres
 from flexcal.workflow.calibrate_robot import RobotCalibration, calibrate_robot
@@ -45,14 +47,16 @@ def fit(folder: Path) -> RobotCalibration:
 
 @pytest.fixture
 def study(fit: RobotCalibration, folder: Path) -> CalibrationStudy:
-    chosen = {"terms": list(fit.selected.terms), "order_mm": 0.1, "workspace_mm": 0.105}
-    tried = [
-        {"terms": ["kinematic"], "order_mm": 0.11, "workspace_mm": 0.12},
-        chosen,
-        {"terms": [*fit.selected.terms, "transmission_1"], "order_mm": 0.1, "workspace_mm": 0.106},
-    ]
+    final, nan = fit.selected.terms, float("nan")
+    rows = [
+        ConsideredTerm(None, ("kinematic",), 1.1e-4, 1.2e-4, 1e-4, 3e-4, 0.0, True, ""),
+        ConsideredTerm("gravity_compliance", final, 1e-4, 1.05e-4, 9e-5, 3e-4, -50.0, True, "it gains"),
+        ConsideredTerm("transmission_1", (*final, "transmission_1"), 1e-4, 1.06e-4, 9e-5, 3e-4, 3.0, False, "it does not gain"),
+        ConsideredTerm("backlash", (*final, "backlash"), nan, nan, nan, nan, nan, False, "one flank only"),
+    ]  # fmt: skip
     stored = calibration_study(folder / "fit")
-    return replace(stored, results={**stored.results, "term_selection": tried})
+    tried = [considered_document(row) for row in rows]
+    return replace(stored, results={**stored.results, "term_selection": tried, "term_selection_by": "folds"})
 
 
 def test_calibration_report_is_complete(
@@ -73,7 +77,8 @@ def test_calibration_report_is_complete(
         "figure-rank",
     }
     assert millimetres(fit.selected.errors.p90) in outline.words
-    assert "+ gravity compliance" in outline.words and "no, not clear enough" in outline.words
+    for words in ("+ gravity compliance", "left: transmission 1", "it does not gain", "one flank only"):
+        assert words in outline.words
     assert fit.estimate.provenance["input.some.csv"] in outline.words and COMMAND in outline.words
     assert "The files state no measurement noise" in outline.words
     assert all(name in outline.words for name in fit.selected.identifiability.kept_names)

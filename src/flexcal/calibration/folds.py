@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-
 _SAME = 0.01
 """rad or m: joints that differ by less make the same pose."""
 

@@ -32,7 +32,10 @@ class LeftOut:
 
 
 def left_out(
-    columns: Sequence[np.ndarray], penalty: Sequence[float], residuals: np.ndarray, folds: Sequence[np.ndarray]
+    columns: Sequence[np.ndarray],
+    penalty: Sequence[float],
+    residuals: np.ndarray,
+    folds: Sequence[np.ndarray],
 ) -> LeftOut:
     """Fit blocks of `columns` (N, 3, k) to `residuals` (N, 3) m, and predict every fold of each kind (N,) from the others.
 
@@ -40,7 +43,9 @@ def left_out(
     (Allen 1974). `penalty` is the factor on the sum of squared coefficients of each block, m²: of a prior, with the columns in its
     standard deviations; 0 for none. H_gg = Q_g Q_gᵀ is inverted in the space of its points or of its columns, whichever is smaller.
     """
-    scaled = [block * _scale(block) if free == 0 else block for block, free in zip(columns, penalty, strict=True)]
+    scaled = [
+        block * _scale(block) if free == 0 else block for block, free in zip(columns, penalty, strict=True)
+    ]
     stacked = np.concatenate(scaled, axis=2).reshape(residuals.size, -1)
     variance = float(np.mean(residuals**2))
     roots = [

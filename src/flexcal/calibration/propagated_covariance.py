@@ -89,7 +89,11 @@ class Propagation:
 
     def _tilt(self, q: np.ndarray, by_tilt: np.ndarray, twists: np.ndarray) -> None:
         """Write the columns of lateral compliances into `twists` (N, 3, T), `by_tilt` (N, 3, n, 2) being those of the tilts."""
-        tilting = [(k, joint, LATERAL.index(kind)) for k, (joint, kind) in enumerate(self.twisting) if kind in LATERAL]
+        tilting = [
+            (k, joint, LATERAL.index(kind))
+            for k, (joint, kind) in enumerate(self.twisting)
+            if kind in LATERAL
+        ]
         if tilting:
             slopes = lateral_slopes(self.model, q, self.payload)
             for k, joint, axis in tilting:

@@ -72,9 +72,7 @@ def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
 
 def _without_load(model: RobotModel) -> str:
     if not model.mass.any() and not model.payload_mass.any():
-        return (
-            f"{model.urdf.name} gives its links no mass, so gravity torques are not known; add <inertial> elements to consider it"
-        )
+        return f"{model.urdf.name} gives its links no mass, so gravity torques are not known; add <inertial> elements to consider it"
     if not np.any(model.gravity):
         return "robot.yaml says that there is no gravity"
     return "gravity loads no joint"

@@ -19,6 +19,7 @@ LEAST_POSES = 20
 MANY_POSES = 10 * FOLDS
 """Different poses from which whole folds are left out, rather than single poses."""
 
+
 @dataclass(frozen=True, eq=False)
 class TermSelection:
     """`terms` that cross-validation supports, for a `model` that declares them, and every term that was `considered`.
@@ -34,7 +35,9 @@ class TermSelection:
 
     def __str__(self) -> str:
         return "; ".join(
-            f"{row.term}: {'taken' if row.taken else 'left'}, {row.reason}" for row in self.considered if row.term
+            f"{row.term}: {'taken' if row.taken else 'left'}, {row.reason}"
+            for row in self.considered
+            if row.term
         )
 
 
@@ -42,9 +45,9 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
 
     A term is added where it lowers the mean error on poses left out by more than one standard error of the paired difference, lowers the
-    Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one, more in
-    folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base terms
-    to all poses. Compliances that are not supported for all joints are tried joint by joint, and must then lower the criterion by
+    Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one,
+    more in folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base
+    terms to all poses. Compliances that are not supported for all joints are tried joint by joint, and must then lower the criterion by
     2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
     """
     base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))

@@ -47,8 +47,8 @@ def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> ConsideredTerm
 class TermTrials:
     """Linear fits of sets of terms about the fit of the base terms to all poses.
 
-    `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses. With `many` the
-    first two decide, otherwise the third.
+    `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses. With
+    `many` the first two decide, otherwise the third.
     """
 
     def __init__(
@@ -71,7 +71,9 @@ class TermTrials:
         old, new = self.fit(chosen), self.fit(terms)
         bic = new.bic - old.bic
         gains = [self._gain(old, new, k) for k in self.deciding]
-        errors = f"{old.mean(self.deciding) / MILLIMETRE:.4f} to {new.mean(self.deciding) / MILLIMETRE:.4f} mm"
+        errors = (
+            f"{old.mean(self.deciding) / MILLIMETRE:.4f} to {new.mean(self.deciding) / MILLIMETRE:.4f} mm"
+        )
         most = [fit.largest(self.deciding) for fit in (old, new)]
         taken = False
         if min(gain for gain, _ in gains) <= 0:
@@ -81,9 +83,7 @@ class TermTrials:
         elif bic >= -extra:
             reason = f"the BIC changes by {bic:+.0f}, where less than {-extra:.0f} would speak for it"
         elif most[1] > _WORSE * most[0]:
-            reason = (
-                f"the largest error at a left-out pose would rise from {most[0] / MILLIMETRE:.4f} to {most[1] / MILLIMETRE:.4f} mm"
-            )
+            reason = f"the largest error at a left-out pose would rise from {most[0] / MILLIMETRE:.4f} to {most[1] / MILLIMETRE:.4f} mm"
         else:
             taken = True
             reason = f"lowers the mean error at left-out poses from {errors} and the BIC by {-bic:.0f}"

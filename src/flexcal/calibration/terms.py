@@ -86,4 +86,3 @@ def tolerances(parameters: Parameters) -> np.ndarray:
 
 def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Parameter:
     return Parameter(name, unit_of(name), model.value(name), lower=lower)
-

@@ -16,7 +16,9 @@ def considered_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
         if not row["taken"] and "." in term:
             joints.append(term)
             continue
-        lines.append(f"considered {term}: {'taken, because it' if row['taken'] else 'left, because'} {row['reason']}")
+        lines.append(
+            f"considered {term}: {'taken, because it' if row['taken'] else 'left, because'} {row['reason']}"
+        )
     if joints:
         lines.append(
             f"considered for single joints and left, because left-out poses or the BIC do not support them: {', '.join(joints)}"

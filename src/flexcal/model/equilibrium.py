@@ -98,7 +98,9 @@ def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float
     return -_RIGID * deflection[:, :, 2]
 
 
-def gravity_moments(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
+def gravity_moments(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
     """Moments (samples, n, 2), N m, with which joints hold gravity about their axes of `misalignment_1` and `misalignment_2`.
 
     As `gravity_torque` otherwise: of the undeflected robot, carrying everything beyond the joint; 0 for prismatic joints.

@@ -10,7 +10,7 @@ from typing import Any
 
 from flexcal.estimation import Estimate
 from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
-from flexcal.report.figures.term_scores import TermStep
+from flexcal.report.considered_terms import considered_terms, left_out_errors
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, ArmPoses, MeasuredPoints
 from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
@@ -46,14 +46,6 @@ def determined(results: Mapping[str, Any]) -> Determined:
     return Determined.stored(results["identifiability"]["selected"])
 
 
-def term_steps(results: Mapping[str, Any]) -> tuple[TermStep, ...]:
-    """What the selection of terms tried; empty where the terms were given."""
-    return tuple(
-        TermStep(tuple(step["terms"]), step["order_mm"] * MILLIMETRE, step["workspace_mm"] * MILLIMETRE)
-        for step in results["term_selection"]
-    )
-
-
 def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
     """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
     write_page(path, calibration_page(study))
@@ -62,9 +54,9 @@ def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
 def calibration_page(study: CalibrationStudy) -> Page:
     """The page before it becomes HTML."""
     results, points = study.results, study.points
-    sections, steps = [_accuracy_section(study)], term_steps(results)
-    if steps:
-        sections.append(terms_section(steps, results["terms"]))
+    sections, considered = [_accuracy_section(study)], considered_terms(results)
+    if considered:
+        sections.append(terms_section(considered, results["term_selection_by"]))
     sections += [
         residuals_section(results["joints"], points.poses, points.calibrated, study.estimate.outliers),
         Section(
@@ -118,8 +110,7 @@ def calibration_checks(
 ) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
     found, errors = determined(results), points.statistics(CALIBRATED)
-    terms = tuple(results["terms"])
-    left_out = next(((step.order, step.place) for step in term_steps(results) if step.terms == terms), None)
+    left_out = left_out_errors(results)
     drift = results["drift"]
     distance = math.nan if drift["distance_mm"] is None else drift["distance_mm"] * MILLIMETRE
     return (

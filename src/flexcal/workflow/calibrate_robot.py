@@ -12,7 +12,6 @@ import numpy as np
 
 from flexcal.calibration import (
     Calibration,
-    ConsideredTerm,
     Drift,
     ErrorStatistics,
     TermSelection,
@@ -32,6 +31,7 @@ from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.calibration import calibration_checks
+from flexcal.report.considered_terms import considered_document
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, MeasuredPoints
 from flexcal.report.trust import Trust
@@ -97,7 +97,7 @@ class RobotCalibration:
             "identifiability": identifiability_block(self.rigid.identifiability)
             | {"selected": identifiability_block(found) | identifiability_spectrum(found)},
             "terms": list(selected.terms),
-            "term_selection": [considered_term(row) for row in chosen.considered] if chosen else [],
+            "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
             "term_selection_by": chosen.by if chosen else None,
             "calibration": {
                 "nominal": ErrorStatistics.of(self.before).in_millimetres(),
@@ -116,7 +116,10 @@ class RobotCalibration:
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)
             ],
-            "remarks": [*([chosen.remark] if chosen and chosen.remark else []), *calibration_remarks(selected)],
+            "remarks": [
+                *([chosen.remark] if chosen and chosen.remark else []),
+                *calibration_remarks(selected),
+            ],
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
             "command": self.command,
@@ -200,25 +203,6 @@ def calibrate_robot(
         report_folder(out)
         progress("report", 1.0)
     return result
-
-
-def considered_term(row: ConsideredTerm) -> dict[str, Any]:
-    """A term that was considered, as results.json has it; null for what was not computed."""
-
-    def millimetres(value: float) -> float | None:
-        return value / MILLIMETRE if np.isfinite(value) else None
-
-    return {
-        "term": row.term,
-        "terms": list(row.terms),
-        "taken": row.taken,
-        "reason": row.reason,
-        "order_mm": millimetres(row.order),
-        "workspace_mm": millimetres(row.workspace),
-        "single_mm": millimetres(row.single),
-        "largest_mm": millimetres(row.largest),
-        "bic_difference": row.bic if np.isfinite(row.bic) else None,
-    }
 
 
 def nominal_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:

@@ -3,38 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
+import numpy as np
 import plotly.graph_objects as go
 
+from flexcal.calibration import ConsideredTerm
 from flexcal.report.figures.canvas import canvas, single
 from flexcal.report.palette import ELASTIC, NOMINAL, PAGE
 from flexcal.units import MILLIMETRE
 
 
-@dataclass(frozen=True)
-class TermStep:
-    """Mean errors (m) on poses left out, by measuring order and by place, with these terms."""
-
-    terms: tuple[str, ...]
-    order: float
-    place: float
-
-
-def term_scores(steps: Sequence[TermStep]) -> go.Figure:
-    """Mean error (mm) on left-out poses by set of terms, for folds contiguous in measuring order and in the workspace."""
-    labels = step_labels(steps)
+def term_scores(rows: Sequence[ConsideredTerm], by: str = "folds") -> go.Figure:
+    """Mean error (mm) on left-out poses by term: of whole "folds" in measuring order and in the workspace, or of single "poses"."""
+    rows = [row for row in rows if np.isfinite(row.order)]
+    labels = [term_label(row) for row in rows]
     figure = canvas(120 + 46 * len(labels))
-    in_order = [step.order / MILLIMETRE for step in steps]
-    in_place = [step.place / MILLIMETRE for step in steps]
-    for name, values, colour in (
-        ("left out by place in the workspace", in_place, ELASTIC),
-        ("left out by measuring order", in_order, NOMINAL),
-    ):
+    series = {
+        "left out by place in the workspace": ([row.workspace for row in rows], ELASTIC),
+        "left out by measuring order": ([row.order for row in rows], NOMINAL),
+    }
+    if by == "poses":
+        series = {"left out one by one": ([row.single for row in rows], ELASTIC)}
+    for name, (values, colour) in series.items():
         figure.add_trace(
             go.Bar(
-                x=single(values), y=labels, orientation="h", name=name, marker={"color": colour},
-                text=[f"{v:.4f}" for v in values], textposition="inside", insidetextanchor="end", constraintext="none",
+                x=single(np.array(values) / MILLIMETRE), y=labels, orientation="h", name=name, marker={"color": colour},
+                text=[f"{v / MILLIMETRE:.4f}" for v in values], textposition="inside", insidetextanchor="end", constraintext="none",
                 textfont={"size": 11, "color": PAGE}, hovertemplate="%{y}: %{x:.4f} mm",
             )
         )  # fmt: skip
@@ -44,7 +38,8 @@ def term_scores(steps: Sequence[TermStep]) -> go.Figure:
     return figure
 
 
-def step_labels(steps: Sequence[TermStep]) -> list[str]:
-    """A label for each step of a selection: the terms it starts with, then what each adds."""
-    first, *later = steps
-    return [" + ".join(first.terms), *(f"+ {step.terms[-1].replace('_', ' ')}" for step in later)]
+def term_label(row: ConsideredTerm) -> str:
+    """The base terms, or what a term adds to them."""
+    if row.term is None:
+        return " + ".join(row.terms)
+    return f"{'+ ' if row.taken else 'left: '}{row.term.replace('_', ' ')}"

@@ -4,38 +4,60 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flexcal.report.figures.term_scores import TermStep, step_labels, term_scores
+import numpy as np
+
+from flexcal.calibration import ConsideredTerm
+from flexcal.report.figures.term_scores import term_label, term_scores
+from flexcal.report.notation import NOTHING
 from flexcal.report.page import FigureBlock, Section, Table
 from flexcal.units import MILLIMETRE
 
 
-def terms_section(steps: Sequence[TermStep], chosen: Sequence[str]) -> Section:
-    """The steps of the selection that ended with the `chosen` terms, as a table and a figure."""
+def terms_section(considered: Sequence[ConsideredTerm], by: str) -> Section:
+    """Every term that was considered, as a table, and what the terms gain, as a figure; `by` says what was left out."""
     rows = []
-    for label, step in zip(step_labels(steps), steps, strict=True):
-        kept = "yes" if set(step.terms) <= set(chosen) else "no, not clear enough"
-        rows.append((label, f"{step.order / MILLIMETRE:.4f}", f"{step.place / MILLIMETRE:.4f}", kept))
+    for row in considered:
+        errors = (row.single,) if by == "poses" else (row.order, row.workspace)
+        bic = f"{row.bic:+.0f}" if row.term and np.isfinite(row.bic) else NOTHING
+        verdict = "" if row.term is None else "taken" if row.taken else "left"
+        rows.append((term_label(row), *(_millimetres(e) for e in errors), bic, verdict, row.reason))
+    out = (
+        ("left out one by one / mm",)
+        if by == "poses"
+        else ("left out by order / mm", "left out by place / mm")
+    )
+    shown = [row for row in considered if row.taken or row.term is None or "." not in row.term]
     return Section(
         "terms",
         "Which terms the data support",
-        "Compliance under gravity, play in the gears and errors of the transmissions are added one by one, and kept only where they lower "
-        "the error at poses that were left out of the fit, both when neighbours in time and when neighbours in space are left out "
-        "together. Leaving out poses at random would flatter every term: a left-out pose would have near twins in the fit.",
+        "Compliance under gravity (of joints about their axes, and lateral, which tilts the axes), backlash and transmission errors are "
+        "added one by one. A term is taken where it lowers the mean error at poses left out of the fit by more than its standard error, "
+        "lowers the Bayesian information criterion (BIC) and does not raise the largest error at a left-out pose. "
+        + (
+            "Poses are few, so they are left out one by one."
+            if by == "poses"
+            else "Neighbours in time and neighbours in space are left out together: left out at random, a pose would have near twins in "
+            "the fit, and every term would be flattered."
+        ),
         (
             Table(
                 "table-terms",
-                "Mean error on left-out poses",
-                ("terms", "left out by order / mm", "left out by place / mm", "kept"),
+                "Terms considered",
+                ("term", *out, "change of BIC", "verdict", "because"),
                 tuple(rows),
-                text_columns=(3,),
+                "Terms that were left are compared with the final choice.",
+                text_columns=(2 + len(out), 3 + len(out)),
             ),
             FigureBlock(
                 "figure-terms",
-                "What each term gains",
-                term_scores(steps),
-                "Shorter bars are better. The last step is the best of those that were tried next; it is kept only where both bars are "
-                "shorter by more than one standard error.",
+                "Mean error at left-out poses by term",
+                term_scores(shown, by),
+                "Shorter bars are better. Bars of terms that were left show the final choice with that term added.",
                 "Bars of the numbers in the table above.",
             ),
         ),
     )
+
+
+def _millimetres(value: float) -> str:
+    return f"{value / MILLIMETRE:.4f}" if np.isfinite(value) else NOTHING

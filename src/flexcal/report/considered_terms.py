@@ -1,0 +1,58 @@
+"""Terms that were considered, to and from `term_selection` of results.json."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.calibration import ConsideredTerm
+from flexcal.units import MILLIMETRE
+
+
+def considered_document(row: ConsideredTerm) -> dict[str, Any]:
+    """A term that was considered, as results.json has it; null for what was not computed."""
+    return {
+        "term": row.term,
+        "terms": list(row.terms),
+        "taken": row.taken,
+        "reason": row.reason,
+        "order_mm": _known(row.order / MILLIMETRE),
+        "workspace_mm": _known(row.workspace / MILLIMETRE),
+        "single_mm": _known(row.single / MILLIMETRE),
+        "largest_mm": _known(row.largest / MILLIMETRE),
+        "bic_difference": _known(row.bic),
+    }
+
+
+def considered_terms(results: Mapping[str, Any]) -> tuple[ConsideredTerm, ...]:
+    """What the selection of terms considered, as results.json has it; empty where the terms were given, or the poses too few."""
+    return tuple(
+        ConsideredTerm(
+            row["term"],
+            tuple(row["terms"]),
+            *(_number(row[f"{key}_mm"]) * MILLIMETRE for key in ("order", "workspace", "single", "largest")),
+            _number(row["bic_difference"]),
+            row["taken"],
+            row["reason"],
+        )
+        for row in results["term_selection"]
+    )
+
+
+def left_out_errors(results: Mapping[str, Any]) -> tuple[float, float] | None:
+    """Mean errors (m) of the chosen terms at left-out poses: by order and by place, or twice that of single poses where these decided."""
+    terms = tuple(results["terms"])
+    for row in considered_terms(results):
+        if row.terms == terms:
+            alone = results["term_selection_by"] == "poses"
+            return (row.single, row.single) if alone else (row.order, row.workspace)
+    return None
+
+
+def _known(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _number(value: float | None) -> float:
+    return math.nan if value is None else value

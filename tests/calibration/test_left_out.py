@@ -1,0 +1,47 @@
+"""Errors at left-out poses from the hat matrix, against fits that really leave them out."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexcal.calibration.folds import order_folds, single_poses
+from flexcal.calibration.left_out import left_out
+
+
+@pytest.mark.parametrize("folds", [40, 8, 3])
+def test_left_out_errors_are_those_of_fits_without_the_fold(folds: int, rng: np.random.Generator) -> None:
+    """Blocks of a few points and blocks with more rows than columns, with a prior on one block of columns."""
+    free, held = rng.standard_normal((40, 3, 9)), rng.standard_normal((40, 3, 4))
+    residuals = 1e-4 * rng.standard_normal((40, 3))
+    fold, penalty = order_folds(40, folds), 2.5
+    found = left_out([free, held], [0.0, penalty], residuals, [fold]).distances[0]
+    both = np.concatenate([free, held], axis=2)
+    for k in range(folds):
+        inside = both[fold != k].reshape(-1, 13)
+        information = inside.T @ inside + np.diag([0.0] * 9 + [penalty] * 4)
+        solution = np.linalg.solve(information, inside.T @ residuals[fold != k].ravel())
+        expected = np.linalg.norm(residuals[fold == k] - both[fold == k] @ solution, axis=1)
+        np.testing.assert_allclose(found[fold == k], expected, rtol=1e-4)
+
+
+def test_the_criterion_is_that_of_schwarz(rng: np.random.Generator) -> None:
+    columns, residuals = rng.standard_normal((50, 3, 6)), 1e-4 * rng.standard_normal((50, 3))
+    solution, left, *_ = np.linalg.lstsq(columns.reshape(150, 6), residuals.ravel(), rcond=None)
+    expected = 150 * np.log(left[0] / 150) + 6 * np.log(150)
+    assert left_out([columns], [0.0], residuals, []).bic == pytest.approx(expected, abs=1e-3)
+    assert solution.shape == (6,)
+
+
+def test_a_column_that_one_pose_alone_sees_is_held_there(rng: np.random.Generator) -> None:
+    """Without that pose nothing is known of it: the prediction stays where it was, and nothing blows up."""
+    columns, residuals = rng.standard_normal((30, 3, 4)), 1e-4 * rng.standard_normal((30, 3))
+    columns[1:, :, 3] = 0.0
+    found = left_out([columns], [0.0], residuals, [np.arange(30)]).distances[0]
+    assert found[0] < 1e-3
+
+
+def test_poses_that_repeat_are_one() -> None:
+    q = np.array([[0.0, 1.0], [0.001, 0.999], [0.5, 1.0], [0.0, 1.0]])
+    number = single_poses(q)
+    assert number[0] == number[1] == number[3] != number[2]
