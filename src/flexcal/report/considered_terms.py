@@ -27,17 +27,7 @@ def considered_document(row: ConsideredTerm) -> dict[str, Any]:
 
 def considered_terms(results: Mapping[str, Any]) -> tuple[ConsideredTerm, ...]:
     """What the selection of terms considered, as results.json has it; empty where the terms were given, or the poses too few."""
-    return tuple(
-        ConsideredTerm(
-            row["term"],
-            tuple(row["terms"]),
-            *(_number(row[f"{key}_mm"]) * MILLIMETRE for key in ("order", "workspace", "single", "largest")),
-            _number(row["bic_difference"]),
-            row["taken"],
-            row["reason"],
-        )
-        for row in results["term_selection"]
-    )
+    return tuple(_considered(row) for row in results["term_selection"])
 
 
 def left_out_errors(results: Mapping[str, Any]) -> tuple[float, float] | None:
@@ -48,6 +38,23 @@ def left_out_errors(results: Mapping[str, Any]) -> tuple[float, float] | None:
             alone = results["term_selection_by"] == "poses"
             return (row.single, row.single) if alone else (row.order, row.workspace)
     return None
+
+
+def _considered(row: Mapping[str, Any]) -> ConsideredTerm:
+    order, workspace, single, largest = (
+        _number(row[f"{key}_mm"]) * MILLIMETRE for key in ("order", "workspace", "single", "largest")
+    )
+    return ConsideredTerm(
+        row["term"],
+        tuple(row["terms"]),
+        order,
+        workspace,
+        single,
+        largest,
+        _number(row["bic_difference"]),
+        row["taken"],
+        row["reason"],
+    )
 
 
 def _known(value: float) -> float | None:
