@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 
+from flexcal.report.trust import Trust
+
 QUANTITY = {"estimate": 1.05e5, "std": 2e3, "low": 1.01e5, "high": 1.09e5, "truth": 1e5, "identifiable": True}
 UNKNOWN = {"estimate": 7e5, "std": None, "low": None, "high": None, "truth": 1.4e5, "identifiable": False}
 ERRORS = {"poses": 150, "mean_mm": 0.034, "p90_mm": 0.048, "max_mm": 0.111}
@@ -36,11 +38,12 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
     """Puts a stand-in for the two-stage procedure in its place, and lists how it was called."""
     made: list[dict[str, Any]] = []
 
-    def run_two_stage(robot: Path, out: Path, **options: Any) -> None:
+    def run_two_stage(robot: Path, out: Path, **options: Any) -> SimpleNamespace:
         made.append({"robot": robot, "out": out, **options})
         options["progress"]("frequency", 0.5)
         assert out.is_dir()
         (out / "results.json").write_text(json.dumps(DOCUMENT))
+        return SimpleNamespace(trust=Trust())
 
     monkeypatch.setitem(
         sys.modules, "flexcal.workflow.two_stage", SimpleNamespace(run_two_stage=run_two_stage)
@@ -58,6 +61,7 @@ def test_arguments_reach_the_procedure(run, calls: list[dict[str, Any]], tmp_pat
     assert (call["seed"], call["plan"], call["truth"], call["out"]) == (7, "paper", truth, tmp_path / "out")
     assert call["robot"].resolve() == root / "examples" / "tx90l" / "robot.yaml"
     assert "frequency" in outcome.err
+    assert "Trusted: cannot be judged — because no independent check was made" in outcome.err
 
 
 def test_text_shows_truth_beside_estimate(run, calls: list[dict[str, Any]], tmp_path: Path) -> None:
