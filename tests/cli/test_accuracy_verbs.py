@@ -202,8 +202,13 @@ def test_certificate(run, ur5: Path) -> None:
     assert done.status == 0
     document = done.document
     before, after = document["before"]["ap"], document["after"]["ap"]
-    # 0.61 mm is what the README says of the UR5 before, and what is left is the noise of three visits
-    assert before["mean_mm"] == pytest.approx(0.61, abs=0.01) and document["before"]["rp"] is None
+    # 0.61 mm is what the README says of the registered UR5 before, and what is left is the noise of three visits
+    registered = document["before"]["registered"]
+    assert registered["mean_mm"] == pytest.approx(0.61, abs=0.01) and document["before"]["rp"] is None
+    assert document["before"]["own"] == before and before["mean_mm"] < registered["mean_mm"]
+    assert (
+        document["before"]["declared"] is None
+    )  # the tracker's frame is the URDF's base turned by 180 degrees
     assert 0.01 < after["mean_mm"] < 0.03 and document["after"]["rp"]["visits"] == 3
     assert document["after_refitted"]["ap"]["mean_mm"] < 1.1 * after["mean_mm"]
     assert document["rms_mm"]["visit_to_visit"] == pytest.approx(1e3 * SIGMA * np.sqrt(3), rel=0.2)

@@ -49,7 +49,7 @@ def test_verification_leaves_its_report(run, calibrated: Path) -> None:
     )
     mean = run("verify", *arguments).document["verification"]["measured"]["mean_mm"]
     html = (out / "report.html").read_text("utf-8")
-    assert "verification report" in html and "as delivered" in html and f"{mean:.3f}" in html
+    assert "verification report" in html and "best-fit registered" in html and f"{mean:.3f}" in html
     assert run("report", out).status == 0
     assert f"{mean:.3f}" in (out / "report.html").read_text("utf-8")
 

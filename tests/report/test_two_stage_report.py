@@ -89,15 +89,14 @@ def test_arrays_are_float32_in_base64(outline: Outline, simulated: TwoStageRun) 
         drawn, 1e3 * np.linalg.norm(simulated.calibration.residuals, axis=1), rtol=1e-6
     )
     drawn = np.frombuffer(base64.b64decode(before["y"]["bdata"]), dtype=np.float32)
-    np.testing.assert_allclose(
-        drawn, 1e3 * np.linalg.norm(simulated.nominal_at_calibration.errors, axis=1), rtol=1e-6
-    )
+    np.testing.assert_allclose(drawn, 1e3 * np.linalg.norm(simulated.before.own, axis=1), rtol=1e-6)
 
 
 def test_first_screen_answers_the_three_questions(html: str, simulated: TwoStageRun) -> None:
     screen = html[html.index('id="verdict"') : html.index('id="stage1"')]
     for statistics in (
         simulated.nominal_verification.all,
+        simulated.own_verification.all,
         simulated.rigid_verification[0].all,
         simulated.elastic_verification.all,
     ):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, calibrate, predict, verify
+from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify
 from flexcal.data import MultisinePlan, PoseSet, write_plan
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimates_file import Block, write_estimates
@@ -21,7 +21,7 @@ from flexcal.model.names import GEOMETRY, SPRINGS, spring_names
 from flexcal.model.transfer import transfer_matrix
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.fitted_response import fitted_responses
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.units import DEGREE
 from flexcal.workflow.fitted_files import write_fitted
 from flexcal.workflow.point_files import write_arm, write_points
@@ -177,6 +177,8 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
     noisy = measured(robot, q_verify, rng)
     took = time.perf_counter() - started
     floor = 2.0e-5 * rng.normal(size=exact.position.shape)
+    placed = robot_before(nominal, calibrated.poses)
+    assert placed.registered is not None and placed.own is not None
     return TwoStageRun(
         nominal=nominal,
         informed=nominal,
@@ -185,9 +187,10 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
         stiffness=stiffness,
         calibration=calibrated,
         rigid=rigid,
-        nominal_at_calibration=verify(nominal, calibrated.poses, elastic=False),
+        before=placed.errors(calibrated.poses),
         verification_poses=exact,
-        nominal_verification=verify(nominal, exact, elastic=False),
+        nominal_verification=verify(placed.registered, exact, elastic=False),
+        own_verification=verify(placed.own, exact, elastic=False),
         elastic_verification=verify(calibrated.model, exact),
         rigid_verification=tuple(verify(fit.model, exact, elastic=False) for fit in rigid),
         measured_verification=verify(calibrated.model, noisy),
@@ -215,8 +218,8 @@ def leave_run(folder: Path, run: TwoStageRun) -> None:
     write_plan(folder / "frequency_plan.yaml", run.plan)
     write_fitted(folder, fitted_responses(run.stiffness, run.nominal))
     write_verification(folder / "verification.csv", run)
-    errors = {NOMINAL: run.nominal_at_calibration.errors, CALIBRATED: fit.residuals}
-    write_points(folder, MeasuredPoints(fit.poses, errors, fit.ambiguous))
-    write_arm(folder, arms_at(fit.model, fit.poses, errors))
+    points = MeasuredPoints(fit.poses, errors_before(run.before) | {CALIBRATED: fit.residuals}, fit.ambiguous)
+    write_points(folder, points)
+    write_arm(folder, arms_at(fit.model, fit.poses, points.shown))
     exported = write_urdf(fit.model, folder / "calibrated.urdf")
     write_results(folder, two_stage_document(run, exported))

@@ -116,7 +116,7 @@ def test_no_verification_pose_was_used_for_the_fit(demo: Path) -> None:
 def test_the_table_says_what_the_results_say(demo: Path) -> None:
     table = pl.read_csv(demo / "verification.csv")
     joints = [f"q{i}" for i in range(1, 7)]
-    kinds = ("nominal", "elastic", "rigid")
+    kinds = ("nominal", "own", "elastic", "rigid")
     points = [f"{kind}_{axis}" for kind in kinds for axis in "xyz"]
     assert table.columns == ["pose", *joints, "x", "y", "z", *points, "parameter_rms", "unambiguous"]
     document = json.loads((demo / "results.json").read_text())["verification"]

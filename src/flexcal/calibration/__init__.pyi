@@ -1,9 +1,11 @@
+from .before import ErrorsBefore, RobotBefore, robot_before
 from .drift import Drift
 from .elastic_prior import ElasticPrior
 from .error_statistics import ErrorStatistics
 from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
 from .measured_points import require_points
+from .placement import Placement, best_placement, enough_for_points, registrable, rigid_placement
 from .plausibility import Moved, moved_far
 from .pose_drift import VISITS_A_SET, PoseDrift, common_way, drift_of_poses
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
@@ -27,17 +29,22 @@ __all__ = [
     "ElasticPrior",
     "ErrorScale",
     "ErrorStatistics",
+    "ErrorsBefore",
     "Moved",
+    "Placement",
     "PoseDrift",
     "PoseRepeatability",
     "Prediction",
     "Propagation",
+    "RobotBefore",
     "TermSelection",
     "Verification",
     "accuracy_map",
+    "best_placement",
     "calibrate",
     "common_way",
     "drift_of_poses",
+    "enough_for_points",
     "error_scale",
     "error_sources",
     "geometric_parameters",
@@ -47,9 +54,12 @@ __all__ = [
     "propagation",
     "random_poses_in",
     "register",
+    "registrable",
     "repeatability",
     "require_points",
     "rigid_motion",
+    "rigid_placement",
+    "robot_before",
     "select_terms",
     "verify",
     "verify_jointly",

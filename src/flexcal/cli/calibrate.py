@@ -49,7 +49,7 @@ class Calibrate:
     def run(self) -> None:
         """Calibrate, and print what was found."""
         from flexcal.cli.considered_terms import considered_lines
-        from flexcal.cli.tables import dropped_table, error_table, weak_table
+        from flexcal.cli.tables import before_rows, dropped_table, error_table, weak_table
         from flexcal.workflow.calibrate_robot import calibrate_robot
         from flexcal.workflow.calibration_remarks import hardly_fits
 
@@ -85,10 +85,9 @@ class Calibrate:
             console.say(line)
         errors = document["calibration"]
         terms = ("elastic, " if found.selected.model.elastic else "") + " + ".join(found.selected.terms)
-        labels = {"nominal": "before (registered only)", "rigid": "rigid", "selected": f"selected: {terms}"}
-        console.show(
-            error_table("distance to the measured points", {labels[key]: errors[key] for key in labels})
-        )
+        labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
+        rows = before_rows(document) | {label: errors[key] for key, label in labels.items()}
+        console.show(error_table("distance to the measured points", rows))
         for remark in document["remarks"]:
             console.say(remark)
         console.say(found.trust.sentence)

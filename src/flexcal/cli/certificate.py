@@ -35,7 +35,7 @@ class Certificate:
 
     def run(self) -> None:
         """Compare, and print the accuracy before and after."""
-        from flexcal.cli.tables import error_table
+        from flexcal.cli.tables import before_rows, error_table
         from flexcal.workflow.certify_robot import certify_robot
 
         require_robot(self.robot, self.targets, self.before, self.after)
@@ -51,11 +51,10 @@ class Certificate:
         )
         document = found.document()
         labels = {
-            "before": "before, targets laid as well as they go",
-            "after": "after, where the calibration has them",
-            "after_refitted": "after, laid as well as they go",
+            "after": "after, nothing registered",
+            "after_refitted": "after, registered and point found too",
         }
-        rows = {label: document[key]["ap"] for key, label in labels.items()}
+        rows = before_rows(document) | {label: document[key]["ap"] for key, label in labels.items()}
         console.show(error_table("pose accuracy AP: distance to the target", rows))
         for key in ("before", "after"):
             if (repeated := document[key]["rp"]) is not None:

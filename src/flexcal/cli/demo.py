@@ -74,7 +74,8 @@ class Demo:
 
 
 _VERIFICATION = {
-    "nominal": "fresh poses, before (registered only)",
+    "nominal": "fresh poses, before (best-fit registered)",
+    "own": "fresh poses, before (the robot's own)",
     "elastic": "fresh poses, against the truth",
     "elastic_unambiguous": "  of these, flank certain",
     "measured": "  against the tracker",

@@ -55,7 +55,7 @@ class Map:
 
     def run(self) -> None:
         """Map, and print how accurate the tool is, where it is worst, and why."""
-        from flexcal.cli.tables import map_table
+        from flexcal.cli.tables import before_rows, error_table, map_table
         from flexcal.data import page_beside
         from flexcal.workflow.map_accuracy import map_accuracy
 
@@ -78,6 +78,8 @@ class Map:
             )
         document = found.document()
         console.show(map_table(document))
+        if document["before"] is not None:
+            console.show(error_table("at the verification poses", before_rows(document)))
         sources = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in document["sources"].items())
         console.say(f"its variance would fall, were these known exactly: {sources}")
         worst = document["worst"][0]

@@ -7,6 +7,9 @@ from typing import Any
 
 from rich.table import Table
 
+NOTHING = "–"
+"""Where there is no number."""
+
 
 def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     """One row a set of errors: poses, mean, 90th percentile and maximum, mm; `rows` are blocks of results.json by label."""
@@ -18,6 +21,17 @@ def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
         numbers = [_millimetres(block[key]) for key in ("mean_mm", "p90_mm", "max_mm")]
         table.add_row(label, str(block["poses"]), *numbers)
     return table
+
+
+def before_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+    """The three blocks `before` of a document as rows of `error_table`, dashes where one is not known."""
+    labels = {
+        "declared": "before, as declared",
+        "registered": "before, best-fit registered",
+        "own": "before, the robot's own: point found too",
+    }
+    unknown = {"poses": NOTHING, "mean_mm": None, "p90_mm": None, "max_mm": None}
+    return {label: document["before"][key] or unknown for key, label in labels.items()}
 
 
 def map_table(document: Mapping[str, Any]) -> Table:
@@ -44,13 +58,13 @@ def repeatability_table(document: Mapping[str, Any]) -> Table:
         table.add_column(heading, justify="right")
     labels = {
         "rp_mm": "repeatability RP",
-        "ap_nominal_mm": "accuracy AP, as delivered (registered only)",
+        "ap_nominal_mm": "accuracy AP, before (the robot's own)",
         "ap_calibrated_mm": "accuracy AP, calibrated",
         "vap_mm": "variation of AP by direction, vAP",
     }
     drifting = {
         "drp_mm": "drift of repeatability, dRP",
-        "dap_nominal_mm": "drift of accuracy, as delivered, dAP",
+        "dap_nominal_mm": "drift of accuracy, before, dAP",
         "dap_calibrated_mm": "drift of accuracy, calibrated, dAP",
         "way_mm": "way of the barycentre meanwhile",
     }
@@ -161,7 +175,7 @@ def response_table(responses: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def _millimetres(value: float | None) -> str:
-    return "–" if value is None else f"{value:.3f}"
+    return NOTHING if value is None else f"{value:.3f}"
 
 
 def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:

@@ -26,7 +26,7 @@ class Verify:
 
     def run(self) -> None:
         """Verify, and print the errors."""
-        from flexcal.cli.tables import error_table
+        from flexcal.cli.tables import before_rows, error_table
         from flexcal.workflow.verify_robot import verify_robot
 
         require_robot(self.robot, *self.poses)
@@ -37,10 +37,10 @@ class Verify:
         )
         document = found.document()
         blocks = document["verification"]
-        labels = {"nominal": "before (registered only)", "measured": "calibrated"}
+        labels = {"measured": "calibrated"}
         if document["ambiguous_poses"]:
             labels["measured_unambiguous"] = "calibrated, flank certain"
-        rows = {label: blocks[key] for key, label in labels.items() if key in blocks}
+        rows = before_rows(document) | {label: blocks[key] for key, label in labels.items()}
         console.show(error_table("distance to the measured points", rows))
         rms = document["rms_mm"]
         noise = (

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.calibration import AccuracyMap, ErrorScale, Verification
 from flexcal.model import RobotModel
+from flexcal.report.before import before_table
 from flexcal.report.figures.accuracy_space import SHOWN, accuracy_space
 from flexcal.report.figures.accuracy_views import accuracy_views
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
@@ -209,6 +210,7 @@ def _observed(study: MapStudy) -> Section:
     blocks: tuple[Block, ...] = (
         Table("table-scale", "Observed against predicted errors", ("", ""), rows),
         Text((_UP_ONLY,)),
+        before_table(study.results["before"]),
         FigureBlock(
             "figure-predicted",
             "Predicted against observed errors",

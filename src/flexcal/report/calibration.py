@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flexcal.calibration import ErrorStatistics
 from flexcal.estimation import Estimate
+from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
 from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
 from flexcal.report.considered_terms import considered_terms, left_out_errors
 from flexcal.report.first_screen import rung, three_facts
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, ArmPoses, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, RIGID, ArmPoses, MeasuredPoints
 from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
 from flexcal.report.page import Check, Page, Section, Table, Text, Verdict
 from flexcal.report.render import write_page
@@ -85,24 +87,34 @@ def calibration_page(study: CalibrationStudy) -> Page:
 
 def calibration_verdict(study: CalibrationStudy) -> Verdict:
     """How accurate it was, how accurate it is at the measured poses, and whether that can be trusted."""
-    before, after = study.points.statistics(NOMINAL), study.points.statistics(CALIBRATED)
+    before, after = study.points.before, study.points.statistics(CALIBRATED)
     checks = calibration_checks(study.results, study.estimate, study.points)
     trust = Trust(checks)
-    rungs = [rung("as delivered", before, "nominal")]
+    rungs = before_rungs(study.points)
     if RIGID in study.points.errors:
         rungs.append(rung("rigid geometry", study.points.statistics(RIGID), "rigid"))
     rungs.append(rung("calibrated", after, "elastic"))
     return Verdict(
         trust.status,
         HEADLINES[trust.status],
-        f"As delivered, and after the best placement of the instrument, points were up to {millimetres(before.max)} mm from where the "
-        f"robot should have been. The calibrated model is within {millimetres(after.p90)} mm at nine of ten of the same {after.poses} "
-        f"points and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} better.",
+        f"{_was(before)}The calibrated model is within {millimetres(after.p90)} mm at nine of ten of the same {after.poses} "
+        f"points and {millimetres(after.max)} mm at worst{_better(before, after)}.",
         three_facts(before, after, trust, "points"),
         tuple(rungs),
         f"Error of the robot at the {after.poses} measured points",
         checks,
     )
+
+
+def _was(before: ErrorStatistics | None) -> str:
+    if before is None:
+        return ""
+    largest = f"{millimetres(before.max)} mm"
+    return f"Before, with instrument and measured point registered by best fit, the robot's own error was up to {largest}. "
+
+
+def _better(before: ErrorStatistics | None, after: ErrorStatistics) -> str:
+    return "" if before is None else f": {ratio(before.p90, after.p90)} better"
 
 
 def calibration_checks(
@@ -130,8 +142,8 @@ def calibration_checks(
 
 def _accuracy_section(study: CalibrationStudy) -> Section:
     points, seen = study.points, study.results["identifiability"]
-    ranks = {NOMINAL: NOTHING, RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
-    rows = []
+    ranks = {RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
+    rows = [(*row, NOTHING) for row in before_rows(points)]
     for model, label in _LABELS.items():
         if model in points.errors:
             statistics = points.statistics(model)
@@ -141,9 +153,10 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
         "Errors at the measured poses",
         ("model", "points", "mean / mm", "90 % within / mm", "worst / mm", "determined parameters"),
         tuple(rows),
+        note=BEFORE_NOTE,
         strong=(len(rows) - 1,),
     )
-    remarks = study.results["remarks"]
+    remarks, before = study.results["remarks"], points.delivered
     return Section(
         "accuracy",
         "Before and after",
@@ -153,13 +166,12 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
             table,
             *([Text((), "Remarks", sentences(remarks))] if remarks else []),
             arm_figure(study.arms, len(points.poses)),
-            error_figure(points.poses, points.errors[NOMINAL], points.calibrated),
+            *([] if before is None else [error_figure(points.poses, before, points.calibrated)]),
         ),
     )
 
 
 _LABELS = {
-    NOMINAL: "as delivered, after registration",
     RIGID: "rigid geometry",
     CALIBRATED: "calibrated",
 }

@@ -57,10 +57,12 @@ def certificate_html(study: CertificateStudy) -> str:
 def accuracy_rows(results: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Label, AP mean, 90 % and worst, RP worst, in mm."""
     labels = {
-        "before": "before: nominal commands, targets laid as well as they go",
-        "after": "after: compensated commands, targets where the calibration has them",
-        "after_refitted": "after, targets laid as well as they go",
+        "before": "before: nominal commands, instrument and point registered by best fit (the robot's own error)",
+        "after": "after: compensated commands, nothing registered (instrument as calibrated)",
+        "after_refitted": "after, registered by best fit as before",
     }
+    before = {"declared": "before, as declared", "registered": "before, best-fit registered"}
+    names = ("mean_mm", "p90_mm", "max_mm")
     rows = []
     for key, label in labels.items():
         block = results[key]
@@ -68,10 +70,13 @@ def accuracy_rows(results: Mapping[str, Any]) -> list[tuple[str, ...]]:
         rows.append(
             (
                 label,
-                *(document_millimetres(block["ap"][name]) for name in ("mean_mm", "p90_mm", "max_mm")),
+                *(document_millimetres(block["ap"][name]) for name in names),
                 repeated,
             )
         )
+    for key, label in before.items():
+        block = results["before"][key] or dict.fromkeys(names)
+        rows.append((label, *(document_millimetres(block[name]) for name in names), NOTHING))
     return rows
 
 

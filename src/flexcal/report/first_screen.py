@@ -14,7 +14,9 @@ def three_facts(
     before: ErrorStatistics | None, after: ErrorStatistics, trust: Trust, noun: str
 ) -> tuple[Fact, ...]:
     """How accurate it was, how accurate it is, and whether it can be trusted; `noun` is poses or points."""
-    was = _fact("How accurate was it?", before, f"9 of 10 {noun} were within this, as delivered.")
+    was = _fact(
+        "How accurate was it?", before, f"9 of 10 {noun} were within this before: the robot's own error."
+    )
     now = _fact("How accurate is it?", after, f"9 of 10 {noun} are within this, calibrated.")
     return (was, now, trust.fact())
 

@@ -7,11 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, Verification
+from flexcal.calibration import ErrorsBefore, ErrorStatistics, Verification
 from flexcal.data import PoseSet
 
-NOMINAL, RIGID, CALIBRATED = "nominal", "rigid", "calibrated"
-"""The models: as delivered after a rigid registration, fitted without further terms, and as it is used."""
+DECLARED, NOMINAL, OWN = "declared", "nominal", "own"
+"""The robot as delivered: as declared, best-fit registered, and registered with the measured points found too."""
+RIGID, CALIBRATED = "rigid", "calibrated"
+"""The robot fitted without further terms, and as it is used."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +35,9 @@ class MeasuredPoints:
         return self.errors[CALIBRATED]
 
     @property
-    def nominal(self) -> np.ndarray | None:
-        """Errors (N, 3) m as delivered; None where the points do not allow a registration."""
-        return self.errors.get(NOMINAL)
+    def delivered(self) -> np.ndarray | None:
+        """The robot's own errors (N, 3) m as delivered: with the points found too, else registered; None where neither is known."""
+        return self.errors.get(OWN, self.errors.get(NOMINAL))
 
     @property
     def verification(self) -> Verification:
@@ -46,9 +48,25 @@ class MeasuredPoints:
         position = self.poses.position - self.calibrated
         return Verification(position, self.calibrated, self.parameter_rms, self.ambiguous)
 
+    @property
+    def shown(self) -> dict[str, np.ndarray]:
+        """The errors that drawings of the arm show: calibrated, and as delivered where known."""
+        shown = {CALIBRATED: self.calibrated}
+        return shown if self.delivered is None else shown | {NOMINAL: self.delivered}
+
+    @property
+    def before(self) -> ErrorStatistics | None:
+        """Of the robot's own errors as delivered; None where they are not known."""
+        return None if self.delivered is None else ErrorStatistics.of(self.delivered)
+
     def statistics(self, model: str) -> ErrorStatistics:
         """Of one model's errors."""
         return ErrorStatistics.of(self.errors[model])
+
+
+def errors_before(before: ErrorsBefore) -> dict[str, np.ndarray]:
+    """The errors of an uncalibrated robot by the names that they have among `MeasuredPoints.errors`."""
+    return {NOMINAL if name == "registered" else name: errors for name, errors in before.known.items()}
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Table, 
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
 
-KINDS = {"nominal": "AP as delivered", "calibrated": "AP calibrated"}
+KINDS = {"nominal": "AP before (the robot's own)", "calibrated": "AP calibrated"}
 
 
 @dataclass(frozen=True, eq=False)

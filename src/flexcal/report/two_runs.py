@@ -90,7 +90,7 @@ def comparison_verdict(found: Comparison) -> Verdict:
     rungs = []
     for run in (first, second):
         if run.before is not None:
-            rungs.append(rung(f"{run.name}, as delivered", run.before, "nominal"))
+            rungs.append(rung(f"{run.name}, before", run.before, "nominal"))
         rungs.append(rung(run.name, run.after, "rigid" if run is first else "elastic"))
     where = "fresh points" if first.fresh and second.fresh else "points"
     return Verdict(status, headline, sentence, facts, tuple(rungs), f"Error of the robot at {where}", checks)
@@ -129,7 +129,7 @@ def _errors(found: Comparison) -> Section:
     rows = []
     for run in (first, second):
         if run.before is not None:
-            rows.append((f"{run.name}, as delivered", str(run.before.poses), *statistics_cells(run.before)))
+            rows.append((f"{run.name}, before", str(run.before.poses), *statistics_cells(run.before)))
         rows.append((run.name, str(run.after.poses), *statistics_cells(run.after)))
     series = [ErrorSeries(first.name, RIGID, first.errors), ErrorSeries(second.name, ELASTIC, second.errors)]
     return Section(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from flexcal.report.before import before_rungs
 from flexcal.report.checks import (
     check_claimed_uncertainty,
     check_drift,
@@ -15,7 +16,7 @@ from flexcal.report.checks import (
     check_truth,
 )
 from flexcal.report.first_screen import rung, three_facts
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID
+from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import millimetres, ratio
 from flexcal.report.page import Check, Page, Rung, Status, Verdict
 from flexcal.report.render import write_page
@@ -70,11 +71,13 @@ def two_stage_page(study: TwoStageStudy) -> Page:
 
 def two_stage_verdict(study: TwoStageStudy) -> Verdict:
     """How accurate it was, how accurate it is, and whether that can be trusted."""
-    before, rigid, after = (study.fresh.statistics(model) for model in (NOMINAL, RIGID, CALIBRATED))
+    before = study.fresh.before
+    assert before is not None
+    rigid, after = (study.fresh.statistics(model) for model in (RIGID, CALIBRATED))
     checks = two_stage_checks(study)
     trust = Trust(checks)
     sentence = (
-        f"As delivered, the tool was up to {millimetres(before.max)} mm from where it should be. On {after.poses} fresh poses it is "
+        f"Before, the robot's own error was up to {millimetres(before.max)} mm. On {after.poses} fresh poses it is "
         f"now within {millimetres(after.p90)} mm at nine of ten and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} "
         f"better. The best calibration without elasticity would leave {millimetres(rigid.p90)} and {millimetres(rigid.max)} mm."
     )
@@ -127,7 +130,7 @@ def truth_checks(study: TwoStageStudy) -> tuple[Check, ...]:
 
 def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
     paper = study.paper
-    rungs = [rung("as delivered", study.fresh.statistics(NOMINAL), "nominal")]
+    rungs = before_rungs(study.fresh)
     rungs += [rung(f"rigid, {fit.poses} poses", fit.errors, "rigid") for fit in study.rigid]
     if paper is not None and paper.rigid is not None:
         rungs.append(rung("paper: rigid, hardware", paper.rigid, "published"))

@@ -8,16 +8,16 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.calibration import Verification
+from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
 from flexcal.report.checks import check_claimed_uncertainty, check_enough, check_flanks, check_unseen
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
 from flexcal.report.first_screen import rung, three_facts
-from flexcal.report.measured_points import NOMINAL, ArmPoses, MeasuredPoints
+from flexcal.report.measured_points import ArmPoses, MeasuredPoints
 from flexcal.report.notation import millimetres, sentences, statistics_cells
 from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Text, Verdict
-from flexcal.report.palette import ELASTIC
-from flexcal.report.palette import NOMINAL as GREY
+from flexcal.report.palette import ELASTIC, NOMINAL
 from flexcal.report.render import write_page
 from flexcal.report.sections.geometry import arm_figure
 from flexcal.report.sections.provenance import provenance_section
@@ -75,10 +75,9 @@ def verification_page(study: VerificationStudy) -> Page:
 def _verdict(study: VerificationStudy) -> Verdict:
     result, fitted = study.verification, study.results["fitted"]
     after = result.all
-    before = study.points.statistics(NOMINAL) if study.points.nominal is not None else None
+    before = study.points.before
     checks = verification_checks(study.results, study.points)
     trust = Trust(checks)
-    rungs = [] if before is None else [rung("as delivered", before, "nominal")]
     noun = "points" if fitted else "fresh points"
     return Verdict(
         trust.status,
@@ -86,7 +85,7 @@ def _verdict(study: VerificationStudy) -> Verdict:
         f"At nine of ten of {after.poses} {noun} the calibrated model is within {millimetres(after.p90)} mm of what the instrument "
         f"reads, and within {millimetres(after.max)} mm at all of them. The instrument's own noise is part of these numbers.",
         three_facts(before, after, trust, "points"),
-        (*rungs, rung("calibrated", after, "elastic")),
+        (*before_rungs(study.points), rung("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} {noun}, against the instrument",
         checks,
     )
@@ -109,11 +108,9 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
 def _errors_section(study: VerificationStudy) -> Section:
     result = study.verification
     series = [ErrorSeries("calibrated", ELASTIC, result.errors)]
-    rows = [("calibrated", str(result.all.poses), *statistics_cells(result.all))]
-    if study.points.nominal is not None:
-        series.insert(0, ErrorSeries("as delivered", GREY, study.points.nominal))
-        before = study.points.statistics(NOMINAL)
-        rows.insert(0, ("as delivered, after registration", str(before.poses), *statistics_cells(before)))
+    rows = [*before_rows(study.points), ("calibrated", str(result.all.poses), *statistics_cells(result.all))]
+    if study.points.delivered is not None:
+        series.insert(0, ErrorSeries("before, the robot's own", NOMINAL, study.points.delivered))
     if result.ambiguous.any():
         certain = result.unambiguous
         rows.append(("… where the backlash flank is certain", str(certain.poses), *statistics_cells(certain)))
@@ -124,6 +121,7 @@ def _errors_section(study: VerificationStudy) -> Section:
             "Distances",
             ("model", "points", "mean / mm", "90 % within / mm", "worst / mm"),
             tuple(rows),
+            note=BEFORE_NOTE,
         ),
         *([Text((), "Remarks", sentences(remarks))] if remarks else []),
         arm_figure(study.arms, len(poses)),

@@ -13,17 +13,16 @@ import numpy as np
 from flexcal.calibration import (
     Calibration,
     Drift,
-    ErrorStatistics,
+    ErrorsBefore,
     TermSelection,
     calibrate,
-    predict,
-    register,
     require_points,
+    robot_before,
     select_terms,
 )
 from flexcal.calibration.geometry_fit import LossName
 from flexcal.calibration.terms import PER_JOINT
-from flexcal.data import PoseSet, read_poses
+from flexcal.data import read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
@@ -33,7 +32,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.calibration import calibration_checks
 from flexcal.report.considered_terms import considered_document
 from flexcal.report.figures.arm_poses import arms_at
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
@@ -56,12 +55,11 @@ AUTO = "auto"
 class RobotCalibration:
     """What `calibrate_robot` found.
 
-    `before` (N, 3) m are the errors of the uncalibrated robot after a rigid registration; `rigid` is the fit without elasticity and further
-    terms, `selected` the one that is stored in the file `estimates`; `selection` is None where the terms were given. `command` is the
-    command line, where there was one.
+    `before` are the errors of the uncalibrated robot; `rigid` is the fit without elasticity and further terms, `selected` the one that is
+    stored in the file `estimates`; `selection` is None where the terms were given. `command` is the command line, where there was one.
     """
 
-    before: np.ndarray
+    before: ErrorsBefore
     rigid: Calibration
     selection: TermSelection | None
     selected: Calibration
@@ -73,7 +71,7 @@ class RobotCalibration:
     def points(self) -> MeasuredPoints:
         """The points of the fit with the errors of every model, the rigid one where it is not the selected."""
         fit = self.selected
-        errors = {NOMINAL: self.before, RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
+        errors = errors_before(self.before) | {RIGID: self.rigid.residuals, CALIBRATED: fit.residuals}
         if self.rigid is fit:
             del errors[RIGID]
         return MeasuredPoints(fit.poses, errors, fit.ambiguous)
@@ -89,7 +87,7 @@ class RobotCalibration:
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:
-        selected, chosen = self.selected, self.selection
+        selected, chosen, before = self.selected, self.selection, self.before.document()
         found, drift = selected.identifiability, Drift.of(selected)
         return {
             "robot": selected.model.name,
@@ -99,8 +97,9 @@ class RobotCalibration:
             "terms": list(selected.terms),
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
             "term_selection_by": chosen.by if chosen else None,
+            "before": before,
             "calibration": {
-                "nominal": ErrorStatistics.of(self.before).in_millimetres(),
+                "nominal": before["registered"],
                 "rigid": self.rigid.errors.in_millimetres(),
                 "selected": selected.errors.in_millimetres(),
             },
@@ -191,25 +190,17 @@ def calibrate_robot(
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(selected.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
-    before = nominal_errors(model, poses)
+    before = robot_before(model, poses).errors(poses)
     result = RobotCalibration(before, rigid, selection, selected, estimate, target, command)
     store_block(source, target, blocks, "calibration", estimate)
     if out is not None:
         progress("report", 0.0)
         write_results(out, result.document())
         write_points(out, result.points)
-        shown = {name: result.points.errors[name] for name in (CALIBRATED, NOMINAL)}
-        write_arm(out, arms_at(selected.model, selected.poses, shown))
+        write_arm(out, arms_at(selected.model, selected.poses, result.points.shown))
         report_folder(out)
         progress("report", 1.0)
     return result
-
-
-def nominal_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Error vectors (N, 3) m of the uncalibrated, rigid robot after the best rigid registration."""
-    bare = replace(model, station=np.zeros_like(model.station))
-    placed = register(bare, poses, predict(bare, poses, elastic=False).position)
-    return poses.position - predict(placed, poses, elastic=False).position
 
 
 def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:

@@ -16,9 +16,13 @@ from flexcal.calibration import (
     ErrorStatistics,
     PoseRepeatability,
     Verification,
+    best_placement,
+    enough_for_points,
     error_scale,
+    registrable,
     repeatability,
-    rigid_motion,
+    rigid_placement,
+    robot_before,
     verify_jointly,
 )
 from flexcal.compensation import wanted_pose
@@ -26,13 +30,14 @@ from flexcal.data import PoseSet, ToolTargets, read_targets
 from flexcal.errors import InputError
 from flexcal.estimates_file import sha256_of
 from flexcal.model import RobotModel, carried_mass
+from flexcal.model.resting_tool import points_kinematics
 from flexcal.model.rotations import vector_rotation
 from flexcal.report.certificate import CertificateStudy, write_certificate
 from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
-from flexcal.workflow.verify_robot import fitted_files, registrable, verification_poses
+from flexcal.workflow.verify_robot import fitted_files, verification_poses
 
 _FAR = 0.25
 """rad or m: a measured pose farther than this from the joint positions of its target belongs to another one."""
@@ -71,12 +76,15 @@ class Visited:
 
 @dataclass(frozen=True, eq=False)
 class RobotCertificate:
-    """Before and after at the same targets; `refitted`: after, with the targets laid as well as they go, as before is.
+    """Before and after at the same targets; `refitted`: after, with instrument and point registered by best fit, as before.
 
-    `verification` and `scale`: the measurements after against what the calibration predicts. `command`: the command line.
+    `before` are the robot's own errors, `declared` and `registered` the others of `RobotBefore`. `verification` and `scale`: the
+    measurements after against what the calibration predicts. `command`: the command line.
     """
 
     robot: CalibratedRobot
+    declared: Visited | None
+    registered: Visited
     before: Visited
     after: Visited
     refitted: Visited
@@ -141,7 +149,12 @@ class RobotCertificate:
             "sigma_mm": float(np.median(poses.sigma)) / MILLIMETRE if poses.sigma_given else None,
             "payload_kg": sorted({float(m) for m in carried_mass(model, poses.payload, len(poses)).round(3)}),
             "temperature": None if every is None else [float(every.min()), float(every.max())],
-            "before": self.before.block(),
+            "before": self.before.block()
+            | {
+                "declared": None if self.declared is None else self.declared.accuracy.in_millimetres(),
+                "registered": self.registered.accuracy.in_millimetres(),
+                "own": self.before.accuracy.in_millimetres(),
+            },
             "after": self.after.block(),
             "after_refitted": self.refitted.block(),
             "prediction": self.scale.document(),
@@ -165,8 +178,8 @@ def certify_robot(
 ) -> RobotCertificate:
     """Compare measurements at nominal and at compensated commands with the targets of both, and write the certificate to `out`.
 
-    Rows of `before` and `after` belong to the target of the same `pose` number. Before, the targets are laid as well as they go through the
-    measured points; after, where the calibration has the instrument. Raises `FlexcalError` where there is no calibration, files do
+    Rows of `before` and `after` belong to the target of the same `pose` number. Before, instrument and measured point are registered
+    by best fit; after, they are where the calibration has them. Raises `FlexcalError` where there is no calibration, files do
     not fit, or fewer than four targets were measured before and after.
     """
     if out.suffix != ".html":
@@ -200,11 +213,14 @@ def certify_robot(
         )
     known, roots = verify_jointly(model, visited[after][0])
     there = _visited(visited[after][0], _placed(model, *visited[after]))
+    placed = robot_before(calibrated.nominal, visited[before][0]).declared
     result = RobotCertificate(
         calibrated,
-        _visited(visited[before][0], _laid(*visited[before])),
+        None if placed is None else _visited(visited[before][0], _placed(placed, *visited[before])),
+        _visited(visited[before][0], _registered(*visited[before])),
+        _visited(visited[before][0], _best_fit(calibrated.nominal, *visited[before])),
         there,
-        _visited(visited[after][0], _laid(*visited[after])),
+        _visited(visited[after][0], _best_fit(calibrated.nominal, *visited[after])),
         len(every) - len(common),
         known,
         error_scale(known, roots, _noise(there)),
@@ -253,14 +269,17 @@ def _placed(model: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray
     return np.matmul(turns, points[:, :, None])[:, :, 0] + places[:, :3]
 
 
-def _laid(poses: PoseSet, points: np.ndarray) -> np.ndarray:
-    """Targets (N, 3), given as `points` (N, 3) in the base frame, as near to the measured ones as a rigid motion brings them; m."""
-    laid = np.empty(points.shape)
-    for station in poses.stations:
-        own = poses.station == station
-        turn, shift = rigid_motion(points[own], poses.position[own], station)
-        laid[own] = points[own] @ turn.T + shift
-    return laid
+def _registered(poses: PoseSet, points: np.ndarray) -> np.ndarray:
+    """Targets (N, 3), given as `points` (N, 3) in the base frame, registered with the measured points by best fit; m."""
+    return rigid_placement(poses, points).expected(poses, points, np.tile(np.eye(3), (len(poses), 1, 1)))
+
+
+def _best_fit(nominal: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray:
+    """As `_registered`, with the place of the measured point on the tool found too, where the poses are enough for that."""
+    if not enough_for_points(poses):
+        return _registered(poses, points)
+    turn = points_kinematics(nominal, poses.q, None, poses.target, jacobians=False).orientation
+    return best_placement(poses, points, turn).expected(poses, points, turn)
 
 
 def _visited(poses: PoseSet, targets: np.ndarray) -> Visited:

@@ -9,7 +9,6 @@ from typing import Any
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.estimates_file import read_estimates
-from flexcal.report.measured_points import NOMINAL
 from flexcal.report.runs import Comparison, Run
 from flexcal.report.sections.provenance import common_origin
 from flexcal.report.two_runs import write_comparison
@@ -82,7 +81,7 @@ def _left(folder: Path, name: str) -> Run:
             points=points.poses.position,
             errors=points.calibrated,
             fresh=verified and not results["fitted"],
-            before=points.statistics(NOMINAL) if points.nominal is not None else None,
+            before=points.before,
             estimates=estimates,
             data=_data(found),
             origin=origin | found,
@@ -98,7 +97,7 @@ def _left(folder: Path, name: str) -> Run:
             points=fresh.poses.position,
             errors=fresh.calibrated,
             fresh=True,
-            before=fresh.statistics(NOMINAL),
+            before=fresh.before,
             estimates=estimates,
             data=_data(found),
             origin=origin | found,

@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.calibration import (
     AccuracyMap,
+    ErrorsBefore,
     ErrorScale,
     Propagation,
     Verification,
@@ -19,6 +20,7 @@ from flexcal.calibration import (
     error_sources,
     propagation,
     random_poses_in,
+    robot_before,
     verify_jointly,
 )
 from flexcal.data import page_beside
@@ -45,10 +47,11 @@ _SOURCE_POSES = 200
 
 @dataclass(frozen=True, eq=False)
 class RobotMap:
-    """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say of it.
+    """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say.
 
-    `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the `worst` rows.
-    `provenance` has all files with their hashes, `command` the command line, where there was one.
+    `scale` is what they say of the map, `before` of the uncalibrated robot. `box` (2, 3) m, None for given poses or anywhere; `sources`
+    over all poses, `worst_sources` at each of the `worst` rows. `provenance` has all files with their hashes, `command` the command line,
+    where there was one.
     """
 
     reach: Propagation
@@ -58,6 +61,7 @@ class RobotMap:
     sources: dict[str, float]
     worst_sources: dict[str, np.ndarray]
     scale: ErrorScale | None
+    before: ErrorsBefore | None
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
@@ -94,6 +98,7 @@ class RobotMap:
             "station": self.reach.station,
             "payload_kg": self.reach.payload,
             "box_m": self.box,
+            "before": None if self.before is None else self.before.document(),
             "predicted": {"mean": _spread(found.mean), "p95": _spread(found.p95)},
             "sources": self.sources,
             "worst": [
@@ -152,7 +157,7 @@ def map_accuracy(
     model = calibrated.model
     stations = [s for s in model.stations if found_station(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
-    scale, study = _verified(calibrated, verification)
+    scale, before, study = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
     found = accuracy_map(reach, q, progress=progress).scaled(applied_factor(scale))
@@ -168,7 +173,7 @@ def map_accuracy(
         tuple(calibrated.blocks),
     )
     sources = error_sources(reach, q[worst])
-    result = RobotMap(reach, found, box, worst, shares, sources, scale, fitted, origin, command)
+    result = RobotMap(reach, found, box, worst, shares, sources, scale, before, fitted, origin, command)
     page = MapStudy(model, found, box, result.document(), scale, study)
     if out != page_beside(out):
         _write_table(out, found)
@@ -200,14 +205,15 @@ def _poses(
 
 def _verified(
     calibrated: CalibratedRobot, files: Sequence[Path]
-) -> tuple[ErrorScale | None, tuple[Verification, np.ndarray | None] | None]:
-    """How large errors at the poses of the `files` are against their prediction, and the verification with its noise."""
+) -> tuple[ErrorScale | None, ErrorsBefore | None, tuple[Verification, np.ndarray | None] | None]:
+    """How large errors at the poses of the `files` are against their prediction, those before, and the verification with its noise."""
     if not files:
-        return None, None
+        return None, None, None
     poses = verification_poses(calibrated, files)
     found, roots = verify_jointly(calibrated.model, poses)
     noise = poses.sigma if poses.sigma_given else None
-    return error_scale(found, roots, noise), (found, noise)
+    before = robot_before(calibrated.nominal, poses).errors(poses)
+    return error_scale(found, roots, noise), before, (found, noise)
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:

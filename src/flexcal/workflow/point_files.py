@@ -11,10 +11,10 @@ import polars as pl
 from flexcal.atomic import atomic_path
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, ArmPoses, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, ArmPoses, MeasuredPoints
 
 POINTS, ARM = "points.csv", "arm.npz"
-_MODELS = (NOMINAL, RIGID, CALIBRATED)
+_MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
 _TEXTS = ("target", "station")
 
 

@@ -19,13 +19,13 @@ from flexcal.calibration import (
     noise_repeatability,
     predict,
     repeatability,
+    robot_before,
 )
 from flexcal.data import PoseSet, read_poses
 from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
 from flexcal.report.repeatability import RepeatabilityStudy, write_repeatability_report
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.calibrate_robot import nominal_errors
 from flexcal.workflow.calibrated_robot import (
     CalibratedRobot,
     calibrated_robot,
@@ -35,16 +35,15 @@ from flexcal.workflow.calibrated_robot import (
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.results import write_results
-from flexcal.workflow.verify_robot import registrable
 
 
 @dataclass(frozen=True, eq=False)
 class RobotRepeatability:
     """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
 
-    "nominal": the nominal robot, laid as well as it goes through the points; "calibrated": the calibrated one. `drifts` are those of the
-    poses that were visited often enough while a clock ran. `provenance` has all files with their hashes, `command` the command line, where
-    there was one.
+    "nominal": the nominal robot's own, with instrument and measured point registered by best fit; "calibrated": the calibrated one's.
+    `drifts` are those of the poses that were visited often enough while a clock ran. `provenance` has all files with their hashes,
+    `command` the command line, where there was one.
     """
 
     poses: PoseSet
@@ -73,7 +72,7 @@ class RobotRepeatability:
             remarks.append(f"{once} rows are of poses that were visited once; they are not used")
         if "nominal" not in self.errors:
             remarks.append(
-                "there are too few poses to lay the nominal robot through them, so its pose accuracy is not known: visit four or more"
+                "there are too few poses to register the nominal robot with them, so its pose accuracy is not known: visit four or more"
             )
         if "calibrated" not in self.errors:
             remarks.append(
@@ -170,8 +169,9 @@ def repeat_robot(
     visited = repeatability(poses)
     calibrated = _calibrated(robot, estimates, nominal)
     errors: dict[str, np.ndarray] = {}
-    if registrable(poses):
-        errors["nominal"] = nominal_errors(nominal, poses)
+    before = robot_before(nominal, poses).errors(poses).robots_own
+    if before is not None:
+        errors["nominal"] = before
     if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
         errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
     stored = None if calibrated is None else calibrated.stored

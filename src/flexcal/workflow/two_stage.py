@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, calibrate, predict, register, verify
+from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify
 from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
 from flexcal.data import MultisinePlan, Recording, write_plan, write_poses
 from flexcal.design import MeasuringSetup, design_poses, random_poses
@@ -23,7 +23,7 @@ from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.fitted_response import fitted_responses
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
 from flexcal.report.two_stage import two_stage_checks
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
@@ -160,7 +160,8 @@ def run_two_stage(
         known = read_truth(hidden)
         exact = replace(seen, position=cell.noise_free(anywhere))
         floor = exact.position - predict(nominal.with_values(known), exact).position
-        registered = register(nominal, measured, predict(nominal, measured, elastic=False).position)
+        placed = robot_before(nominal, measured)
+        assert placed.registered is not None and placed.own is not None
         run = TwoStageRun(
             nominal=nominal,
             informed=believed,
@@ -170,9 +171,10 @@ def run_two_stage(
             stiffness=stiffness,
             calibration=calibration,
             rigid=rigid,
-            nominal_at_calibration=verify(registered, measured, elastic=False),
+            before=placed.errors(measured),
             verification_poses=exact,
-            nominal_verification=verify(registered, exact, elastic=False),
+            nominal_verification=verify(placed.registered, exact, elastic=False),
+            own_verification=verify(placed.own, exact, elastic=False),
             elastic_verification=verify(calibration.model, exact),
             rigid_verification=tuple(verify(c.model, exact, elastic=False) for c in rigid),
             measured_verification=verify(calibration.model, seen),
@@ -193,9 +195,11 @@ def run_two_stage(
     progress("report", 0.0)
     write_fitted(out, fitted_responses(stiffness, nominal))
     write_verification(out / VERIFICATION, run)
-    errors = {NOMINAL: run.nominal_at_calibration.errors, CALIBRATED: calibration.residuals}
-    write_points(out, MeasuredPoints(measured, errors, calibration.ambiguous))
-    write_arm(out, arms_at(calibration.model, measured, errors))
+    points = MeasuredPoints(
+        measured, errors_before(run.before) | {CALIBRATED: calibration.residuals}, calibration.ambiguous
+    )
+    write_points(out, points)
+    write_arm(out, arms_at(calibration.model, measured, points.shown))
     write_results(out, run.results)
     trust = Trust(two_stage_checks(two_stage_study(out)))
     run = replace(run, trust=trust, results={**run.results, "verdict": trust.document()})

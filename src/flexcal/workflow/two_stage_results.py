@@ -15,7 +15,7 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.export import Exported
 from flexcal.model.names import SPRINGS
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.results import identifiability_block, identifiability_spectrum, quantities
 from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
@@ -38,10 +38,11 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
         "stage1": stage_one
         | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
         "identifiability": identifiability_block(found) | identifiability_spectrum(found),
+        "before": run.before.document(),
         "calibration": run.calibration.errors.in_millimetres(),
         "calibration_fit": {
             "reduced_chi2": run.calibration.estimate.reduced_chi2,
-            "nominal": run.nominal_at_calibration.all.in_millimetres(),
+            "nominal": run.before.document()["registered"],
             "rigid": run.rigid[0].errors.in_millimetres(),
             "wrong_flanks": wrong_flanks(run),
             "drift": {"distance_mm": drift.distance / MILLIMETRE, "certain": drift.certain},
@@ -49,6 +50,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
         "rigid_fits": [{"poses": len(c.poses), "rank": c.identifiability.rank} for c in run.rigid],
         "verification": {
             "nominal": run.nominal_verification.all.in_millimetres(),
+            "own": run.own_verification.all.in_millimetres(),
             **_verified(run.elastic_verification),
             "rigid": run.rigid_verification[0].all.in_millimetres(),
             "measured": run.measured_verification.all.in_millimetres(),
@@ -111,7 +113,7 @@ def wrong_flanks(run: TwoStageRun) -> int:
     return int((true != run.calibration.flank).any(axis=1).sum())
 
 
-_COLUMNS = {NOMINAL: "nominal", CALIBRATED: "elastic", RIGID: "rigid"}
+_COLUMNS = {NOMINAL: "nominal", OWN: "own", CALIBRATED: "elastic", RIGID: "rigid"}
 """Models of verification.csv, and what their columns are called there."""
 
 
@@ -119,7 +121,8 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
     """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), where every model has the point, the distance
     that the covariance of the elastic model's parameters predicts, and whether the flanks are certain."""
     poses, elastic = run.verification_poses, run.elastic_verification
-    models = {NOMINAL: run.nominal_verification, CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
+    before = {NOMINAL: run.nominal_verification, OWN: run.own_verification}
+    models = before | {CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
     columns: dict[str, np.ndarray] = {"pose": poses.pose}
     columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
     columns |= {axis: poses.position[:, k] for k, axis in enumerate("xyz")}
@@ -150,7 +153,11 @@ def read_verification(path: Path) -> MeasuredPoints:
             temperature=None,
             pose=table["pose"].to_numpy(),
         )
-        errors = {model: truth - vectors(f"{name}_") for model, name in _COLUMNS.items()}
+        errors = {
+            model: truth - vectors(f"{name}_")
+            for model, name in _COLUMNS.items()
+            if f"{name}_x" in table.columns
+        }
         certain = table["unambiguous"].cast(pl.Boolean).to_numpy()
         return MeasuredPoints(poses, errors, ~certain, table["parameter_rms"].cast(pl.Float64).to_numpy())
     except (pl.exceptions.PolarsError, TypeError, OSError) as problem:

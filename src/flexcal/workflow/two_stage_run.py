@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flexcal.calibration import Calibration, ErrorStatistics, Verification
+from flexcal.calibration import Calibration, ErrorsBefore, ErrorStatistics, Verification
 from flexcal.data import MultisinePlan, PoseSet
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
@@ -33,7 +33,9 @@ class TwoStageRun:
     fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
     `verification_poses` are against the noise-free truth; `measured_verification`, at the same poses, is against the instrument. `floor` is
     the error that would remain with every parameter known. `truth` maps parameter names to SI values.
-    `results` is the document of results.json, `trust` the verdict in it, `seconds` durations by stage.
+    `before` are the errors of the nominal robot at the calibration poses; `nominal_verification` is of the same registered robot, and
+    `own_verification` with the measured point found too. `results` is the document of results.json, `trust` the verdict in it, `seconds`
+    durations by stage.
     """
 
     nominal: RobotModel
@@ -43,9 +45,10 @@ class TwoStageRun:
     stiffness: StiffnessResult
     calibration: Calibration
     rigid: tuple[Calibration, ...]
-    nominal_at_calibration: Verification
+    before: ErrorsBefore
     verification_poses: PoseSet
     nominal_verification: Verification
+    own_verification: Verification
     elastic_verification: Verification
     rigid_verification: tuple[Verification, ...]
     measured_verification: Verification

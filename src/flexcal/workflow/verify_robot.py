@@ -10,17 +10,16 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, Verification, require_points, verify
+from flexcal.calibration import ErrorsBefore, Verification, require_points, robot_before, verify
 from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance, sha256_of
 from flexcal.model import RobotModel
 from flexcal.report.figures.arm_poses import arms_at
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
 from flexcal.report.verification import verification_checks
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.calibrate_robot import nominal_errors
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
@@ -31,16 +30,16 @@ from flexcal.workflow.results import write_results
 
 @dataclass(frozen=True, eq=False)
 class RobotVerification:
-    """Errors of the calibrated robot `model` at `poses`, and `before` (N, 3) m: those of the uncalibrated one after a rigid registration.
+    """Errors of the calibrated robot `model` at `poses`, and `before` those of the uncalibrated one.
 
-    `before` is None with fewer than four poses, which a registration fits too well to say anything; `fitted` are the files among them
-    that the calibration was made from, `provenance` all files with their hashes, `command` the command line, where there was one.
+    `fitted` are the files among them that the calibration was made from, `provenance` all files with their hashes, `command` the command
+    line, where there was one.
     """
 
     model: RobotModel
     poses: PoseSet
     result: Verification
-    before: np.ndarray | None
+    before: ErrorsBefore
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
@@ -48,8 +47,7 @@ class RobotVerification:
     @property
     def points(self) -> MeasuredPoints:
         """The points with the errors before and after."""
-        errors = {} if self.before is None else {NOMINAL: self.before}
-        errors |= {CALIBRATED: self.result.errors}
+        errors = errors_before(self.before) | {CALIBRATED: self.result.errors}
         return MeasuredPoints(self.poses, errors, self.result.ambiguous, self.result.parameter_rms)
 
     @property
@@ -82,12 +80,14 @@ class RobotVerification:
         result = self.result
         measured = result.all.in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
-        if self.before is not None:
-            blocks["nominal"] = ErrorStatistics.of(self.before).in_millimetres()
+        before = self.before.document()
+        if before["registered"] is not None:
+            blocks["nominal"] = before["registered"]
         return {
             "robot": self.model.name,
             "joints": {joint.name: joint.kind for joint in self.model.joints},
             "backlash": list(self.model.backlash_joints),
+            "before": before,
             "verification": blocks,
             "rms_mm": {
                 "parameters": _rms(result.expected_rms()),
@@ -120,14 +120,14 @@ def verify_robot(
     calibrated = calibrated_robot(robot, estimates, "verify")
     model, bare, blocks = calibrated.model, calibrated.nominal, calibrated.blocks
     poses = verification_poses(calibrated, files)
-    before = nominal_errors(bare, poses) if registrable(poses) else None
+    before = robot_before(bare, poses).errors(poses)
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
     fitted = fitted_files(calibrated, files)
     result = RobotVerification(model, poses, verify(model, poses), before, fitted, origin, command)
     if out is not None:
         write_results(out, result.document())
         write_points(out, result.points)
-        write_arm(out, arms_at(model, poses, result.points.errors))
+        write_arm(out, arms_at(model, poses, result.points.shown))
         report_folder(out)
     return result
 
@@ -154,19 +154,3 @@ def fitted_files(calibrated: CalibratedRobot, files: Sequence[Path]) -> tuple[st
 def _rms(distance: np.ndarray) -> float:
     """Root mean square (mm) of distances (N,) in m."""
     return float(np.sqrt(np.mean(distance**2))) / MILLIMETRE
-
-
-def registrable(poses: PoseSet) -> bool:
-    """Whether every station has the four points off a line that a registration with something left to say needs, repeated visits apart."""
-    for station in poses.stations:
-        own = poses.station == station
-        points, commands = (
-            poses.position[own],
-            zip(poses.q[own].round(3).tolist(), poses.target[own], strict=True),
-        )
-        if (
-            len({(*q, target) for q, target in commands}) < 4
-            or np.linalg.matrix_rank(points - points.mean(axis=0), tol=1e-3) < 2
-        ):
-            return False
-    return True

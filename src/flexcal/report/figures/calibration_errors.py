@@ -15,7 +15,7 @@ def calibration_errors(poses: PoseSet, before: np.ndarray, after: np.ndarray) ->
     """Distances in millimetres (log scale) of the error vectors `before` and `after` (N, 3) m, against the number of the pose."""
     figure = canvas(380)
     for name, errors, colour, symbol in (
-        ("as delivered", before, NOMINAL, "diamond"),
+        ("before, the robot's own", before, NOMINAL, "diamond"),
         ("calibrated", after, ELASTIC, "circle"),
     ):
         figure.add_trace(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, RIGID
+from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import NOTHING, statistics_cells
 from flexcal.report.page import Block, Section, Table, Text
 from flexcal.report.publication import Publication
@@ -14,13 +14,13 @@ def comparison_section(study: TwoStageStudy) -> Section:
     paper = study.paper
     fresh, found = study.verification, study.determined
     errors = [
-        ("calibration poses, as delivered", study.points.statistics(NOMINAL), None),
+        ("calibration poses, before (the robot's own)", study.points.before, None),
         (
             "calibration poses, calibrated",
             study.points.statistics(CALIBRATED),
             paper.calibration if paper else None,
         ),
-        ("fresh poses, as delivered", study.fresh.statistics(NOMINAL), None),
+        ("fresh poses, before (the robot's own)", study.fresh.before, None),
         ("fresh poses, rigid calibration", study.fresh.statistics(RIGID), paper.rigid if paper else None),
         ("fresh poses, elastic calibration", fresh.all, paper.elastic if paper else None),
         ("… flank certain", fresh.unambiguous, None),

@@ -22,13 +22,13 @@ _OVER_SPACING = 2.5
 """The same over the distance between neighbouring points, where they are many."""
 
 _FACTORS = tuple(float(m * 10**k) for k in range(5) for m in (1, 2, 5))
-_ARROWS = {CALIBRATED: "after calibration", NOMINAL: "as delivered"}
+_ARROWS = {CALIBRATED: "after calibration", NOMINAL: "before, the robot's own"}
 
 
 def geometry_section(study: TwoStageStudy) -> Section:
     """Figs. 10-12, identifiability and the parameters."""
     points = study.points
-    poses, before, after = points.poses, points.errors[NOMINAL], points.calibrated
+    poses, before, after = points.poses, points.delivered, points.calibrated
     return Section(
         "stage2",
         "Stage 2: geometry",
@@ -37,7 +37,7 @@ def geometry_section(study: TwoStageStudy) -> Section:
         "encoders, and play in the gears.",
         (
             arm_figure(study.arms, len(poses), "Figure 10"),
-            error_figure(poses, before, after, "Figure 11"),
+            *([] if before is None else [error_figure(poses, before, after, "Figure 11")]),
             component_figure(poses, after),
             *identifiability_blocks(study.determined, study.paper),
             parameter_table(study.geometry, study.kept, study.truth),
@@ -70,14 +70,14 @@ def arm_figure(arms: ArmPoses, total: int, number: str = "") -> FigureBlock:
 
 def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray, number: str = "") -> FigureBlock:
     """Fig. 11."""
+    was, now = (millimetres(float(np.linalg.norm(e, axis=1).max())) for e in (before, after))
     return FigureBlock(
         "figure-11",
         title(number, "error at the calibration poses, before and after"),
         calibration_errors(poses, before, after),
         "Distance between measured and predicted point. The scale is logarithmic: one step of the grid is about a factor of two. These "
         "poses were used for the fit, so this is not yet the accuracy to expect elsewhere.",
-        f"Error of each of {len(poses)} poses as delivered, up to {millimetres(float(np.linalg.norm(before, axis=1).max()))} mm, and "
-        f"calibrated, up to {millimetres(float(np.linalg.norm(after, axis=1).max()))} mm.",
+        f"Error of each of {len(poses)} poses before (the robot's own), up to {was} mm, and calibrated, up to {now} mm.",
     )
 
 

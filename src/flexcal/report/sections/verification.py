@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from flexcal.calibration import ErrorStatistics
 from flexcal.report import palette
+from flexcal.report.before import BEFORE
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
-from flexcal.report.measured_points import NOMINAL, RIGID
+from flexcal.report.measured_points import RIGID
 from flexcal.report.notation import millimetres, ratio, statistics_cells
 from flexcal.report.page import Block, FigureBlock, Section, Table, Text
 from flexcal.report.study import TwoStageStudy
@@ -16,12 +17,13 @@ from flexcal.report.study import TwoStageStudy
 def verification_section(study: TwoStageStudy) -> Section:
     """Fig. 13, the distribution of errors, predicted against observed ones, and the floor."""
     elastic, fresh, paper = study.verification, study.fresh, study.paper
-    before, rigid = fresh.statistics(NOMINAL), fresh.statistics(RIGID)
+    before, rigid = fresh.before, fresh.statistics(RIGID)
+    assert before is not None and fresh.delivered is not None
     series = [
         ErrorSeries("rigid calibration", palette.RIGID, fresh.errors[RIGID]),
         ErrorSeries("elastic calibration", palette.ELASTIC, elastic.errors),
     ]
-    everything = [ErrorSeries("as delivered", palette.NOMINAL, fresh.errors[NOMINAL]), *series]
+    everything = [ErrorSeries("before, the robot's own", palette.NOMINAL, fresh.delivered), *series]
     published = {}
     if paper is not None and paper.elastic is not None:
         published |= {"paper, 90 %": (paper.elastic.p90, 0.9), "paper, worst": (paper.elastic.max, 1.0)}
@@ -49,7 +51,7 @@ def verification_section(study: TwoStageStudy) -> Section:
             error_distribution(everything, published),
             "Read across at 90 %: nine of ten poses have an error smaller than where the curve crosses. Curves farther left are better.",
             f"Cumulative distributions; 90 % of poses are within {millimetres(elastic.all.p90)} mm with elasticity, "
-            f"{millimetres(rigid.p90)} mm without, and {millimetres(before.p90)} mm as delivered.",
+            f"{millimetres(rigid.p90)} mm without, and {millimetres(before.p90)} mm before.",
         ),
         FigureBlock(
             "figure-predicted",
@@ -78,7 +80,8 @@ def accuracy_table(study: TwoStageStudy) -> Table:
     def row(label: str, s: ErrorStatistics, reference: str = "truth") -> tuple[str, ...]:
         return (label, str(s.poses), *statistics_cells(s), reference)
 
-    rows = [row("as delivered (nominal)", study.fresh.statistics(NOMINAL))]
+    fresh = study.fresh
+    rows = [row(label, fresh.statistics(model)) for model, label in BEFORE.items() if model in fresh.errors]
     rows += [row(f"rigid calibration, {fit.poses} poses, rank {fit.rank}", fit.errors) for fit in study.rigid]
     elastic = study.verification
     strong = len(rows)

@@ -1,0 +1,136 @@
+"""The uncalibrated robot against measured points: as declared, best-fit registered, and with the measured point found too.
+
+A reflector whose place on the tool was taken with a ruler is off by millimetres, and so is the robot that is registered with it. That is no
+error of the robot. Its own error is what is left when the instrument's frame (6 parameters a station) and the place of each measured
+point on the tool (3 a point) are fitted, and no geometric parameter of the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.error_statistics import ErrorStatistics
+from flexcal.calibration.placement import best_placement, enough_for_points, registrable, rigid_placement
+from flexcal.calibration.prediction import predict
+from flexcal.data import PoseSet
+from flexcal.model import RobotModel
+from flexcal.model.rotations import rotation_vector
+
+DECLARED_WITHIN = 0.05
+"""Of the reach: with a larger median distance between nominal and measured points the instrument's frame is not the declared one."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotBefore:
+    """An uncalibrated robot with the instrument placed three ways.
+
+    `declared`: the instrument measures in the base frame, or stands, axes parallel to the base's, where robot.yaml says; None where the
+    measured points are in another frame. `registered`: every station placed by the best rigid motion; None where its points are too few.
+    `own`: stations and measured points placed; None with fewer than three coordinates a parameter.
+    """
+
+    declared: RobotModel | None
+    registered: RobotModel | None
+    own: RobotModel | None
+
+    def errors(self, poses: PoseSet) -> ErrorsBefore:
+        """Errors at `poses`, whose stations and targets are those that were placed."""
+        found = (
+            None if robot is None else poses.position - predict(robot, poses, elastic=False).position
+            for robot in (self.declared, self.registered, self.own)
+        )
+        return ErrorsBefore(*found)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorsBefore:
+    """Error vectors (N, 3) m, measured minus predicted, of an uncalibrated robot placed as in `RobotBefore`; None where it is not."""
+
+    declared: np.ndarray | None
+    registered: np.ndarray | None
+    own: np.ndarray | None
+
+    @property
+    def known(self) -> Mapping[str, np.ndarray]:
+        """The errors by name, where they are known."""
+        every = {"declared": self.declared, "registered": self.registered, "own": self.own}
+        return {name: errors for name, errors in every.items() if errors is not None}
+
+    @property
+    def robots_own(self) -> np.ndarray | None:
+        """The headline: the robot's own errors, where the poses are too few for that those after registration; None where they are too."""
+        return self.registered if self.own is None else self.own
+
+    def document(self) -> dict[str, Any]:
+        """The block `before` of results.json; null where the errors are not known."""
+        every = (("declared", self.declared), ("registered", self.registered), ("own", self.own))
+        return {
+            name: None if errors is None else ErrorStatistics.of(errors).in_millimetres()
+            for name, errors in every
+        }
+
+
+def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
+    """Place the instrument, and the measured points, of the nominal, rigid robot `model` by the measured points of `poses`.
+
+    Kabsch (1976) for the registration; Gauss-Newton on the 6 parameters of every station and 3 of every measured point for the robot's own
+    error. Raises `FlexcalError` for an unknown target or station.
+    """
+    for station in poses.stations:
+        model.station_index(station)
+    at_base = replace(model, station=np.zeros_like(model.station))
+    nominal = predict(at_base, poses, elastic=False)
+    declared = _declared(at_base, poses)
+    if not registrable(poses):
+        return RobotBefore(declared, None, None)
+    registered = at_base.with_values(_station_values(rigid_placement(poses, nominal.position).stations))
+    own = None
+    if enough_for_points(poses):
+        own = _with_points_found(at_base, poses, nominal.position, nominal.kinematics.orientation)
+    return RobotBefore(declared, registered, own)
+
+
+def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
+    """The robot in the instrument's frame, where that is the base frame or at the declared stations; None where it is neither."""
+    places = {name: np.array(station.xyz) for name, station in model.config.stations.items()}
+    beside = model.with_values(
+        {
+            f"station.{name}.{axis}": -float(value)
+            for name, place in places.items()
+            for axis, value in zip("xyz", place, strict=True)
+        }
+    )
+    for candidate in (model, beside):
+        away = poses.position - predict(candidate, poses, elastic=False).position
+        if np.median(np.linalg.norm(away, axis=1)) < DECLARED_WITHIN * model.reach:
+            return candidate
+    return None
+
+
+def _with_points_found(
+    model: RobotModel, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray
+) -> RobotModel:
+    """The robot with stations and measured points where they fit best."""
+    found = best_placement(poses, nominal, orientation)
+    values = _station_values(found.stations)
+    values |= {
+        f"point.{name}.{axis}": model.value(f"point.{name}.{axis}") + float(value)
+        for name, shift in found.shifts.items()
+        for axis, value in zip("xyz", shift, strict=True)
+    }
+    return model.with_values(values)
+
+
+def _station_values(placed: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
+    values: dict[str, float] = {}
+    for name, (turn, offset) in placed.items():
+        numbers = (*offset, *rotation_vector(turn))
+        values |= {
+            f"station.{name}.{key}": float(v)
+            for key, v in zip(("x", "y", "z", "rx", "ry", "rz"), numbers, strict=True)
+        }
+    return values

@@ -1,0 +1,102 @@
+"""Best-fit registration: where the instrument, and the measured points on the tool, have to be for given positions of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.registration import rigid_motion
+from flexcal.data import PoseSet
+from flexcal.model.rotations import vector_rotation
+
+_LEAST_POINTS = 4
+_STEPS = 20
+_SMALL = 1e-10
+"""m and rad: a Gauss-Newton step after which there is no other."""
+_RANK = 1e-8
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Rotation (3, 3) and position (3,) m of the robot's base in each station's frame, and by how much (3,) m each target is moved in the
+    axes of its own frame."""
+
+    stations: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    shifts: Mapping[str, np.ndarray]
+
+    def expected(self, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """Where the instrument should read the targets (N, 3) m, which are at `nominal` (N, 3), turned by `orientation` (N, 3, 3)."""
+        expected = np.empty(nominal.shape)
+        for name, (turn, offset) in self.stations.items():
+            own = poses.station == name
+            moved = np.array([self.shifts.get(t, np.zeros(3)) for t in poses.target[own].tolist()])
+            expected[own] = (
+                nominal[own] + np.einsum("nij,nj->ni", orientation[own], moved)
+            ) @ turn.T + offset
+        return expected
+
+
+def rigid_placement(poses: PoseSet, nominal: np.ndarray) -> Placement:
+    """Every station by the rigid motion that best maps `nominal` (N, 3) m, base frame, to the measured points (Kabsch 1976)."""
+    stations = {}
+    for name in poses.stations:
+        own = poses.station == name
+        stations[name] = rigid_motion(nominal[own], poses.position[own], name)
+    return Placement(stations, {})
+
+
+def best_placement(poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> Placement:
+    """Stations and measured points by least squares: measured = R (nominal + orientation · shift) + t, by Gauss-Newton from Kabsch's R, t.
+
+    `nominal` (N, 3) m and `orientation` (N, 3, 3) of each target's frame, in the base frame. What the poses cannot tell apart (a tool that
+    never turns: where the point is, and where the instrument) is the shortest step from where it was.
+    """
+    found = rigid_placement(poses, nominal)
+    stations, shifts = dict(found.stations), {name: np.zeros(3) for name in poses.targets}
+    points_from = 6 * len(stations)
+    for _ in range(_STEPS):
+        columns = np.zeros((len(poses), 3, points_from + 3 * len(shifts)))
+        expected = Placement(stations, shifts).expected(poses, nominal, orientation)
+        for k, (name, (turn, offset)) in enumerate(stations.items()):
+            own = poses.station == name
+            columns[own, :, 6 * k : 6 * k + 3] = -np.cross(
+                (expected[own] - offset)[:, :, None], np.eye(3), axis=1
+            )
+            columns[own, :, 6 * k + 3 : 6 * k + 6] = np.eye(3)
+            for j, target in enumerate(shifts):
+                seen = own & (poses.target == target)
+                columns[seen, :, points_from + 3 * j : points_from + 3 * j + 3] = turn @ orientation[seen]
+        rows = columns.reshape(-1, columns.shape[2])
+        step = np.linalg.lstsq(rows, (poses.position - expected).ravel(), rcond=_RANK)[0]
+        for k, (name, (turn, offset)) in enumerate(stations.items()):
+            own = step[6 * k : 6 * k + 6]
+            stations[name] = (vector_rotation(own[:3]) @ turn, offset + own[3:])
+        for j, target in enumerate(shifts):
+            shifts[target] = shifts[target] + step[points_from + 3 * j : points_from + 3 * j + 3]
+        if np.abs(step).max() < _SMALL:
+            break
+    return Placement(stations, shifts)
+
+
+def enough_for_points(poses: PoseSet) -> bool:
+    """Whether there are three coordinates for each parameter of `best_placement`, repeated visits apart."""
+    return len(distinct(poses)) >= 6 * len(poses.stations) + 3 * len(poses.targets)
+
+
+def registrable(poses: PoseSet) -> bool:
+    """Whether every station has the four points off a line that a registration with something left to say needs, repeated visits apart."""
+    for station in poses.stations:
+        own = poses.subset(poses.station == station)
+        centred = own.position - own.position.mean(axis=0)
+        if len(distinct(own)) < _LEAST_POINTS or np.linalg.matrix_rank(centred, tol=1e-3) < 2:
+            return False
+    return True
+
+
+def distinct(poses: PoseSet) -> set[tuple[Any, ...]]:
+    """Joint positions and targets without repeated visits."""
+    rows = zip(poses.q.round(3).tolist(), poses.target.tolist(), poses.station.tolist(), strict=True)
+    return {(*q, target, station) for q, target, station in rows}
