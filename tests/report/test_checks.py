@@ -76,7 +76,7 @@ def test_a_drift_is_flagged(simulated: TwoStageRun) -> None:
 
     def judged(calibration: Calibration) -> str:
         drift = Drift.of(calibration)
-        return check_drift(drift.distance, certain=drift.certain).status
+        return check_drift(drift.document()).status
 
     assert judged(fit) == "good"
     share = np.linspace(-0.5, 0.5, len(fit.poses))

@@ -9,6 +9,7 @@ import numpy as np
 from flexcal.calibration.geometric_calibration import Calibration
 from flexcal.calibration.geometry_fit import columns_of
 from flexcal.calibration.prediction import predict
+from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
 """How often an arm that stays is said to drift: three standard deviations of a Gaussian."""
@@ -27,12 +28,21 @@ class Drift:
         return float(np.linalg.norm(self.travel))
 
     @property
-    def certain(self) -> bool:
-        """Whether chance explains it in less than 0.27 % of all sessions without a drift."""
+    def probability(self) -> float:
+        """How often points that do not drift show so large a statistic: the p-value."""
         from scipy.stats import chi2
 
         statistic = self.travel @ np.linalg.solve(self.covariance, self.travel)
-        return bool(chi2.sf(statistic, len(self.travel)) < _CHANCE)
+        return float(chi2.sf(statistic, len(self.travel)))
+
+    @property
+    def certain(self) -> bool:
+        """Whether the p-value is below 0.27 %."""
+        return self.probability < _CHANCE
+
+    def document(self) -> dict[str, float | bool]:
+        """The block `drift` of results.json."""
+        return {"distance_mm": self.distance / MILLIMETRE, "certain": self.certain, "p": self.probability}
 
     @classmethod
     def of(cls, fit: Calibration) -> Drift:

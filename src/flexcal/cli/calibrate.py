@@ -77,7 +77,7 @@ class Calibrate:
         if found.selected.terms != found.rigid.terms:
             dropped = [d["name"] for d in seen["selected"]["dropped"]]
             further = [name for name in dropped if name not in found.rigid.identifiability.names]
-            lost = f"; not told apart: {', '.join(further)}" if further else ""
+            lost = f"; not separately identifiable: {', '.join(further)}" if further else ""
             console.say(
                 f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
             )
@@ -99,7 +99,7 @@ class Calibrate:
             f"put right what is wrong in the data or in {self.robot}, and calibrate again; "
             f"flexcal import {self.robot} {self.poses[0]} looks for it"
             if hardly_fits(found.selected)
-            else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses that this fit never saw "
+            else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
         )
         console.finish(document, following)

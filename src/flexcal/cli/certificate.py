@@ -51,8 +51,8 @@ class Certificate:
         )
         document = found.document()
         labels = {
-            "after": "after, nothing registered",
-            "after_refitted": "after, registered and point found too",
+            "after": "after, in the calibrated frame",
+            "after_refitted": "after, best-fit registered, point found too",
         }
         rows = before_rows(document) | {label: document[key]["ap"] for key, label in labels.items()}
         console.show(error_table("pose accuracy AP: distance to the target", rows))

@@ -63,11 +63,11 @@ class Compensate:
             )
         before = document["error_before_mm"]
         console.say(
-            f"with nominal commands the tool would be off by {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"
+            f"with nominal commands the tool would be {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"
         )
         if document["ambiguous"]:
             console.say(
-                f"at {document['ambiguous']} commands gravity does not surely settle the flank of a backlash: unambiguous is false there"
+                f"at {document['ambiguous']} commands the flank of a backlash is uncertain: unambiguous is false there"
             )
         for item in document["refused"][:_LISTED]:
             place = ", ".join(f"{key} {item[key]}" for key in ("pose", "line", "row") if key in item)

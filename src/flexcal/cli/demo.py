@@ -58,7 +58,7 @@ class Demo:
         for kind in ("stiffness", "damping"):
             console.show(comparison_table(kind, document["stage1"][kind]))
         seen = document["identifiability"]
-        console.say(f"{seen['rank']} of {seen['parameters']} geometric parameters can be told apart")
+        console.say(f"{seen['rank']} of {seen['parameters']} geometric parameters are identifiable")
         rows = {"calibration poses": document["calibration"]}
         rows |= {
             label: document["verification"][key]

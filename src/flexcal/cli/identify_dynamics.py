@@ -112,22 +112,21 @@ class IdentifyDynamics:
             console.show(friction_table(document["friction_tried"]))
         console.say(f"friction: {', '.join(found.friction.labels)}")
         error = document["error_percent"]
-        console.say(f"torques missed by {error['train']:.2f} % of their norm in the fit")
+        console.say(f"relative torque error: {error['train']:.2f} % in the fit")
         if error["held_out"] is not None:
-            console.say(
-                f"torques missed by {error['held_out']:.2f} % of their norm where the fit did not look"
-            )
+            console.say(f"relative torque error: {error['held_out']:.2f} % on data outside the fit")
         if learned := document["learned_residual"]:
             console.show(learned_table(learned["motors"]))
             console.say(_learned(learned))
         essential = document["essential_parameters"]
         console.say(
-            f"{len(essential['parameters'])} essential parameters alone miss {essential['error_percent']['train']:.2f} %"
+            f"{len(essential['parameters'])} essential parameters alone have a relative torque error of "
+            f"{essential['error_percent']['train']:.2f} %"
         )
         if found.bodiless:
             console.say(
-                f"no body can have the inertials of {', '.join(found.bodiless)}: they give torques, but carry no springs and "
-                "fit in no URDF; --estimator sdp finds bodies"
+                f"the inertials of {', '.join(found.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
+                "need consistent ones; --estimator sdp finds them"
             )
         for remark in document["remarks"]:
             console.say(remark)
@@ -170,11 +169,11 @@ def _share(text: str) -> float:
 def _learned(learned: Mapping[str, Any]) -> str:
     """What a learned residual is worth, in words."""
     if not learned["file"]:
-        return "nothing was learned: no motor's torques are predicted better with it in left-out blocks of the fit"
-    kinds = {"cross_validation": "in left-out blocks of the fit", "held_out": "where the fit did not look"}
+        return "no residual model was kept: it reduced the cross-validation error of no motor"
+    kinds = {"cross_validation": "in cross-validation", "held_out": "on data outside the fit"}
     told = (
         f"{error['with']:.2f} % instead of {error['without']:.2f} % {where}"
         for kind, where in kinds.items()
         if (error := learned["error_percent"][kind]) is not None
     )
-    return f"with the learned residual torques are missed by {' and by '.join(told)}"
+    return f"with the learned residual the relative torque error is {' and '.join(told)}"

@@ -71,7 +71,7 @@ class IdentifyPayload:
         units = {item.name: item.unit for item in found.fit.estimate.parameters}
         title = f"payload in the frame {found.frame}, inertia about its centre of mass"
         console.show(quantity_table(title, document["parameters"], units))
-        console.say(f"torques missed by {document['error_percent']['train']:.2f} % of their norm")
+        console.say(f"relative torque error: {document['error_percent']['train']:.2f} %")
         for remark in document["remarks"]:
             console.say(remark)
         console.say(found.trust.sentence)

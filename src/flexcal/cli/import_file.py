@@ -95,7 +95,7 @@ class Import:
         if fit is None:
             return
         console.say(
-            f"the nominal robot, laid through the points, misses them by {fit.rms / MILLIMETRE:.2f} mm (rms)"
+            f"the nominal robot, best-fit registered, has residuals of {fit.rms / MILLIMETRE:.2f} mm (rms)"
         )
         shift = float(((fit.moved - fit.declared) ** 2).sum() ** 0.5)
         if not fit.doubtful and shift > _MOVED and fit.moved_rms < 0.5 * fit.rms:
@@ -109,9 +109,7 @@ class Import:
         fit = found.misfit
         assert fit is not None
         share = f"{100 * fit.moved_rms / fit.reach:.0f} % of its reach"
-        what = (
-            f"{self.file}: the points are not this robot's as the columns are read: it misses them by {share}"
-        )
+        what = f"{self.file}: the points do not fit this robot as the columns are read: the residuals are {share}"
         if not fit.proposal:
             check = f"check the order, units and signs of the columns, and the point's frame in {self.robot}"
             return f"{what}; {check}, or write them with --unchecked."
@@ -147,7 +145,5 @@ class Import:
 
         calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))
         if stored_estimates(found.model, None).is_file():
-            return (
-                f"{verify}, where the calibration never saw these poses; or, to calibrate anew, {calibrate}"
-            )
+            return f"{verify}, if these poses are outside the calibration; or, to calibrate anew, {calibrate}"
         return f"{calibrate}; or, where they were kept to check a calibration, {verify}"

@@ -81,10 +81,10 @@ class Map:
         if document["before"] is not None:
             console.show(error_table("at the verification poses", before_rows(document)))
         sources = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in document["sources"].items())
-        console.say(f"its variance would fall, were these known exactly: {sources}")
+        console.say(f"reduction of the variance if these were known exactly: {sources}")
         worst = document["worst"][0]
         place = ", ".join(f"{value:.3f}" for value in worst["position_m"])
-        console.say(f"worst at {place} m (base frame): 95 % within {worst['p95_mm']:.3f} mm")
+        console.say(f"worst at {place} m (base frame): 95 % bound {worst['p95_mm']:.3f} mm")
         if (check := document["verification"]) is not None:
             console.say(
                 f"errors at {check['poses']} poses are {check['factor']:.2f} ({check['low']:.2f} to {check['high']:.2f}) times "
@@ -104,7 +104,7 @@ class Map:
 
 _VERDICTS = {
     "right": "the prediction holds",
-    "optimistic": "it was too optimistic, and the map is larger by this factor",
-    "unknown": "the instrument's noise is in them, so they judge nothing; the map is larger by this factor all the same",
-    "cautious": "it is cautious, and the map was left as it is",
+    "optimistic": "it is too optimistic, and the map is multiplied by this factor",
+    "unknown": "the instrument's noise is included, so the prediction cannot be judged; the map is multiplied by this factor",
+    "cautious": "it is conservative, and the map is unchanged",
 }

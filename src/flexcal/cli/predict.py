@@ -40,9 +40,7 @@ class Predict:
         )
         if document["ambiguous_poses"]:
             listed = len(document["ambiguous_poses"])
-            console.say(
-                f"in {listed} poses gravity does not surely settle the flank of a backlash: ambiguous_poses in --json"
-            )
+            console.say(f"in {listed} poses the flank of a backlash is uncertain: ambiguous_poses in --json")
         console.say(f"wrote {self.out}: {document['poses']} poses of the tool in the base frame")
         console.finish(
             document,

@@ -35,10 +35,10 @@ def before_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
 
 
 def map_table(document: Mapping[str, Any]) -> Table:
-    """Predicted mean and 95 % of the tool's error: median, nine of ten and worst over the poses, mm."""
+    """Predicted mean and 95 % of the tool's error: median, P90 and maximum over the poses, mm."""
     table = Table(title="predicted error of the tool", title_justify="left")
     table.add_column("")
-    for heading in ("median mm", "9 of 10 mm", "worst mm"):
+    for heading in ("median mm", "P90 mm", "max mm"):
         table.add_column(heading, justify="right")
     for label, key in (("mean", "mean"), ("95 % within", "p95")):
         numbers = document["predicted"][key].values()
@@ -66,7 +66,7 @@ def repeatability_table(document: Mapping[str, Any]) -> Table:
         "drp_mm": "drift of repeatability, dRP",
         "dap_nominal_mm": "drift of accuracy, before, dAP",
         "dap_calibrated_mm": "drift of accuracy, calibrated, dAP",
-        "way_mm": "way of the barycentre meanwhile",
+        "way_mm": "displacement of the barycentre",
     }
     for block, named in ((document, labels), (document["drift"] or {}, drifting)):
         for key, label in named.items():
@@ -109,7 +109,7 @@ def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
 
 def weak_table(directions: Sequence[Mapping[str, Any]]) -> Table:
     """The combinations of parameters that are seen least."""
-    table = Table(title="weakest combinations that are still seen", title_justify="left")
+    table = Table(title="least determined combinations", title_justify="left")
     table.add_column("relative size", justify="right")
     table.add_column("combination, in units of 0.3 mm and 0.5 mrad")
     for entry in directions:

@@ -60,14 +60,14 @@ def map_page(study: MapStudy) -> Page:
     leading = max(results["sources"], key=results["sources"].__getitem__)
     verdict = Verdict(
         trust.status,
-        f"The tool is within {document_millimetres(p95['p90_mm'])} mm",
-        f"At nine of ten of {results['poses']} poses, {_where(study)}, the point '{results['target']}' is within "
-        f"{document_millimetres(p95['p90_mm'])} mm of where the calibrated model says, in 95 of 100 cases; "
-        f"at the worst within {document_millimetres(p95['worst_mm'])} mm.",
+        f"Predicted accuracy: {document_millimetres(p95['p90_mm'])} mm",
+        f"The 95 % bound of the error of the point '{results['target']}' has a P90 of {document_millimetres(p95['p90_mm'])} mm over "
+        f"{results['poses']} poses, {_where(study)}, and a maximum of "
+        f"{document_millimetres(p95['worst_mm'])} mm.",
         (
-            Fact("How far off is it on average?", document_millimetres(mean["median_mm"]), "mm", "Mean error, at the median pose."),
-            Fact("How far off at most?", document_millimetres(p95["worst_mm"]), "mm", "95 % stay below this at the worst pose."),
-            Fact("What does it come from?", _percent(results["sources"][leading]), "%", f"of the variance would go, were {leading} known."),
+            Fact("What is the mean error?", document_millimetres(mean["median_mm"]), "mm", "Mean error, at the median pose."),
+            Fact("What is the largest error?", document_millimetres(p95["worst_mm"]), "mm", "95 % bound at the worst pose."),
+            Fact("What contributes most?", _percent(results["sources"][leading]), "%", f"of the variance: {leading}."),
         ),
         (),
         "",
@@ -90,13 +90,13 @@ def _where(study: MapStudy) -> str:
     if study.box is not None:
         low, high = study.box
         ranges = ", ".join(f"{n} {a:g} to {b:g}" for n, a, b in zip("xyz", low, high, strict=True))
-        return f"random ones with the point in the working volume ({ranges} m, base frame)"
-    return "those given or random ones all over the joint ranges"
+        return f"random, with the point in the working volume ({ranges} m, base frame)"
+    return "given, or random over the joint ranges"
 
 
 _UP_ONLY = (
-    "Where errors are larger than chance allows, this page is multiplied by the observed over the predicted size; where they are smaller, "
-    "nothing is made smaller, for other poses may be worse than those that were measured."
+    "Where observed errors are significantly larger than predicted, all predictions are multiplied by the ratio; where they are smaller, "
+    "predictions are not reduced, because errors at other poses may be larger."
 )
 
 
@@ -118,7 +118,7 @@ def _numbers(study: MapStudy) -> Section:
                 for column in ("median_mm", "p90_mm", "worst_mm")
             ),
         )
-        for label, key in (("mean error", "mean"), ("95 % of errors are below", "p95"))
+        for label, key in (("mean error", "mean"), ("95 % bound", "p95"))
     )
     places = []
     for item in results["worst"]:
@@ -143,21 +143,21 @@ def _numbers(study: MapStudy) -> Section:
         ),
         Table(
             "table-worst",
-            "Where it is worst",
-            ("x, y, z / m", "mean / mm", "95 % / mm", "mostly from", "joint positions"),
+            "Largest errors",
+            ("x, y, z / m", "mean / mm", "95 % / mm", "main source", "joint positions"),
             tuple(places),
             text_columns=(3, 4),
-            note="In the robot's base frame; places that are apart from each other.",
+            note="In the robot's base frame; only places apart from each other are listed.",
         ),
         Text(
             (
-                "The error is the distance between where the calibrated model has the point and where an instrument at the station "
-                f"'{results['station']}' would find it, without the instrument's own noise. It comes from the covariance of all that was "
-                "estimated; what the model does not know, such as wear or warm-up, is not in it.",
+                "The error is the distance between the position predicted by the calibrated model and that measured by an instrument at "
+                f"the station '{results['station']}' without the instrument's noise. It is propagated from the covariance of "
+                "all estimates; effects that are not modelled, such as wear or warm-up, are not included.",
             )
         ),
     ]
-    return Section("numbers", "How accurate", "", tuple(blocks))
+    return Section("numbers", "Predicted errors", "", tuple(blocks))
 
 
 def _space(study: MapStudy) -> Section:
@@ -168,7 +168,7 @@ def _space(study: MapStudy) -> Section:
             "figure-views",
             "Three views of the volume",
             accuracy_views(found),
-            "Colour: the distance that 95 % of errors stay below, averaged over all poses behind a cell.",
+            "Colour: 95 % bound of the error, averaged over all poses behind a cell.",
             "Predicted error in three views of the volume.",
         ),
         FigureBlock(
@@ -179,21 +179,21 @@ def _space(study: MapStudy) -> Section:
             f"Predicted error of {drawn} poses in space.",
         ),
     )
-    return Section("space", "Where", "", blocks)
+    return Section("space", "Errors over the workspace", "", blocks)
 
 
 def _sources(study: MapStudy) -> Section:
     results = study.results
     block = FigureBlock(
         "figure-sources",
-        "What the error comes from",
+        "Sources of the error",
         variance_shares(results["sources"], results["worst"][0]["sources"]),
-        "By how much of itself the variance of the error would fall if all parameters of a kind were known exactly. Kinds that are "
-        "correlated share, so the bars need not add up to 100 %. To bring the longest bar down, measure more poses, or better ones: "
+        "Relative reduction of the error variance if all parameters of a kind were known exactly. Kinds are "
+        "correlated, so the bars need not add up to 100 %. To reduce the longest bar, measure more or better chosen poses: "
         "flexcal design poses.",
         "Shares of the variance by kind of parameter.",
     )
-    return Section("sources", "Why", "", (block,))
+    return Section("sources", "Error sources", "", (block,))
 
 
 def _observed(study: MapStudy) -> Section:
@@ -203,7 +203,7 @@ def _observed(study: MapStudy) -> Section:
     rows = (
         ("observed over predicted size", f"{scale.factor:.2f}"),
         ("95 % interval", f"{scale.low:.2f} to {scale.high:.2f}"),
-        ("independent numbers in it", f"{scale.freedom:.0f}"),
+        ("effective degrees of freedom", f"{scale.freedom:.0f}"),
         ("poses within the bound for 95 %", f"{100 * scale.inside:.0f} %"),
         ("poses within the bound for 50 %", f"{100 * float((scale.probability <= 0.5).mean()):.0f} %"),
     )
@@ -213,14 +213,14 @@ def _observed(study: MapStudy) -> Section:
         before_table(study.results["before"]),
         FigureBlock(
             "figure-predicted",
-            "Predicted against observed errors",
+            "Observed against predicted errors",
             predicted_quantiles(found, noise),
             "Sorted errors at the verification poses against the quantiles that the covariance of the parameters and the instrument's "
-            "noise predict. Points on the dashed line: the prediction was right. Above it: the robot is worse than promised.",
+            "noise predict. Points on the dashed line: the prediction was right. Above it: errors are larger than predicted.",
             "Sorted observed errors against predicted quantiles.",
         ),
     )
-    return Section("observed", "Is it so?", "", blocks)
+    return Section("observed", "Verification", "", blocks)
 
 
 def _joints(model: RobotModel, q: np.ndarray) -> str:

@@ -19,12 +19,12 @@ BEFORE = {
 BEFORE_NOTE = (
     "As declared: with the measured point where robot.yaml says, in the declared frame; a dash where the instrument measures in a frame of "
     "its own. Best-fit registered: with the instrument's frame fitted (6 parameters a station). The robot's own: with the place of the "
-    "measured point on the tool fitted too (3 a point), for what a ruler got wrong there is no error of the robot."
+    "measured point on the tool fitted too (3 a point), because an error of its declared place is not one of the robot."
 )
 
 
 def before_rows(points: MeasuredPoints) -> list[tuple[str, ...]]:
-    """Label, number of points, mean, 90 % and worst in mm of all three; dashes where one is not known."""
+    """Label, number of points, mean, P90 and maximum in mm of all three; dashes where one is not known."""
     rows = []
     for model, label in BEFORE.items():
         statistics = points.statistics(model) if model in points.errors else None
@@ -41,7 +41,7 @@ def before_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
         block = before[name] or {}
         numbers = (document_millimetres(block.get(key)) for key in ("mean_mm", "p90_mm", "max_mm"))
         rows.append((label, *numbers))
-    columns = ("model", "mean / mm", "90 % within / mm", "worst / mm")
+    columns = ("model", "mean / mm", "P90 / mm", "max / mm")
     return Table(
         "table-before",
         "Errors at the verification poses before calibration",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,7 +25,6 @@ from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.terms import terms_section
 from flexcal.report.trust import Trust
 from flexcal.report.two_stage import HEADLINES
-from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +42,7 @@ class CalibrationStudy:
 
 
 def determined(results: Mapping[str, Any]) -> Determined:
-    """What the poses determine of the calibrated model."""
+    """Parameters of the calibrated model."""
     return Determined.stored(results["identifiability"]["selected"])
 
 
@@ -63,9 +61,9 @@ def calibration_page(study: CalibrationStudy) -> Page:
         residuals_section(results["joints"], points.poses, points.calibrated, study.estimate.outliers),
         Section(
             "geometry",
-            "What the poses determine",
-            "Not every length and angle can be seen from the points that were measured. What cannot is held at its nominal value, named "
-            "here with what stands in for it.",
+            "Parameters",
+            "Parameters that the measured points do not determine keep their nominal values; the parameters that absorb them are named "
+            "beside them.",
             (
                 *identifiability_blocks(determined(results), None),
                 parameter_table(study.estimate, tuple(results["identifiability"]["selected"]["kept"]), None),
@@ -97,8 +95,8 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     return Verdict(
         trust.status,
         HEADLINES[trust.status],
-        f"{_was(before)}The calibrated model is within {millimetres(after.p90)} mm at nine of ten of the same {after.poses} "
-        f"points and {millimetres(after.max)} mm at worst{_better(before, after)}.",
+        f"{_was(before)}At the same {after.poses} points the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
+        f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
         three_facts(before, after, trust, "points"),
         tuple(rungs),
         f"Error of the robot at the {after.poses} measured points",
@@ -123,8 +121,6 @@ def calibration_checks(
     """The checks behind the verdict; `results` is the document of results.json."""
     found, errors = determined(results), points.statistics(CALIBRATED)
     left_out = left_out_errors(results)
-    drift = results["drift"]
-    distance = math.nan if drift["distance_mm"] is None else drift["distance_mm"] * MILLIMETRE
     return (
         check_left_out(errors.mean, left_out, found.rank / (3 * errors.poses)).named(
             "left_out", independent=True
@@ -135,7 +131,7 @@ def calibration_checks(
             sigma_given=results["fit"]["sigma_given"],
         ).named("residual"),
         check_rank(found.parameters, found.rank, found.gap).named("rank"),
-        check_drift(distance, certain=drift["certain"]).named("drift"),
+        check_drift(results["drift"]).named("drift"),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
     )
 
@@ -151,7 +147,7 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
     table = Table(
         "table-accuracy",
         "Errors at the measured poses",
-        ("model", "points", "mean / mm", "90 % within / mm", "worst / mm", "determined parameters"),
+        ("model", "points", "mean / mm", "P90 / mm", "max / mm", "determined parameters"),
         tuple(rows),
         note=BEFORE_NOTE,
         strong=(len(rows) - 1,),
@@ -160,7 +156,7 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
     return Section(
         "accuracy",
         "Before and after",
-        "Distances between measured and predicted points. These are the poses of the fit; poses that it never saw tell more: measure some "
+        "Distances between measured and predicted points. These are the poses of the fit; measure others "
         "and run flexcal verify.",
         (
             table,

@@ -57,9 +57,9 @@ def certificate_html(study: CertificateStudy) -> str:
 def accuracy_rows(results: Mapping[str, Any]) -> list[tuple[str, ...]]:
     """Label, AP mean, 90 % and worst, RP worst, in mm."""
     labels = {
-        "before": "before: nominal commands, instrument and point registered by best fit (the robot's own error)",
-        "after": "after: compensated commands, nothing registered (instrument as calibrated)",
-        "after_refitted": "after, registered by best fit as before",
+        "before": "before: nominal commands, best-fit registered, point found too",
+        "after": "after: compensated commands, in the calibrated frame",
+        "after_refitted": "after: compensated commands, best-fit registered, point found too",
     }
     before = {"declared": "before, as declared", "registered": "before, best-fit registered"}
     names = ("mean_mm", "p90_mm", "max_mm")
@@ -86,7 +86,7 @@ def limiting_parts(results: Mapping[str, Any]) -> list[tuple[str, str]]:
         "measured": "measured distance to the target",
         "parameters": "uncertainty of the calibration, predicted",
         "instrument": "noise of the instrument, stated",
-        "visit_to_visit": "from visit to visit, instrument included, measured",
+        "visit_to_visit": "repeatability, instrument included, measured",
     }
     return [(label, document_millimetres(results["rms_mm"].get(key))) for key, label in labels.items()]
 
@@ -117,7 +117,7 @@ def _judgement(results: Mapping[str, Any]) -> str:
         "unknown": "It cannot be judged: the instrument's noise is not known, and is in these numbers.",
         "cautious": "The predicted uncertainty was larger than needed.",
     }[found["verdict"]]
-    beyond = "" if found["verdict"] == "unknown" else "beyond what measurements scatter, "
+    beyond = "" if found["verdict"] == "unknown" else "beyond the scatter of the measurements, "
     return (
         f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % "
         f"of them; {beyond}errors are {found['factor']:.2f} times as large as the calibration predicts (95 % "

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.estimation import Estimate
-from flexcal.report.notation import millimetres
+from flexcal.report.notation import document_millimetres, millimetres, p_value
 from flexcal.report.page import Check
 
 BOUND_95 = 1.6140
@@ -25,18 +26,18 @@ CLEAR_GAP = 3.0
 
 
 def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
-    """Whether accuracy was judged on enough poses that the fit never saw, and holds there."""
-    question = "Was it checked on poses that the fit never saw?"
+    """Whether accuracy was checked on enough poses outside the fit, and is as good there."""
+    question = "Was it verified on poses outside the fit?"
     answer = (
-        f"Yes, on {fresh.poses}: 9 of 10 are within {millimetres(fresh.p90)} mm there, and within {millimetres(fitted.p90)} mm on the "
+        f"Yes, on {fresh.poses}: P90 is {millimetres(fresh.p90)} mm there and {millimetres(fitted.p90)} mm on the "
         f"{fitted.poses} poses of the fit."
     )
     if fresh.poses < FEW_POSES:
-        return Check(question, f"{answer} That is few; verify on {FEW_POSES} or more.", "care")
+        return Check(question, f"{answer} These are few; verify on {FEW_POSES} or more.", "care")
     if fresh.p90 > 3 * fitted.p90:
         return Check(
             question,
-            f"{answer} Fresh poses are much worse: the fit has learnt its own poses or misses a term.",
+            f"{answer} Errors at fresh poses are much larger: the model overfits or lacks a term.",
             "care",
         )
     return Check(question, answer, "good")
@@ -44,27 +45,23 @@ def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
 
 def check_unseen(fitted: Sequence[str]) -> Check:
     """Whether the calibration was fitted to none of the files; `fitted` names those that it was fitted to."""
-    question = "Did the calibration never see these points?"
+    question = "Are the points outside the fit?"
     if fitted:
         which = " and ".join(fitted)
         return Check(
             question,
-            f"No: it was fitted to {which}, so this says little about other poses; verify on poses that it never saw.",
+            f"No: it was fitted to {which}, so errors at other poses may be larger; verify on poses outside the fit.",
             "unknown",
         )
-    return Check(question, "None of the files is one that it was fitted to.", "good")
+    return Check(question, "Yes: none of the files was used for the fit.", "good")
 
 
 def check_enough(poses: int) -> Check:
     """Whether so many poses are enough for a 90 % value."""
     question = "Were enough fresh poses measured?"
     if poses >= FEW_POSES:
-        return Check(
-            question, f"{poses} points; the 90 % value rests on about {max(1, poses // 10)} of them.", "good"
-        )
-    return Check(
-        question, f"{poses} points are few; with {FEW_POSES} or more the worst ones mean something.", "care"
-    )
+        return Check(question, f"{poses} points; P90 rests on about {max(1, poses // 10)} of them.", "good")
+    return Check(question, f"{poses} points are few; measure {FEW_POSES} or more.", "care")
 
 
 def check_claimed_uncertainty(
@@ -124,25 +121,25 @@ def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = Tru
     return Check(question, answer, "good")
 
 
-def check_drift(distance: float, *, certain: bool) -> Check:
-    """Whether what the fit leaves goes with the order of measuring, by so much (m) from the first pose to the last."""
-    question = "Did robot and instrument stay as they were while the poses were measured?"
-    if not certain:
-        return Check(question, "Nothing speaks against it.", "good")
+def check_drift(drift: Mapping[str, Any]) -> Check:
+    """Whether residuals drift with time; `drift` is the block of results.json."""
+    question = "Did robot or instrument drift during the measurement?"
+    if not drift["certain"]:
+        return Check(question, f"No drift detected (p = {p_value(drift['p'])}).", "good")
     answer = (
-        f"What the fit leaves goes with the order of measuring, {millimetres(distance)} mm from the first pose to the last. Let the "
-        "robot warm up and the instrument settle, or measure in random order if place and order went together."
+        f"Residuals drift with time (p = {p_value(drift['p'])}), by {document_millimetres(drift['distance_mm'])} mm from the first "
+        "pose to the last. Let robot and instrument warm up, or measure in random order if place and order are correlated."
     )
     return Check(question, answer, "care")
 
 
 def check_rank(parameters: int, rank: int, gap: float) -> Check:
     """Whether the parameters that the poses determine stand clear, by `gap` decades, of those that they do not."""
-    question = "Is it clear which parameters the poses determine?"
+    question = "Is the rank of the identification clear?"
     dropped = parameters - rank
     answer = f"{rank} of {parameters} geometric parameters are determined; "
     if not dropped:
-        return Check(question, f"{answer}none had to be dropped.", "good")
+        return Check(question, f"{answer}none was dropped.", "good")
     clear = gap >= CLEAR_GAP
     answer += (
         f"the {dropped} others are absorbed by them, with a gap of {gap:.0f} decades between the two groups."
@@ -160,12 +157,14 @@ def check_springs(estimate: Estimate, stiffness: Sequence[str], damping: Sequenc
     answer = f"{seen(stiffness)} of {len(stiffness)} stiffnesses and {seen(damping)} of {len(damping)} dampings are."
     if seen(stiffness) == len(stiffness):
         return Check(question, f"{answer} Damping does not affect accuracy at rest.", "good")
-    return Check(question, f"{answer} What is missing rests on robot.yaml; change poses or payload.", "care")
+    return Check(
+        question, f"{answer} The others keep the values of robot.yaml; change poses or payload.", "care"
+    )
 
 
 def check_flanks(verification: Verification) -> Check:
     """Whether it is certain at every pose on which side of its backlash a joint rests."""
-    question = "Is it certain on which side of the backlash each joint rests?"
+    question = "Is the flank of the backlash certain at every pose?"
     unclear, all_ = int(verification.ambiguous.sum()), len(verification.ambiguous)
     if not unclear:
         return Check(question, f"Yes, at all {all_} verification poses.", "good")
@@ -180,7 +179,9 @@ def check_flanks(verification: Verification) -> Check:
 def check_truth(covered: int, total: int) -> Check:
     """Whether the 95 % intervals contain the truth, where it is known."""
     question = "Do the 95 % intervals contain the truth?"
-    answer = f"{covered} of {total} do ({100 * covered / total:.0f} %). Only a simulated robot can tell."
+    answer = (
+        f"{covered} of {total} do ({100 * covered / total:.0f} %). Only a simulated robot has a known truth."
+    )
     share = covered / total
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
 
@@ -215,15 +216,17 @@ def check_left_out(mean: float, left_out: tuple[float, float] | None, share: flo
 
 def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
     """Whether single measurements stand out: so many `outliers` of a robust loss, or the worst of the errors."""
-    question = "Are there measurements that stand out?"
+    question = "Are there outliers?"
     if outliers:
-        answer = f"{outliers} of {fit.poses} were set aside by the robust loss; they are listed below."
+        answer = (
+            f"{outliers} of {fit.poses} got hardly any weight from the robust loss; they are listed below."
+        )
         return Check(question, answer, "good" if outliers <= 0.02 * fit.poses else "care")
     if fit.max > 4 * fit.p90:
         return Check(
             question,
-            f"The worst, {millimetres(fit.max)} mm, is more than four times what nine of ten stay within; look at it, or fit with the "
-            "robust loss cauchy.",
+            f"The worst, {millimetres(fit.max)} mm, is more than four times P90; check this measurement, or fit with "
+            "--loss cauchy.",
             "care",
         )
     return Check(question, "No.", "good")

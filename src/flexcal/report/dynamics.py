@@ -73,7 +73,7 @@ def dynamics_page(study: DynamicsStudy) -> Page:
             Section(
                 "torques",
                 "Torques: predicted against measured",
-                "What counts is whether the robot's torques are predicted in motions that the fit never saw.",
+                "The torque error on motions outside the fit measures the quality of the model.",
                 (
                     *torque_blocks(results["error_percent"], held_out(results), logs),
                     signals_table(results["signals"]),
@@ -104,7 +104,12 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
     where = held_out(results) or "the recordings of the fit"
     fitted = f" In the fit it is {significant(error['train'], 3)} %." if unseen is not None else ""
     facts = (
-        Fact("How well are torques predicted?", significant(shown, 3), "% missed", f"Of {where}.{fitted}"),
+        Fact(
+            "How well are torques predicted?",
+            significant(shown, 3),
+            "% relative error",
+            f"On {where}.{fitted}",
+        ),
         Fact(
             "How many base parameters are determined?",
             f"{results['rank']} of {len(base)}",
@@ -115,10 +120,10 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
         trust.fact(),
     )
     sentence = (
-        f"Of {where}, the identified robot misses {significant(shown, 3)} % of the norm of the measured torques."
+        f"The relative error of the predicted torques is {significant(shown, 3)} % on {where}."
         if unseen is not None
-        else f"In the recordings of the fit, the identified robot misses {significant(shown, 3)} % of the norm of the measured torques; "
-        "what it misses in other motions is not known."
+        else f"The relative error of the predicted torques is {significant(shown, 3)} % on the recordings of the fit; "
+        "the error on other motions is not known."
     )
     return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
 

@@ -18,8 +18,8 @@ _SHOWN = 3
 
 
 def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
-    """Whether torques that the fit never saw are predicted; `held_out` says which, empty for none."""
-    question = "Does it predict torques that the fit never saw?"
+    """Whether torques outside the fit are predicted; `held_out` says which, empty for none."""
+    question = "Does it predict torques outside the fit?"
     if not held_out:
         return Check(
             question,
@@ -28,17 +28,17 @@ def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
         )
     unseen, train = error["held_out"], error["train"]
     answer = (
-        f"Of {held_out}, {significant(unseen, 3)} % of the norm of the torques is missed, {significant(train, 3)} % in the fit. "
-        "The choice of friction terms did not look there either."
+        f"The relative torque error is {significant(unseen, 3)} % on {held_out} and {significant(train, 3)} % in the fit. "
+        "The friction terms were chosen without these data."
     )
     if unseen > TOO_LARGE:
-        return Check(question, f"{answer} That is too much: the model does not hold there.", "bad")
+        return Check(question, f"{answer} That is too large: the model does not hold there.", "bad")
     if unseen > MUCH_WORSE * train:
         return Check(
-            question, f"{answer} That is a large step: friction changed, or the model is too rich.", "care"
+            question, f"{answer} That is much larger: friction changed, or the model overfits.", "care"
         )
     if unseen > LARGE:
-        return Check(question, f"{answer} That is a lot; look at the spectra of what is left.", "care")
+        return Check(question, f"{answer} That is large; look at the spectra of the residuals.", "care")
     return Check(question, answer, "good")
 
 
@@ -46,9 +46,11 @@ def check_joints(per_joint: Mapping[str, float]) -> Check:
     """Whether every joint by itself is predicted."""
     question = "Is every joint predicted?"
     worst = max(per_joint, key=lambda joint: per_joint[joint])
-    answer = f"The worst is {worst}: {significant(per_joint[worst], 3)} % of the norm of its own torques is missed."
+    answer = f"The worst is {worst}: its relative torque error is {significant(per_joint[worst], 3)} %."
     if per_joint[worst] > JOINT_LARGE:
-        return Check(question, f"{answer} Its torques are small, or its friction is another.", "care")
+        return Check(
+            question, f"{answer} Its torques are small, or its friction model does not hold.", "care"
+        )
     return Check(question, answer, "good")
 
 
@@ -70,19 +72,20 @@ def check_base(results: Mapping[str, Any]) -> Check:
 
 def check_bodies(bodiless: list[str]) -> Check:
     """Whether every link has inertials that a body can have."""
-    question = "Is every link a body that could be built?"
+    question = "Are the inertials of every link physically consistent?"
     if not bodiless:
-        return Check(question, "Yes: every mass and every inertia is positive, as a body's is.", "good")
+        return Check(question, "Yes: all masses and pseudo-inertias are positive.", "good")
     return Check(
         question,
-        f"Not {', '.join(bodiless)}. Torques lose nothing by it, but springs and a URDF need bodies: identify with --estimator sdp.",
+        f"Not {', '.join(bodiless)}. Torques are not affected, but springs and a URDF need consistent inertials: identify with "
+        f"--estimator sdp.",
         "care",
     )
 
 
 def check_shown(remarks: list[str]) -> Check:
     """Whether the recordings show every declared term of the drives."""
-    question = "Do the recordings show every term of the drives?"
+    question = "Do the recordings determine every drive parameter?"
     if not remarks:
         return Check(question, "Yes.", "good")
     more = f"; and {len(remarks) - _SHOWN} more" if len(remarks) > _SHOWN else ""

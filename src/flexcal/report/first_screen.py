@@ -15,9 +15,9 @@ def three_facts(
 ) -> tuple[Fact, ...]:
     """How accurate it was, how accurate it is, and whether it can be trusted; `noun` is poses or points."""
     was = _fact(
-        "How accurate was it?", before, f"9 of 10 {noun} were within this before: the robot's own error."
+        "How accurate was it?", before, f"P90 over the {noun}, the robot's own error before calibration."
     )
-    now = _fact("How accurate is it?", after, f"9 of 10 {noun} are within this, calibrated.")
+    now = _fact("How accurate is it?", after, f"P90 over the {noun}, calibrated.")
     return (was, now, trust.fact())
 
 
@@ -31,5 +31,5 @@ def rung(
 def _fact(question: str, s: ErrorStatistics | None, words: str) -> Fact:
     if s is None:
         return Fact(question, NOTHING, "", "Too few poses to tell.")
-    spread = f"Mean {millimetres(s.mean)}, worst {millimetres(s.max)} mm."
+    spread = f"Mean {millimetres(s.mean)}, maximum {millimetres(s.max)} mm."
     return Fact(question, millimetres(s.p90), "mm", f"{words} {spread}")

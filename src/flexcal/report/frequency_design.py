@@ -66,10 +66,10 @@ def _verdict(study: FrequencyDesignStudy) -> Verdict:
     checks = (_known(spring, std), _explained(study))
     minutes = study.results["seconds_on_the_robot"] / 60
     facts = (
-        Fact("How well will the springs be known?", significant(100 * std, 2), "%", f"Worst is {spring}."),
+        Fact("How accurate will the stiffnesses be?", significant(100 * std, 2), "%", f"Worst is {spring}."),
         Fact("How long does it take?", f"{minutes:.0f}", "min", f"{study.results['recordings']} recordings."),
         Fact(
-            "Will all of them be known?",
+            "Will all be determined?",
             "Yes" if std < LOG_STD_LIMIT else "No",
             "",
             tally(checks),
@@ -77,10 +77,10 @@ def _verdict(study: FrequencyDesignStudy) -> Verdict:
         ),
     )
     sentence = (
-        f"Predicted from the robot as it is known, its sensors and its friction: the stiffness of {spring} will have a standard "
+        f"Predicted from the model, its sensors and its friction: the stiffness of {spring} will have a standard "
         f"deviation of {significant(100 * std, 2)} %, every other a smaller one."
     )
-    headline = "Every stiffness will be known" if std < LOG_STD_LIMIT else f"{spring} will not be known"
+    headline = "Every stiffness will be determined" if std < LOG_STD_LIMIT else f"{spring} will not be known"
     return Verdict(worst(checks), headline, sentence, facts, (), "", checks)
 
 
@@ -121,14 +121,14 @@ def _springs(study: FrequencyDesignStudy) -> Section:
     heads = ("spring", "stiffness / %", "with a flat spectrum / %", "damping / %")
     return Section(
         "springs",
-        "What the plan will tell",
-        "Predicted from sensor noise, friction under the reference motion, and what is not known of links and geometry.",
+        "Predicted accuracy of the springs",
+        "Predicted from sensor noise, friction under the reference motion, and the uncertainty of links and geometry.",
         (
             FigureBlock(
                 "figure-springs",
                 "Predicted standard deviations",
                 predicted_springs(planned, flat),
-                "The further left, the better known. Grey: the same poses with the same torque on every line.",
+                "Farther left is better. Grey: the same poses with the same torque on every line.",
                 "Predicted standard deviation of every stiffness and damping, planned and with a flat spectrum.",
             ),
             Table("table-springs", "Predicted standard deviations", heads, rows),
@@ -143,7 +143,7 @@ def _poses(study: FrequencyDesignStudy) -> Section:
         blocks.append(
             FigureBlock(
                 "figure-curve",
-                "How many poses are enough",
+                "Number of poses",
                 poses_against_std(study.curve, len(plan.poses)),
                 "Each pose is added to those before it; the plan, dotted, was then improved by exchange. With flat amplitudes. Grey: the "
                 "median of poses drawn from the same candidates.",
@@ -166,7 +166,7 @@ def _poses(study: FrequencyDesignStudy) -> Section:
     return Section(
         "poses",
         "Where to excite",
-        "Together the poses tell the springs apart; no single one does.",
+        "All poses together determine the springs; no single one does.",
         tuple(blocks),
     )
 

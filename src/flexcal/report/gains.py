@@ -12,9 +12,9 @@ from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
 
 _TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "The gains of all drives are known"),
-    "care": ("With care", "Some gains are not known well; read which before declaring them"),
-    "bad": ("No", "These recordings tell no gain"),
+    "good": ("Yes", "The gains of all drives are determined"),
+    "care": ("With care", "Some gains are uncertain; read which before declaring them"),
+    "bad": ("No", "These recordings determine no gain"),
 }
 _WIDE = 0.05
 """1σ of a factor from which its gain is not known well."""
@@ -49,18 +49,20 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
     payloads = sorted(set(results["payloads_kg"]))
     facts = (
         Fact("How far were the declared gains off?", percent(largest), "", "The largest of all drives."),
-        Fact("How many are told?", f"{len(seen)} of {len(factors)}", "", "The others stay as declared."),
+        Fact(
+            "How many are determined?", f"{len(seen)} of {len(factors)}", "", "The others stay as declared."
+        ),
         Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
     )
     sentence = (
-        f"The mass of the payload is the scale: {len(results['payloads_kg'])} recordings hold "
-        f"{' or '.join(f'{mass:g} kg' for mass in payloads)}, and what that changes of the torques tells the gains."
+        f"The known mass of the payload is the reference: {len(results['payloads_kg'])} recordings hold "
+        f"{' or '.join(f'{mass:g} kg' for mass in payloads)}, and the change of the torques determines the gains."
     )
     return Verdict(status, headline, sentence, facts, (), "", checks)
 
 
 def _check_told(seen: int, total: int) -> Check:
-    question = "Do the recordings tell every gain?"
+    question = "Do the recordings determine every gain?"
     if not seen:
         return Check(question, "None: the payload changes no torque by enough.", "bad")
     if seen < total:
@@ -94,7 +96,9 @@ def _table(results: Mapping[str, Any]) -> Table:
                 name.removesuffix(".drive_gain"),
                 significant(declared, 5),
                 significant(item["estimate"], 4) if known else NOTHING,
-                f"{significant(item['low'], 4)} to {significant(item['high'], 4)}" if known else "not told",
+                f"{significant(item['low'], 4)} to {significant(item['high'], 4)}"
+                if known
+                else "not determined",
                 significant(gain, 5),
             )
         )

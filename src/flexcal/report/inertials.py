@@ -53,8 +53,8 @@ def inertials_page(study: InertialsStudy) -> Page:
 
 
 _LEAD = (
-    "The recordings move every parameter as far as they speak of it; what they do not show keeps value and tolerance of robot.yaml. The "
-    "last column says how much narrower the interval became."
+    "Parameters that the recordings do not determine keep value and tolerance of robot.yaml. The "
+    "last column is the ratio of prior to posterior standard deviation."
 )
 
 
@@ -67,20 +67,20 @@ def _verdict(study: InertialsStudy) -> Verdict:
         Fact(
             "How well were torques predicted?",
             before,
-            "% missed",
+            "% relative error",
             "With the values of robot.yaml, up to 5 Hz.",
         ),
         Fact(
             "How well are they predicted?",
             after,
-            "% missed",
+            "% relative error",
             "With the identified values, of the same recordings.",
         ),
         trust.fact(),
     )
     sentence = (
-        f"Of the torques of the trajectories up to 5 Hz, the nominal robot misses {before} % of their norm and the identified one "
-        f"{after} %."
+        f"Up to 5 Hz, the relative error of the predicted torques is {before} % with the nominal robot and "
+        f"{after} % with the identified one."
     )
     return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
 
@@ -95,13 +95,15 @@ def inertials_checks(results: Mapping[str, Any], estimate: Estimate) -> tuple[Ch
 
 def _check_error(error: Mapping[str, float]) -> Check:
     question = "Does the identified robot explain the torques?"
-    answer = f"It misses {significant(error['train'], 3)} % of their norm."
+    answer = f"The relative torque error is {significant(error['train'], 3)} %."
     if error["train"] > TOO_LARGE:
-        return Check(question, f"{answer} That is not this robot, or not its torques.", "bad")
+        return Check(question, f"{answer} The torques are not those of this robot.", "bad")
     if error["train"] > LARGE:
-        return Check(question, f"{answer} That is a lot; look at friction and at the torques' scale.", "care")
+        return Check(
+            question, f"{answer} That is large; check friction and the scale of the torques.", "care"
+        )
     if error["train"] > error["nominal"]:
-        return Check(question, f"{answer} The nominal values did better.", "care")
+        return Check(question, f"{answer} The nominal values have a smaller error.", "care")
     return Check(question, answer, "good")
 
 
@@ -117,7 +119,7 @@ def _table(study: InertialsStudy) -> Table:
     return Table(
         "table-parameters",
         f"All {len(rows)} parameters",
-        ("parameter", "unit", "estimate", "95 % interval", "narrower than the prior"),
+        ("parameter", "unit", "estimate", "95 % interval", "prior std / posterior std"),
         tuple(rows),
         text_columns=(1,),
     )

@@ -90,3 +90,10 @@ def ratio(worse: float, better: float) -> str:
 def sentences(remarks: Sequence[str]) -> tuple[str, ...]:
     """Remarks as they end a line of the terminal, as sentences: with a capital and a full stop."""
     return tuple(f"{remark[:1].upper()}{remark[1:]}." for remark in remarks)
+
+
+def p_value(value: float) -> str:
+    """A p-value with two decimals, or one significant digit below 0.1."""
+    if value < 0.001:
+        return "0.001 or less"
+    return f"{value:.2f}" if value >= 0.1 else f"{value:.1g}"

@@ -50,14 +50,14 @@ def payload_page(study: PayloadStudy) -> Page:
     results = study.results
     return Page(
         title=f"{results['robot']}: payload report",
-        subtitle=f"Mass, centre of mass and inertia of what is held, in the frame {results['frame']}",
+        subtitle=f"Mass, centre of mass and inertia of the payload, in the frame {results['frame']}",
         verdict=_verdict(study),
         sections=(
             Section(
                 "payload",
                 "Payload",
                 f"Everything is in the frame {results['frame']}, the inertia about the centre of mass. It rests on torques in N m: where "
-                "these are currents times gains, the mass is as much off as the gains are.",
+                "these are currents times gains, errors of the gains are errors of the mass.",
                 (_table(study), Text((results["declaration"],), "The same as a line of robot.yaml")),
             ),
             Section(
@@ -116,13 +116,13 @@ def _table(study: PayloadStudy) -> Table:
         factor, unit = scaled(item.unit)
         known = study.estimate.interval(item.name) is not None
         stays = "as robot.yaml declares it" if declared is not None else "at zero"
-        cells = _value(study.estimate, item.name) if known else (f"not told, stays {stays}", None)
+        cells = _value(study.estimate, item.name) if known else (f"not determined, stays {stays}", None)
         was = () if declared is None else (f"{factor * declared[item.name]:.5g}".replace("-", "−"),)
         rows.append((item.name.removeprefix("payload."), unit, *cells, *was))
     columns = ("parameter", "unit", "estimate", "95 % interval")
     return Table(
         "table-payload",
-        "What is held",
+        "Payload parameters",
         columns if declared is None else (*columns, "robot.yaml"),
         tuple(rows),
         text_columns=(1,),

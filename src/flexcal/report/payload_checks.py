@@ -34,9 +34,9 @@ def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
 def _check_torques(error: Mapping[str, Any]) -> Check:
     question = "Do robot and payload explain the torques?"
     train, best = error["train"], error["best"]
-    answer = f"{significant(train, 3)} % of their norm is missed"
+    answer = f"{significant(train, 3)} % is the relative torque error"
     answer += (
-        f"; noise alone, as fits of every joint of every recording by itself have it, would be {significant(best, 3)} %."
+        f"; the noise alone, from separate fits of every joint and recording, is {significant(best, 3)} %."
         if best
         else "."
     )
@@ -49,26 +49,26 @@ def _check_torques(error: Mapping[str, Any]) -> Check:
             "care",
         )
     if train > LARGE:
-        return Check(question, f"{answer} That is a lot; look at the torques below.", "care")
+        return Check(question, f"{answer} That is large; look at the torques below.", "care")
     return Check(question, answer, "good")
 
 
 def _check_body(rise: float) -> Check:
-    question = "Is it a body that could be built?"
+    question = "Is the payload physically consistent?"
     if rise > BODILESS:
         return Check(
             question,
-            f"No body has what these torques ask for: the nearest one raises the sum of squares by {significant(rise, 3)}, and chance by "
+            f"No: the nearest consistent payload raises the sum of squares by {significant(rise, 3)}; by chance this exceeds "
             f"{BODILESS:g} once in a thousand. Check the drive gains, the robot's own dynamics and the frame.",
             "care",
         )
     if rise > 0:
         return Check(
             question,
-            f"The nearest one is: it raises the sum of squares by {significant(rise, 3)}, which noise explains.",
+            f"The nearest consistent one raises the sum of squares by {significant(rise, 3)}, which noise explains.",
             "good",
         )
-    return Check(question, "Yes: mass and inertia came out as a body's are.", "good")
+    return Check(question, "Yes: mass and inertia are physically consistent.", "good")
 
 
 def _check_mass(mass: Mapping[str, float]) -> Check:
@@ -84,20 +84,20 @@ def _check_mass(mass: Mapping[str, float]) -> Check:
 
 
 def _check_told(parameters: Mapping[str, Mapping[str, Any]]) -> Check:
-    question = "Do the recordings tell all of it?"
+    question = "Do the recordings determine all parameters?"
     hidden = [name.removeprefix("payload.") for name, item in parameters.items() if not item["identifiable"]]
     if not hidden:
-        return Check(question, "Mass, centre of mass and inertia are told.", "good")
+        return Check(question, "Mass, centre of mass and inertia are determined.", "good")
     names = ", ".join(hidden)
     if any(name.startswith("com") for name in hidden):
         return Check(
             question,
-            f"Not {names}; turn the payload about other axes, so that gravity comes from more sides.",
+            f"Not {names}; rotate the payload about other axes, so that gravity acts from more directions.",
             "care",
         )
     return Check(
         question,
-        f"All but the inertia ({names}), which takes faster turns; positions at rest do not depend on it.",
+        f"All but the inertia ({names}), which needs faster rotations; positions at rest do not depend on it.",
         "good",
     )
 
@@ -114,8 +114,8 @@ def _check_declared(mass: Mapping[str, float], declared: Mapping[str, float] | N
     side = "above" if mass["estimate"] > weight else "below"
     return Check(
         question,
-        f"No: it is {size}{side} the declared {weight:g} kg. What was identified counts where these estimates are read; if a scale "
-        "agrees with robot.yaml, the torques or the robot's own dynamics are off.",
+        f"No: it is {size}{side} the declared {weight:g} kg. The identified mass is used where these estimates are read; if a scale "
+        "agrees with robot.yaml, the torques or the robot's own dynamics are wrong.",
         "care",
     )
 

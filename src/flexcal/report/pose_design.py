@@ -50,7 +50,7 @@ def pose_page(study: PoseStudy) -> Page:
         f"{len(study.q)} poses to measure" if chosen else f"{len(study.q)} random poses, for a verification",
         _sentence(results)
         if chosen
-        else "They lie all over the joint ranges, touch nothing, and the instrument sees them.",
+        else "They cover the joint ranges, are free of collisions and visible to the instrument.",
         _facts(results) if chosen else (),
         (),
         "",
@@ -86,16 +86,22 @@ def pose_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     if (working := results.get("working")) is not None:
         share = working["reached_share"]
         answer = f"Of the working volume the robot reaches {100 * share:.0f} %."
-        checks.append(Check("Can the robot work where it shall?", answer, "good" if share > 0.9 else "care"))
+        checks.append(
+            Check("Does the robot reach its working volume?", answer, "good" if share > 0.9 else "care")
+        )
     if "blocked_moves" in results:
         blocked = results["blocked_moves"]
         ways = ", ".join(f"{a} to {b}" for a, b in blocked)
         answer = (
-            f"Something touches on the straight way of the joints from {ways}: go round there."
+            f"There are collisions on the straight joint motion from {ways}: go round there."
             if blocked
-            else "Nothing touches on them."
+            else "There are no collisions on them."
         )
-        checks.append(Check("Are the moves between the poses free?", answer, "care" if blocked else "good"))
+        checks.append(
+            Check(
+                "Are the moves between the poses free of collisions?", answer, "care" if blocked else "good"
+            )
+        )
     return tuple(checks)
 
 
@@ -128,8 +134,9 @@ def _facts(results: Mapping[str, Any]) -> tuple[Fact, ...]:
         )
     error, least = results["tool_error_mm"], results["least_possible_mm"]
     return (
-        Fact("How accurate can the tool become?", significant(error, 3), "mm", f"Root mean square {where}, from noise alone."),
-        Fact("How good is the choice?", f"{100 * (error / least - 1):.0f}", "%", "At most so far above the best choice of as many."),
+        Fact("What accuracy is possible?", significant(error, 3), "mm", f"Root mean square {where}, from noise alone."),
+        Fact("How close to the optimum is it?", f"{100 * (error / least - 1):.0f}", "%", "Upper bound of the excess over the best choice "
+        "of as many poses."),
         Fact("How long are the moves?", f"{results['moves_s']:.0f}", "s", "At least: all joints at once, none faster than its limit."),
     )  # fmt: skip
 
@@ -151,11 +158,11 @@ def _numbers(results: Mapping[str, Any]) -> Section:
         "figure-numbers",
         "Predicted tool error against the number of poses",
         pose_numbers(numbers, errors, plan, wanted),
-        "Where the line falls by half with four times the poses, more of them only average noise. The dashed line is this plan. From the "
-        "instrument's noise alone: what deflection and repeatability add is not in it.",
+        "Where four times the poses halve the error, further poses only average noise. The dashed line is this plan. From the "
+        "instrument's noise alone, without deflection and repeatability.",
         f"Predicted tool error in mm against {len(numbers)} numbers of poses.",
     )
-    return Section("numbers", "How many poses are enough", "", (block,))
+    return Section("numbers", "Number of poses", "", (block,))
 
 
 def _space(study: PoseStudy) -> Section:
@@ -164,7 +171,7 @@ def _space(study: PoseStudy) -> Section:
         "figure-space",
         "The poses in the robot's base frame",
         plan_space(corners, study.working, study.box, station_position(study.model)),
-        "Skeletons of the arm; the blue way goes through the target's places in the order of the plan. Drag to turn.",
+        "Skeletons of the arm; the blue line goes through the target's places in the order of the plan. Drag to turn.",
         f"The arm in {len(study.q)} poses, in three dimensions.",
     )
     return Section("space", "Where they are", "", (block,))

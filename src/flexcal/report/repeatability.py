@@ -43,7 +43,7 @@ def repeatability_page(study: RepeatabilityStudy) -> Page:
     rp = results["rp_mm"]
     facts = [
         Fact(
-            "How well does it repeat?",
+            "What is its repeatability?",
             document_millimetres(rp["max"]),
             "mm",
             "RP at the worst pose (ISO 9283).",
@@ -62,7 +62,7 @@ def repeatability_page(study: RepeatabilityStudy) -> Page:
             )
     verdict = Verdict(
         worst(checks),
-        f"The robot repeats within {document_millimetres(rp['max'])} mm",
+        f"Repeatability RP: {document_millimetres(rp['max'])} mm",
         f"{results['poses']} poses were visited {results['visits']['total']} times in all; "
         f"RP is {document_millimetres(rp['mean'])} mm on average.",
         tuple(facts),
@@ -114,13 +114,13 @@ def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
     )
     checks = [Check("Was every pose visited often enough?", answer, "good" if enough else "care")]
     noise = study.results["instrument_rp_mm"]
-    question = "Is it the robot that is measured, and not the instrument?"
+    question = "Is the scatter that of the robot rather than of the instrument?"
     if noise is None:
         checks.append(Check(question, "The files state no sigma, so this cannot be judged.", "unknown"))
     else:
         seen = study.results["rp_mm"]["mean"]
         answer = f"The instrument's noise alone would show an RP of {document_millimetres(noise)} mm; "
-        answer += f"{document_millimetres(seen)} mm are seen on average."
+        answer += f"{document_millimetres(seen)} mm are measured on average."
         checks.append(Check(question, answer, "good" if seen > 1.5 * noise else "care"))
     if (drift := study.results["drift"]) is not None:
         moved = [item for item in drift["each"] if item["certain"]]
@@ -129,9 +129,9 @@ def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
             f"{len(moved)} of {len(drift['each'])} poses moved from the first visits to the last, "
             f"pose {farthest['pose']} by {document_millimetres(farthest['way_mm'][-1])} mm."
             if moved
-            else "It moved no more than its visits scatter."
+            else "No drift detected."
         )
-        checks.append(Check("Did it stay while it was measured?", answer, "care" if moved else "good"))
+        checks.append(Check("Did it drift during the measurement?", answer, "care" if moved else "good"))
     return tuple(checks)
 
 
@@ -164,17 +164,17 @@ def _drift_section(drift: Mapping[str, Any]) -> Section:
     ]
     if len(drift["each"]) > 1:
         sentences.append(
-            f"What drifts? All poses together went {document_millimetres(drift['together_mm'])} mm, as a base or an instrument does "
+            f"Drift: all poses moved together by {document_millimetres(drift['together_mm'])} mm, as a base or an instrument does "
             f"that moves; besides, each went {document_millimetres(drift['apart_mm'])} mm (root mean square), as an arm that warms up."
         )
     blocks = (
-        Table("table-drift", "From the first visits to the last", columns, rows),
+        Table("table-drift", "Drift from the first visits to the last", columns, rows),
         FigureBlock(
             "figure-drift",
-            "The course of every pose",
+            "Drift of every pose",
             pose_courses(drift["each"]),
             "One mark a set, at the mean time of its visits. The noise of the instrument is part of it.",
-            "Way of the barycentre and RP of every pose against time.",
+            "Displacement of the barycentre and RP of every pose against time.",
         ),
         Text(tuple(sentences)),
     )
@@ -187,11 +187,11 @@ def _poses_section(study: RepeatabilityStudy) -> Section:
             "AP is the distance between the barycentre of all visits and the commanded point; RP is the mean distance of the visits from "
             "their barycentre plus three of its standard deviations; vAP is the largest distance between barycentres of visits that came "
             "from different poses. The noise of the instrument is part of all of them.",
-            "As delivered, the commanded point is where the nominal robot has it, placed as well as it goes before the instrument; "
-            "calibrated, it is where the calibrated model has it.",
+            "As delivered, the commanded point is that of the nominal robot, best-fit registered; "
+            "calibrated, it is that of the calibrated model.",
         )
     )
-    return Section("poses", "How accurate and how repeatable", "", (repeatability_table(study.results), text))
+    return Section("poses", "Accuracy and repeatability", "", (repeatability_table(study.results), text))
 
 
 def _order_section(study: RepeatabilityStudy) -> Section:
@@ -201,7 +201,7 @@ def _order_section(study: RepeatabilityStudy) -> Section:
         "figure-order",
         "Deviations from the barycentre, in the order of measuring",
         residual_trend(rows, deviations, "row of the file, in order", "measured minus barycentre"),
-        "What goes with the order is drift: a robot that warms up, an instrument that settles.",
+        "A trend indicates drift: a robot that warms up or an instrument that settles.",
         "Components of the deviations in measuring order.",
     )
     return Section("order", "In the order of measuring", "", (block,))

@@ -21,7 +21,7 @@ from flexcal.units import DEGREE
 
 _TRUST: dict[Status, tuple[str, str]] = {
     "good": ("Yes", "Measured, and springs can be fitted to them"),
-    "care": ("With care", "Measured; read what is not sure below before fitting springs to them"),
+    "care": ("With care", "Measured; read the checks below before fitting springs to them"),
     "bad": ("No", "These responses are too uncertain to fit springs to"),
 }
 
@@ -81,7 +81,7 @@ def _verdict(study: ResponseStudy) -> Verdict:
     )
     facts = (
         Fact(
-            "How well is the response known?",
+            "How uncertain is the response?",
             percent(least["relative_std"]),
             "1σ",
             f"At the median line of the diagonal in pose {least['pose']}, the worst.",
@@ -92,12 +92,14 @@ def _verdict(study: ResponseStudy) -> Verdict:
             "",
             f"Noise alone would leave {percent(least['relative_noise_std'])} there. {advice}",
         ),
-        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+        Fact(
+            "Can springs be fitted to it?", answer, "", f"{tally(checks)}; each is explained below.", status
+        ),
     )
     low, high = (function(entry[key] for entry in entries) for function, key in _BAND)
     where = "1 pose" if len(entries) == 1 else f"{len(entries)} poses"
     sentence = (
-        f"The motors were shaken in {where}, at {least['lines']} frequencies from {low:g} to {high:g} Hz; the "
+        f"The motors were excited in {where}, at {least['lines']} frequencies from {low:g} to {high:g} Hz; the "
         "resonances of the springs must lie between them."
     )
     return Verdict(status, headline, sentence, facts, (), "", checks)
@@ -132,7 +134,7 @@ def _table(study: ResponseStudy) -> Table:
     columns += ("of it distortion", "degrees of freedom", *(("odd distortion",) if with_odd else ()))
     return Table(
         "table-responses",
-        "How well each pose is known",
+        "Uncertainty by pose",
         columns,
         tuple(rows),
         "1σ is that of the mean over the response, at the median line of the diagonal; noise and distortion add up as squares, their "

@@ -21,8 +21,8 @@ _UNLIKE = 2.0
 _FREEDOM = 20
 _SHOWN = 3
 _CURES: dict[Limit, str] = {
-    "noise": "Noise is what limits it: record more periods, or shake harder.",
-    "distortion": "Distortion is what limits it: record more realisations; more periods of the same do not lower it.",
+    "noise": "Noise dominates: record more periods, or increase the torques.",
+    "distortion": "Nonlinear distortion dominates: record more realisations; more periods of the same do not lower it.",
 }
 
 
@@ -52,9 +52,9 @@ def response_checks(
 
 
 def _check_known(entries: Sequence[Mapping[str, Any]]) -> Check:
-    question = "Are the responses known well?"
+    question = "Is the uncertainty of the responses small?"
     worst = worst_pose(entries)
-    answer = f"To {percent(worst['relative_std'])} (1σ, median over lines and axes) in pose {worst['pose']}, the worst."
+    answer = f"{percent(worst['relative_std'])} (1σ, median over lines and axes) in pose {worst['pose']}, the worst."
     if worst["relative_std"] > _TOO_LARGE:
         return Check(question, f"{answer} {_CURES[limit_of(entries)]}", "bad")
     if worst["relative_std"] > _LARGE:
@@ -63,7 +63,7 @@ def _check_known(entries: Sequence[Mapping[str, Any]]) -> Check:
 
 
 def _check_axes(responses: Sequence[FrequencyResponse]) -> Check:
-    question = "Is every axis seen in every pose?"
+    question = "Is every axis excited in every pose?"
     lost = [
         f"{joint} in pose {response.pose + 1}"
         for response in responses
@@ -79,14 +79,15 @@ def _check_axes(responses: Sequence[FrequencyResponse]) -> Check:
     more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
     return Check(
         question,
-        f"Not {', '.join(lost[:_SHOWN])}{more}: 1σ is more than {100 * _TOO_LARGE:.0f} % of the response at half of the lines. Shake these "
-        "axes harder.",
+        f"Not {', '.join(lost[:_SHOWN])}{more}: 1σ is more than {100 * _TOO_LARGE:.0f} % of the response at half of the lines. Increase "
+        f"the torques of these "
+        "axes.",
         "care",
     )
 
 
 def _check_poses(entries: Sequence[Mapping[str, Any]]) -> Check:
-    question = "Is every pose known as well as the others?"
+    question = "Are all poses equally certain?"
     if len(entries) == 1:
         return Check(question, "There is one pose only.", "unknown")
     worst, middle = worst_pose(entries), float(np.median([entry["relative_std"] for entry in entries]))
@@ -103,7 +104,7 @@ def _check_poses(entries: Sequence[Mapping[str, Any]]) -> Check:
 
 
 def _check_freedom(entries: Sequence[Mapping[str, Any]]) -> Check:
-    question = "Is the uncertainty itself known?"
+    question = "Is the uncertainty itself well estimated?"
     freedom = min(entry["degrees_of_freedom"] for entry in entries)
     answer = (
         f"It rests on {freedom:.0f} degrees of freedom, so it is known to {percent((2 * freedom) ** -0.5)}."

@@ -65,7 +65,7 @@ def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
         ),
         Check(
             "Does it touch nothing?",
-            f"Bodies keep {1e3 * document['clearance']:.0f} mm or more beyond their margin."
+            f"The smallest clearance is {1e3 * document['clearance']:.0f} mm beyond the margin."
             if document["clearance"] > 0
             else "Bodies touch.",
             "good" if document["clearance"] > 0 else "bad",
@@ -85,14 +85,14 @@ def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
             "On a real robot.",
         ),
         Fact(
-            "How well is everything excited?",
+            "How well are the parameters excited?",
             significant(document["condition"], 3),
             "",
             f"Condition number of the observation matrix of {document['base_parameters']} base parameters, columns of unit norm.",
         ),
         Fact("Can I run it?", "Yes" if status == "good" else "With care", "", f"{tally(checks)}.", status),
     )
-    headline = "The motions keep every limit" if status == "good" else "Look at the remarks before running it"
+    headline = "The motions keep every limit" if status == "good" else "Read the remarks before running it"
     sentence = (
         "Limits are those of the URDF and of robot.yaml, for the nominal robot with its declared friction."
     )
@@ -149,10 +149,10 @@ def _knowledge(design: TrajectoryDesign, document: Mapping[str, Any]) -> Section
     blocks = (
         FigureBlock(
             "figure-gain",
-            "What is known after, relative to before",
+            "Predicted reduction of the standard deviations",
             prior_gains(names, after),
             "Predicted standard deviations with these trajectories and robot.yaml's prior, over those of the prior alone, for torque noise "
-            "of 0.1 % of the efforts; 1 means that torques do not tell.",
+            "of 0.1 % of the efforts; 1 means no information.",
             f"Ratio of standard deviations after and before for {len(names)} parameters.",
         ),
         Table("table-gain", "The same in numbers", ("parameter", "after / before"), rows, folded=True),

@@ -65,22 +65,22 @@ def comparison_verdict(found: Comparison) -> Verdict:
         )
         sentence = (
             f"The 95 % interval of the difference, {_signed(difference.low)} to {_signed(difference.high)} mm ({second.name} minus "
-            f"{first.name}), includes zero: other points may say the opposite."
+            f"{first.name}), includes zero: at other points the opposite may hold."
         )
     if better.after.p90 > worse.after.p90:
-        sentence += f" Yet nine of ten points are closer in {worse.name}."
+        sentence += f" Yet P90 is smaller in {worse.name}."
     facts = (
         *(
             Fact(
                 f"How accurate is {run.name}?",
                 millimetres(run.after.p90),
                 "mm",
-                f"9 of 10 points are within this. Mean {millimetres(run.after.mean)}, worst {millimetres(run.after.max)} mm.",
+                f"P90 over the points. Mean {millimetres(run.after.mean)}, maximum {millimetres(run.after.max)} mm.",
             )
             for run in (first, second)
         ),
         Fact(
-            "Does it tell of other points?",
+            "Does it hold for other points?",
             _ANSWERS[status],
             "",
             "Read below what the comparison rests on.",
@@ -102,7 +102,7 @@ def _checks(found: Comparison) -> tuple[Check, ...]:
     few = min(len(run.errors) for run in (first, second))
     return (
         Check(
-            "Are these points that no fit saw?",
+            "Are the points outside both fits?",
             f"Not in {' and '.join(seen)}: the model with more terms always comes closer to the points it was fitted to. Verify both on "
             "the same fresh points, and compare these."
             if seen
@@ -113,7 +113,7 @@ def _checks(found: Comparison) -> tuple[Check, ...]:
             "Were both measured at the same points?",
             "Yes: they are compared point by point, and what all points share cancels out."
             if found.difference.paired
-            else "No: a run with easier points looks better. The interval allows for chance, not for that.",
+            else "No: a run with easier points looks better, which the interval does not take into account.",
             "good" if found.difference.paired else "care",
         ),
         Check(
@@ -138,7 +138,7 @@ def _errors(found: Comparison) -> Section:
         "",
         (
             Table(
-                "table-accuracy", "Distances", ("run", "points", "mean / mm", "90 % within / mm", "worst / mm"), tuple(rows)
+                "table-accuracy", "Distances", ("run", "points", "mean / mm", "P90 / mm", "max / mm"), tuple(rows)
             ),
             Text(
                 (
@@ -149,15 +149,15 @@ def _errors(found: Comparison) -> Section:
                         if difference.paired
                         else "The points differ, so the variances of both means are summed."
                     )
-                    + " Neighbours in measuring order err alike; the interval rests on the means of up to twenty stretches of it.",
+                    + " Errors are correlated in measuring order; the interval is from the means of up to twenty blocks.",
                 ),
                 "The difference",
             ),
             FigureBlock(
                 "figure-distribution",
-                "What share of points is better than a given error",
+                "Cumulative distribution of the errors",
                 error_distribution(series, {}),
-                "Read across at 90 %: nine of ten points have an error smaller than where the curve crosses. Farther left is better.",
+                "P90 is where a curve crosses 90 %. Farther left is better.",
                 f"Cumulative distributions; 90 % of points are within {millimetres(first.after.p90)} and "
                 f"{millimetres(second.after.p90)} mm.",
             ),
@@ -168,8 +168,8 @@ def _errors(found: Comparison) -> Section:
 def _parameters(found: Comparison) -> Section:
     shared = found.shared
     words = (
-        f"Both runs used {', '.join(shared)}, so their estimates are not independent: noise moved both alike, and a difference comes from "
-        "the model, the options or what else was measured. The root of the summed variances is only a yardstick here, no test."
+        f"Both runs used {', '.join(shared)}, so their estimates are not independent: they share their noise, and differences come from "
+        f"the model, the options or other measurements. The root of the summed variances is a scale here, not a test."
         if shared
         else "The runs share no measurement, so their estimates are independent: by chance, a difference exceeds 1.96 times the root of "
         f"the summed variances in {100 * LEVEL:.0f} of 100 parameters."
@@ -189,7 +189,7 @@ def _changes(comparison: Comparison, block: Block) -> Sequence[PageBlock]:
     if not comparison.shared and found.changes:
         chance = "less than 0.1 %" if found.probability < 1e-3 else f"{100 * found.probability:.2g} %"
         words += (
-            f" Chance alone would give about {LEVEL * len(found.changes):.1f}; it makes all of them together as different in {chance} of "
+            f" By chance, about {LEVEL * len(found.changes):.1f}; it makes all of them together as different in {chance} of "
             "all cases."
         )
     if found.others:

@@ -30,7 +30,6 @@ from flexcal.report.sections.stiffness import stiffness_section
 from flexcal.report.sections.verification import verification_section
 from flexcal.report.study import TwoStageStudy
 from flexcal.report.trust import Trust
-from flexcal.units import MILLIMETRE
 
 HEADLINES: dict[Status, str] = {
     "good": "Calibrated, and the numbers can be trusted",
@@ -77,8 +76,9 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
     checks = two_stage_checks(study)
     trust = Trust(checks)
     sentence = (
-        f"Before, the robot's own error was up to {millimetres(before.max)} mm. On {after.poses} fresh poses it is "
-        f"now within {millimetres(after.p90)} mm at nine of ten and {millimetres(after.max)} mm at worst: {ratio(before.p90, after.p90)} "
+        f"Before, the robot's own error was up to {millimetres(before.max)} mm. On {after.poses} fresh poses the "
+        f"calibrated robot has a P90 of {millimetres(after.p90)} mm and a maximum of {millimetres(after.max)} mm: "
+        f"{ratio(before.p90, after.p90)} "
         f"better. The best calibration without elasticity would leave {millimetres(rigid.p90)} and {millimetres(rigid.max)} mm."
     )
     return Verdict(
@@ -96,7 +96,6 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict: those that a real robot would have too."""
     found, geometry, determined, fresh = study.stiffness, study.geometry, study.determined, study.verification
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
-    drift = study.results["calibration_fit"]["drift"]
     return (
         check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all).named(
             "fresh_poses", independent=True
@@ -110,7 +109,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         check_residual("Does the measurement noise explain the residuals of the responses?", found).named(
             "residual_stiffness"
         ),
-        check_drift(drift["distance_mm"] * MILLIMETRE, certain=drift["certain"]).named("drift"),
+        check_drift(study.results["calibration_fit"]["drift"]).named("drift"),
         check_springs(found, stiffness, damping).named("springs"),
         check_rank(determined.parameters, determined.rank, determined.gap).named("rank"),
         check_flanks(fresh).named("flanks"),

@@ -61,7 +61,7 @@ def verification_page(study: VerificationStudy) -> Page:
     return Page(
         title=f"{results['robot']}: verification report",
         subtitle=f"Accuracy of the calibrated robot at {len(study.points.poses)} measured points"
-        + ("" if results["fitted"] else " that the fit never saw"),
+        + ("" if results["fitted"] else " outside the fit"),
         verdict=_verdict(study),
         sections=(
             _errors_section(study),
@@ -82,8 +82,8 @@ def _verdict(study: VerificationStudy) -> Verdict:
     return Verdict(
         trust.status,
         _HEADLINES[trust.status],
-        f"At nine of ten of {after.poses} {noun} the calibrated model is within {millimetres(after.p90)} mm of what the instrument "
-        f"reads, and within {millimetres(after.max)} mm at all of them. The instrument's own noise is part of these numbers.",
+        f"At {after.poses} {noun} errors of the calibrated model have a P90 of {millimetres(after.p90)} mm and a maximum of "
+        f"{millimetres(after.max)} mm. The instrument's noise is included.",
         three_facts(before, after, trust, "points"),
         (*before_rungs(study.points), rung("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} {noun}, against the instrument",
@@ -119,7 +119,7 @@ def _errors_section(study: VerificationStudy) -> Section:
         Table(
             "table-accuracy",
             "Distances",
-            ("model", "points", "mean / mm", "90 % within / mm", "worst / mm"),
+            ("model", "points", "mean / mm", "P90 / mm", "max / mm"),
             tuple(rows),
             note=BEFORE_NOTE,
         ),
@@ -134,20 +134,20 @@ def _errors_section(study: VerificationStudy) -> Section:
         ),
         FigureBlock(
             "figure-distribution",
-            "What share of points is better than a given error",
+            "Cumulative distribution of the errors",
             error_distribution(series, {}),
-            "Read across at 90 %: nine of ten points have an error smaller than where the curve crosses.",
-            f"Cumulative distribution; 90 % of points are within {millimetres(result.all.p90)} mm.",
+            "P90 is where a curve crosses 90 %.",
+            f"Cumulative distribution; P90 is {millimetres(result.all.p90)} mm.",
         ),
     ]
     if poses.sigma_given:
         blocks.append(
             FigureBlock(
                 "figure-predicted",
-                "Predicted against observed errors",
+                "Observed against predicted errors",
                 predicted_quantiles(result, poses.sigma),
                 "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed "
-                "line: the prediction was right. Above it: the robot is worse than promised. Below: better.",
+                "line: the prediction was right. Above it: errors are larger than predicted. Below: smaller.",
                 "Sorted observed errors against predicted quantiles.",
             )
         )
@@ -162,7 +162,7 @@ def _errors_section(study: VerificationStudy) -> Section:
 def _residuals_section(study: VerificationStudy) -> Section:
     return Section(
         "residuals",
-        "What the errors go with",
-        "Errors that grow with a joint, with time or towards one side of the working volume tell what the model lacks.",
+        "Errors by joint, time and place",
+        "Errors that grow with a joint, with time or towards one side of the working volume indicate what the model lacks.",
         residual_blocks(study.results["joints"], study.points.poses, study.points.calibrated),
     )

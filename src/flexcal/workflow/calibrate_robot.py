@@ -110,7 +110,7 @@ class RobotCalibration:
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),
             },
-            "drift": {"distance_mm": drift.distance / MILLIMETRE, "certain": drift.certain},
+            "drift": drift.document(),
             "outliers": [
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)

@@ -55,8 +55,8 @@ def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
     drift = Drift.of(fit)
     if drift.certain:
         remarks.append(
-            f"what the fit leaves goes with the order of measuring, {drift.distance / MILLIMETRE:.3f} mm from the first pose to the last: "
-            "something warmed up or settled, or place and order went together"
+            f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "
+            "robot or instrument warmed up or settled, or place and order are correlated"
         )
     far = moved_far(fit)
     if far:

@@ -236,6 +236,6 @@ def _write_table(out: Path, found: AccuracyMap) -> None:
 
 
 def _spread(values: np.ndarray) -> dict[str, float]:
-    """Median, nine of ten and worst over the poses, mm."""
+    """Median, P90 and maximum over the poses, mm."""
     median, most, worst = (float(v) / MILLIMETRE for v in np.quantile(values, [0.5, 0.9, 1.0]))
     return {"median_mm": median, "p90_mm": most, "worst_mm": worst}

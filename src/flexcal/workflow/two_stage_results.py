@@ -45,7 +45,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
             "nominal": run.before.document()["registered"],
             "rigid": run.rigid[0].errors.in_millimetres(),
             "wrong_flanks": wrong_flanks(run),
-            "drift": {"distance_mm": drift.distance / MILLIMETRE, "certain": drift.certain},
+            "drift": drift.document(),
         },
         "rigid_fits": [{"poses": len(c.poses), "rank": c.identifiability.rank} for c in run.rigid],
         "verification": {

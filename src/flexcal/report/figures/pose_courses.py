@@ -21,7 +21,7 @@ def pose_courses(drifting: Sequence[Mapping[str, Any]]) -> go.Figure:
     longest = max(item["t_s"][-1] for item in drifting) - start
     unit, word = (_HOUR, "h") if longest > 2 * _HOUR else (_MINUTE, "min")
     figure = panels(
-        2, 1, 460, ["way of the barycentre from that of the first set / mm", "RP / mm"], row_gap=0.16
+        2, 1, 460, ["displacement of the barycentre from that of the first set / mm", "RP / mm"], row_gap=0.16
     )
     for k, item in enumerate(drifting):
         line = {

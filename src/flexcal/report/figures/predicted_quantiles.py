@@ -1,4 +1,4 @@
-"""Predicted against observed errors: whether the uncertainty that was claimed is the one that was found."""
+"""Observed against predicted errors: whether the uncertainty that was claimed is the one that was found."""
 
 from __future__ import annotations
 

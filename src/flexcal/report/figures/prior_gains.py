@@ -21,7 +21,7 @@ def prior_gains(names: Sequence[str], after: np.ndarray) -> go.Figure:
             y=[names[k] for k in order],
             mode="markers",
             marker={"color": ELASTIC, "size": 7},
-            hovertemplate="%{y}: %{x:.3g} of what it was<extra></extra>",
+            hovertemplate="%{y}: %{x:.3g} of the prior standard deviation<extra></extra>",
         )
     )
     low = int(np.floor(np.log10(max(float(after.min(initial=1.0)), 1e-9))))

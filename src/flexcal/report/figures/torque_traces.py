@@ -24,7 +24,7 @@ def torque_traces(joints: Sequence[str], logs: Mapping[str, TorquePrediction]) -
         curves = (
             ("measured", log.measured, np.ones_like(unseen), NOMINAL, 2.2),
             ("predicted, in the fit", log.predicted, ~unseen, ELASTIC, 1.2),
-            ("predicted, never seen by the fit", log.predicted, unseen, RIGID, 1.2),
+            ("predicted, outside the fit", log.predicted, unseen, RIGID, 1.2),
         )
         for kind, torque, part, colour, width in curves:
             if not part.any():

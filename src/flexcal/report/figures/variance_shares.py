@@ -27,8 +27,6 @@ def variance_shares(over_all: Mapping[str, float], worst: Mapping[str, float]) -
                 hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
             )
         )
-    figure.update_xaxes(
-        title_text="variance that knowing it would take away", ticksuffix=" %", range=[0, 100]
-    )
+    figure.update_xaxes(title_text="reduction of the variance if known", ticksuffix=" %", range=[0, 100])
     figure.update_yaxes(autorange="reversed")
     return figure

@@ -21,9 +21,9 @@ def base_parameters_section(results: Mapping[str, Any], estimate: Estimate) -> S
     stay, error = len(essential["parameters"]), essential["error_percent"]
     unseen = error["held_out"]
     words = (
-        f"{stay} of them are essential: with all others zero, the fit misses {significant(error['train'], 3)} % of the norm of the "
-        f"torques instead of {significant(results['error_percent']['train'], 3)} %"
-        + (f", and {significant(unseen, 3)} % where it did not look." if unseen is not None else ".")
+        f"{stay} of them are essential: with all others zero, the relative torque error is {significant(error['train'], 3)} % "
+        f"instead of {significant(results['error_percent']['train'], 3)} %"
+        + (f", and {significant(unseen, 3)} % on data outside the fit." if unseen is not None else ".")
     )
     blocks: list[Block] = [Text((words,)), _table(base)]
     names, correlation = base_correlation(base, estimate)
@@ -31,9 +31,9 @@ def base_parameters_section(results: Mapping[str, Any], estimate: Estimate) -> S
         blocks += [_map(names, correlation), _strongest(names, correlation)]
     return Section(
         "base-parameters",
-        "What the recordings determine",
-        "Torques depend on the links only through combinations of their masses, first moments and inertias: the base parameters. A single "
-        "mass in them need not be what a scale would show.",
+        "Base parameters",
+        "Torques depend on the links only through combinations of their masses, first moments and inertias: the base parameters. A "
+        "single mass in them is not identifiable by itself.",
         tuple(blocks),
     )
 
@@ -74,9 +74,9 @@ def _table(base: Sequence[Mapping[str, Any]]) -> Table:
 def _map(names: tuple[str, ...], correlation: np.ndarray) -> FigureBlock:
     return FigureBlock(
         "figure-correlation",
-        "How the errors of base parameters go together",
+        "Correlation of the base parameters",
         correlation_map(names, correlation),
-        "Blue pairs err in the same direction, red ones in opposite ones; the paler, the better the motion tells them apart.",
+        "Correlation coefficients of the estimates: blue is positive, red is negative. Pale pairs are well separated by the motion.",
         f"Correlations of {len(names)} base parameters; the strongest are in the table below.",
     )
 
@@ -90,9 +90,9 @@ def _strongest(names: tuple[str, ...], correlation: np.ndarray) -> Table:
     )
     return Table(
         "table-correlation",
-        "The pairs that are hardest to tell apart",
+        "Most correlated pairs",
         ("base parameter", "and", "correlation"),
         rows,
-        "A motion that moves the two differently would separate them.",
+        "A trajectory that excites the two independently would separate them.",
         text_columns=(1,),
     )

@@ -25,7 +25,7 @@ def comparison_section(study: TwoStageStudy) -> Section:
         ("fresh poses, elastic calibration", fresh.all, paper.elastic if paper else None),
         ("… flank certain", fresh.unambiguous, None),
     ]
-    columns = ["errors at", "poses", "mean / mm", "90 % within / mm", "worst / mm"]
+    columns = ["errors at", "poses", "mean / mm", "P90 / mm", "max / mm"]
     columns += [f"{paper.short}, 90 %", f"{paper.short}, worst"] if paper else []
     rows = []
     for label, ours, theirs in errors:
@@ -47,7 +47,7 @@ def comparison_section(study: TwoStageStudy) -> Section:
     ]
     if paper is not None:
         blocks.append(Text((), "Before comparing", (*paper.remarks, f"Source: {paper.citation}.")))
-    lead = "The same procedure, run here and published." if paper else "The numbers of this run in one place."
+    lead = "The procedure as run here and as published." if paper else "The numbers of this run in one place."
     return Section(
         "numbers", "All numbers beside the paper's" if paper else "All numbers", lead, tuple(blocks)
     )

@@ -25,18 +25,17 @@ def friction_section(results: Mapping[str, Any]) -> Section:
             for row in tried
         )
         rule = (
-            "a further term has to lower the error by a hundredth of itself"
+            "a further term has to reduce the error by 1 %"
             if not tried[0]["terms"]
             else "robot.yaml names the terms, and each has the shape with the smallest error"
         )
         blocks.append(
             Table(
                 "table-friction",
-                "Terms tried beyond the plain ones, in order",
+                "Friction terms that were tried, in order",
                 ("terms", "cross-validated error / %"),
                 rows,
-                "Errors are of parts of the training data that were left out in turn, as a share of the norm of the torques. In bold: "
-                f"what was taken; {rule}.",
+                f"Relative torque errors in cross-validation. In bold: the chosen terms; {rule}.",
                 strong=(taken,),
                 folded=len(rows) > LONG,
             )

@@ -32,9 +32,9 @@ def geometry_section(study: TwoStageStudy) -> Section:
     return Section(
         "stage2",
         "Stage 2: geometry",
-        f"A laser tracker measured the tool in {len(poses)} poses. With the springs known, the arm's sag is computed for each pose and "
-        "what remains is geometry: axes that are not quite parallel, links that are not quite as long as drawn, zero positions of the "
-        "encoders, and play in the gears.",
+        f"A laser tracker measured the tool in {len(poses)} poses. With the springs known, the arm's deflection under gravity is "
+        f"computed for each pose; the remaining errors are geometric: axes that are not parallel, link lengths, joint offsets and "
+        f"backlash.",
         (
             arm_figure(study.arms, len(poses), "Figure 10"),
             *([] if before is None else [error_figure(poses, before, after, "Figure 11")]),
@@ -58,10 +58,10 @@ def arm_figure(arms: ArmPoses, total: int, number: str = "") -> FigureBlock:
     )
     return FigureBlock(
         "figure-10",
-        title(number, f"the arm, and which way the {total} measured points are off"),
+        title(number, f"arm and error vectors of the {total} measured points"),
         arm_poses(arms, labels, factors),
-        f"{some}The arm as lines from joint to joint, {drawn}; drag to turn it. Arrows show which way and how far a measured point is "
-        f"from the predicted one, exaggerated as chosen above; the longest is {largest}.",
+        f"{some}The arm as lines from joint to joint, {drawn}; drag to turn it. Arrows point from the predicted to the measured point, "
+        f"exaggerated as chosen above; the longest is {largest}.",
         f"Three-dimensional line drawing of the arm {drawn} with exaggerated error arrows; the longest is {largest}.",
         (Selector("Error arrows", "arrows", tuple(labels.values())),),
         Slider("Exaggeration", "arrows", _FACTORS, {labels[model]: factors[model] for model in labels}),
@@ -86,10 +86,10 @@ def component_figure(poses: PoseSet, residuals: np.ndarray) -> FigureBlock:
     largest = np.abs(residuals).max(axis=0)
     return FigureBlock(
         "figure-12",
-        "Figure 12: what is left at the calibration poses, by coordinate",
+        "Figure 12: residuals at the calibration poses, by coordinate",
         error_components(poses, residuals),
         "Measured minus predicted position in the instrument's frame. Bars that stay within the dotted lines and change sign at random are "
-        "measurement noise; a pattern would be something that the model misses.",
+        "measurement noise; a pattern indicates a term that the model lacks.",
         "Residuals by pose; the largest are "
         + ", ".join(f"{millimetres(float(v))} mm in {axis}" for v, axis in zip(largest, "xyz", strict=True))
         + ".",

@@ -55,8 +55,9 @@ def identifiability_blocks(found: Determined, paper: Publication | None) -> tupl
     dropped = found.parameters - found.rank
     words = (
         f"Of {found.parameters} geometric parameters, the measured points determine {found.rank} combinations. The other {dropped} would "
-        "move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, cannot be told apart. "
-        "They stay at their nominal values, and the kept ones absorb what they would have been; predictions lose nothing by it."
+        "move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, are not separately "
+        "identifiable. They stay at their nominal values, and the kept ones absorb what they would have been; predictions lose nothing "
+        "by it."
     )
     paragraphs = [words]
     if paper is not None and paper.rank is not None and paper.rank != found.rank:
@@ -65,14 +66,14 @@ def identifiability_blocks(found: Determined, paper: Publication | None) -> tupl
             "differences blur the gap below, which the figure shows to be wide, and can make a dependent parameter look independent."
         )
     blocks: list[Block] = [
-        Text(tuple(paragraphs), "What the poses can and cannot tell"),
+        Text(tuple(paragraphs), "Identifiability"),
         FigureBlock(
             "figure-rank",
-            "The gap between determined and undetermined",
+            "Singular values of the identification Jacobian",
             singular_values(found.singular_values, found.diagonal, found.rank, found.gap),
             "Each mark is one direction in the space of parameters, by how far it moves the measured points, relative to the strongest. "
-            "Blue directions are determined; grey ones are rounding errors of the computer. The wider the gap between them, the less the "
-            "choice depends on a threshold.",
+            "Blue directions are determined; grey ones are numerically zero. The wider the gap between them, the less the rank depends "
+            "on a threshold.",
             f"Singular values and the diagonal of R of {found.parameters} parameters; {found.rank} are kept, {dropped} are smaller by "
             f"{found.gap:.0f} decades.",
         ),
@@ -110,7 +111,7 @@ def _amount(coefficient: float) -> str:
 def _weak_table(found: Determined) -> Table:
     return Table(
         "table-weak",
-        "The weakest combinations that were kept",
+        "Least determined combinations of the kept parameters",
         ("combination", "strength, relative to the strongest"),
         tuple((name, f"{value:.1e}") for name, value in found.weak),
         "These have the widest intervals; more or better spread poses strengthen them.",

@@ -17,16 +17,16 @@ def learned_section(learned: Mapping[str, Any], held_out: str) -> Section:
     where = held_out or "the recordings of the fit"
     shown = error["held_out"] or error["train"]
     verdict = (
-        f"Stored in {PurePath(file).name}. With it, the torques of {where} are missed by {significant(shown['with'], 3)} % instead of "
+        f"Stored in {PurePath(file).name}. With it, the relative torque error of {where} is {significant(shown['with'], 3)} % instead of "
         f"{significant(shown['without'], 3)} %."
         if file
-        else "Nothing was learned: no motor's torques are predicted better with it in left-out blocks of the fit."
+        else "No residual model was kept: it reduced the cross-validation error of no motor."
     )
     motors = [
         (
             row["motor"],
             *(significant(row["cross_validation_percent"][key], 3) for key in ("without", "with")),
-            "learned" if row["learned"] else "not worth it",
+            "learned" if row["learned"] else "no gain",
         )
         for row in learned["motors"]
     ]
@@ -41,21 +41,22 @@ def learned_section(learned: Mapping[str, Any], held_out: str) -> Section:
     return Section(
         "learned",
         "Learned residual torque",
-        "What the physical model misses, as a function of position, speed and predicted torque of each motor. It is added to predicted "
+        "Residual torque of the physical model as a function of position, speed and predicted torque of each motor. It is added to "
+        "predicted "
         "torques only: every parameter and interval on this page is as it would be without.",
         (
             Text((verdict,)),
             Table(
                 "table-learned-motors",
-                "Torques of the motors missed in left-out blocks of the fit",
+                "Relative torque errors of the motors in cross-validation",
                 ("motor", "without / %", "with / %", "verdict"),
                 tuple(motors),
-                "Each block is predicted from physical parameters and residuals of the others alone. An error has to fall by a hundredth.",
+                "Each block is predicted from physical parameters and residuals of the others alone. The error has to fall by 1 %.",
                 text_columns=(3,),
             ),
             Table(
                 "table-learned-joints",
-                f"Torques of the joints missed, of {where}",
+                f"Relative torque errors of the joints, {where}",
                 ("joint", "without / %", "with / %", "inside 95 % interval / % of rows"),
                 tuple(joints),
             ),

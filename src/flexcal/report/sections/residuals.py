@@ -25,8 +25,8 @@ def residuals_section(
         blocks = (*blocks, _outlier_table(poses, residuals, outliers))
     return Section(
         "residuals",
-        "What the fit leaves",
-        "If the model is complete, nothing of what is left depends on when or where it was measured.",
+        "Residuals",
+        "If the model is complete, residuals depend neither on time nor on the pose.",
         blocks,
     )
 
@@ -40,8 +40,8 @@ def residual_blocks(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
             "figure-order",
             "Residuals in the order of measuring",
             residual_trend(np.arange(1.0, len(poses) + 1), residuals, "measurement, in order"),
-            "A drift of the running mean points to warm-up or a moving instrument, a step to a bump. Scatter about zero is what remains "
-            "when the model is right.",
+            "A drift of the running mean indicates warm-up or a moving instrument, a step a collision. With a complete model residuals "
+            "scatter about zero.",
             f"Residuals of {len(poses)} points by coordinate in measuring order, with a running mean.",
         )
     ]
@@ -62,15 +62,16 @@ def residual_blocks(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
             "figure-joints",
             "Residuals against every joint",
             residual_joints(joints, poses, residuals),
-            "A wave over one joint is an error of its transmission; growth towards one end is sag that the model misses.",
+            "A periodic pattern over a joint indicates transmission errors; growth towards one end indicates deflection that the model "
+            "lacks.",
             "Error against the position of each joint, with means in bins.",
         ),
         FigureBlock(
             "figure-workspace",
             "Residuals in the working volume",
             residual_workspace(poses, residuals),
-            "Each measured point in the instrument's frame, coloured by its error; drag to turn. Neighbours of one colour mean that the "
-            "model misses something that depends on where the robot is.",
+            "Each measured point in the instrument's frame, coloured by its error; drag to turn. Regions of one colour indicate errors "
+            "that depend on the place in the workspace.",
             f"Points in space coloured by error; the largest, {millimetres(float(distance[worst]))} mm, is at pose "
             f"{int(poses.pose[worst])}.",
         ),
@@ -82,13 +83,13 @@ _CONDITIONS = (
     (
         "time",
         "time / s",
-        "A slope or a curve that flattens is an arm that warms up or an instrument that settles; breaks show as gaps.",
+        "A slope or a curve that flattens indicates an arm that warms up or an instrument that settles; breaks show as gaps.",
     ),
     (
         "temperature",
         "temperature, as in the file",
-        "No term of the model depends on the temperature. A slope here is what warming does to arm and instrument; measure warm, or "
-        "calibrate again at the temperature of work.",
+        "No term of the model depends on the temperature. A slope indicates thermal expansion of arm or instrument; measure warm, or "
+        "calibrate again at working temperature.",
     ),
 )
 
@@ -102,7 +103,7 @@ def _outlier_table(poses: PoseSet, residuals: np.ndarray, outliers: Sequence[int
     more = len(rows) - len(cells)
     return Table(
         "table-outliers",
-        f"{len(rows)} outliers that the robust loss set aside",
+        f"{len(rows)} outliers, to which the robust loss gave hardly any weight",
         ("pose", "point", "distance / mm"),
         cells,
         f"And {more} more, listed in results.json." if more > 0 else "",

@@ -17,8 +17,9 @@ def levels_block(
         id,
         title,
         response_levels(responses, labels),
-        f"How strongly each motor accelerates (row) for a torque on each motor (column), at {len(responses[0].frequencies_hz)} "
-        "frequencies. Valleys and peaks are the arm swinging on its springs. The lower curves are one standard deviation of the mean: "
+        f"Acceleration of each motor (row) for a torque on each motor (column), at {len(responses[0].frequencies_hz)} "
+        "frequencies. Valleys and peaks are antiresonances and resonances of the elastic arm. The lower curves are one standard "
+        "deviation of the mean: "
         "noise of the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
         in_words(responses),
         (Selector("Pose", "pose", tuple(labels)),) if len(labels) > 1 else (),

@@ -84,7 +84,7 @@ def _reason(estimate: Estimate, name: str) -> str:
     spread = float(estimate.covariance[number, number]) ** 0.5
     dropped = next((d for d in estimate.dropped if d.name == name), None)
     if dropped is not None and dropped.absorbed_by:
-        return f"the data cannot tell it from {', '.join(n for n, _ in dropped.absorbed_by[:3])}."
+        return f"the data do not distinguish it from {', '.join(n for n, _ in dropped.absorbed_by[:3])}."
     if dropped is not None or spread == 0:
         return "the measured responses do not depend on it in these poses."
     return (

@@ -28,13 +28,13 @@ def stage_zero_section(study: TwoStageStudy) -> Section | None:
         Text(
             (
                 "The robot followed periodic trajectories without payload; masses, centres of mass, rotors and friction were fitted to its "
-                "torques with CAD as the prior. Torques at the motors determine combinations of these only. What they leave open stays as "
-                "uncertain as CAD, and both stages know that.",
+                "torques with CAD as the prior. Torques at the motors determine combinations of these only. Undetermined combinations "
+                "keep the uncertainty of CAD, which both stages take into account.",
             )
         )
     )
     return Section(
-        "stage0", "Stage 0: link inertials", "What the links weigh, before anything elastic.", tuple(blocks)
+        "stage0", "Stage 0: link inertials", "Link inertials before elasticity is identified.", tuple(blocks)
     )
 
 
@@ -44,8 +44,8 @@ def _gain_table(study: TwoStageStudy) -> Table:
     springs = [_stiffnesses(results) for results in both]
     errors = [np.array([abs(q["estimate"] / q["truth"] - 1) for q in found.values()]) for found in springs]
     rows: list[tuple[str, ...]] = [
-        ("stage 1: largest of all stiffness errors", *(_percent(float(e.max())) for e in errors)),
-        ("stage 1: median of all stiffness errors", *(_percent(float(np.median(e))) for e in errors)),
+        ("stage 1: largest stiffness error", *(_percent(float(e.max())) for e in errors)),
+        ("stage 1: median stiffness error", *(_percent(float(np.median(e))) for e in errors)),
     ]
     for name in study.springs("stiffness"):
         stds = (_relative_std(found[name]) for found in springs)
@@ -54,18 +54,18 @@ def _gain_table(study: TwoStageStudy) -> Table:
     every = [ErrorStatistics.of_millimetres(found["elastic"]) for found in fresh]
     certain = [ErrorStatistics.of_millimetres(found["elastic_unambiguous"]) for found in fresh]
     rows += [
-        ("stage 2: mean of the fresh poses / mm", *(millimetres(v.mean) for v in every)),
-        ("stage 2: 90 % of them within / mm", *(millimetres(v.p90) for v in every)),
+        ("stage 2: mean error at fresh poses / mm", *(millimetres(v.mean) for v in every)),
+        ("stage 2: P90 at fresh poses / mm", *(millimetres(v.p90) for v in every)),
         ("stage 2: worst / mm", *(millimetres(v.max) for v in every)),
-        ("stage 2: worst, flank certain / mm", *(millimetres(v.max) for v in certain)),
+        ("stage 2: maximum, flank certain / mm", *(millimetres(v.max) for v in certain)),
         (
-            "stage 2: what the intervals expect, rms / mm",
+            "stage 2: predicted rms / mm",
             *(document_millimetres(found["expected_rms_mm"]) for found in fresh),
         ),
     ]
     return Table(
         "table-stage0-gain",
-        "What stage 0 buys: both stages fitted to the same data",
+        "Effect of stage 0: both stages fitted to the same data with and without it",
         ("number", "inertials of CAD alone", "with stage 0"),
         tuple(rows),
     )

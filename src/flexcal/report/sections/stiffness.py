@@ -37,7 +37,7 @@ def stiffness_section(study: TwoStageStudy) -> Section:
             "Estimates and their 95 % intervals",
             spring_intervals(estimate, stiffness, damping, study.truth, "the truth"),
             "Each dot is an estimate relative to the truth, each bar its 95 % interval: about 19 of 20 bars should reach zero. Bars "
-            "that leave the picture are cut.",
+            "beyond the axis are cut.",
             f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to the truth, with 95 % intervals. "
             "The numbers are in Table 1.",
         ),
@@ -46,8 +46,9 @@ def stiffness_section(study: TwoStageStudy) -> Section:
     return Section(
         "stage1",
         "Stage 1: springs and dampers",
-        "Motors and bearings give way under load, so the arm is not where its motors are. Small random torques on the motors, and the "
-        "accelerations that answer, show how stiff each drive and each bearing is: the arm resonates where its springs say. "
+        "Drives and bearings deflect under load, so the arm is not where the motor encoders put it. Small random torques excite the "
+        "motors, and the "
+        "resonances in the measured accelerations determine the stiffness of each drive and bearing. "
         f"{_experiment(study)}",
         tuple(blocks),
     )
@@ -67,7 +68,7 @@ def response_blocks(responses: Sequence[FittedResponse], estimate: Estimate) -> 
             "figure-7",
             "Figures 7 to 9: measured responses against the fitted model",
             response_fit(responses, labels),
-            "Dots are measured, lines are the model with the one set of springs and dampers that fits all poses at once. Where an element "
+            "Dots: measured. Lines: model with one set of springs and dampers fitted to all poses. Where an element "
             "nearly vanishes, because the pose hardly couples the two axes, dots scatter and carry little weight.",
             f"Magnitudes of all elements and phases of the diagonal ones in {len(labels)} poses; the table below says how well they fit.",
             (Selector("Pose", "pose", labels),),
@@ -82,7 +83,7 @@ def _experiment(study: TwoStageStudy) -> str:
     low, high = plan.frequencies_hz.min(), plan.frequencies_hz.max()
     return (
         f"Here: {len(plan.poses)} poses, {len(plan.lines)} frequencies from {low:.1f} to {high:.1f} Hz, {plan.realisations} random draws, "
-        f"{minutes:.0f} minutes of shaking in all."
+        f"{minutes:.0f} minutes of excitation in all."
     )
 
 
@@ -103,7 +104,7 @@ def _fit_table(responses: Sequence[FittedResponse], estimate: Estimate, labels: 
         )
     return Table(
         "table-fit",
-        "How well the model fits, pose by pose",
+        "Goodness of fit by pose",
         (
             "pose",
             "mean joint position",
@@ -115,6 +116,6 @@ def _fit_table(responses: Sequence[FittedResponse], estimate: Estimate, labels: 
         tuple(rows),
         f"Over all poses χ² per degree of freedom is {estimate.reduced_chi2:.2f} ({estimate.degrees_of_freedom} degrees of freedom, "
         f"{estimate.status} after {estimate.iterations} iterations). Misfit over std near one means that noise and distortion explain "
-        "what is left.",
+        "the residuals.",
         text_columns=(1,),
     )

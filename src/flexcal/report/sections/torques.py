@@ -32,8 +32,8 @@ def torque_blocks(
     blocks: list[Block] = [
         Table(
             "table-torques",
-            f"Torques missed, of {where}",
-            ("joint", "missed / % of the norm of its torques"),
+            f"Relative torque error, {where}",
+            ("joint", "relative error / % of the norm of its torques"),
             tuple(rows),
             strong=(len(rows) - 1,),
         )
@@ -51,7 +51,7 @@ def _traces(
     stride = max(log.stride for log in logs.values())
     thinned = f" Of a long recording only one row in up to {stride} is drawn." if stride > 1 else ""
     unseen = any(log.held_out.any() for log in logs.values())
-    red = ", red in the part that the fit never saw" if unseen else ""
+    red = ", red outside the fit" if unseen else ""
     return FigureBlock(
         "figure-torques",
         "Torques over time",
@@ -68,10 +68,10 @@ def _spectra(
 ) -> FigureBlock:
     return FigureBlock(
         "figure-spectra",
-        "Where in frequency torques are missed",
+        "Spectrum of the residual torque",
         torque_spectra(joints, logs),
-        "A flat red line is noise. Where it follows the grey one, the model lacks something there: at low frequencies mostly friction, at "
-        "a single peak a resonance or the ripple of a gear. All rows count, standstill and what the fit never saw among them.",
+        "A flat red spectrum is noise. Where it follows the grey one, the model lacks a term: at low frequencies mostly friction, at a "
+        "single peak a resonance or gear ripple. All rows count, including standstill and rows outside the fit.",
         f"Amplitude densities of measured torque and residual of {len(joints)} joints.",
         choice,
     )

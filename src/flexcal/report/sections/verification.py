@@ -34,36 +34,36 @@ def verification_section(study: TwoStageStudy) -> Section:
         accuracy_table(study),
         FigureBlock(
             "figure-13",
-            f"Figure 13: error at {elastic.all.poses} poses that the fit never saw",
+            f"Figure 13: error at {elastic.all.poses} poses outside the fit",
             verification_errors(fresh.poses, series, elastic, paper.elastic if paper else None),
             "Distance from the noise-free truth, on a logarithmic scale. Orange: the best fit of a rigid arm. Blue: with elasticity. "
             + (
-                f"Ringed: {unclear} poses where gravity hardly loads a joint with backlash, so its side is not certain."
+                f"Ringed: {unclear} poses where gravity hardly loads a joint with backlash, so its flank is uncertain."
                 if unclear
-                else "At every pose the side of the backlash is certain."
+                else "At every pose the flank of the backlash is certain."
             ),
             f"Errors of the elastic calibration reach {millimetres(elastic.all.max)} mm, those of the rigid one "
             f"{millimetres(rigid.max)} mm.",
         ),
         FigureBlock(
             "figure-distribution",
-            "What share of poses is better than a given error",
+            "Cumulative distribution of the errors",
             error_distribution(everything, published),
-            "Read across at 90 %: nine of ten poses have an error smaller than where the curve crosses. Curves farther left are better.",
-            f"Cumulative distributions; 90 % of poses are within {millimetres(elastic.all.p90)} mm with elasticity, "
+            "P90 is where a curve crosses 90 %. Curves farther left are better.",
+            f"Cumulative distributions; P90 is {millimetres(elastic.all.p90)} mm with elasticity, "
             f"{millimetres(rigid.p90)} mm without, and {millimetres(before.p90)} mm before.",
         ),
         FigureBlock(
             "figure-predicted",
-            "Predicted against observed errors",
+            "Observed against predicted errors",
             predicted_quantiles(elastic, study.unpredicted_noise),
             "The covariance of the parameters, with the floor, predicts how large errors should be. Points on the dashed line: the "
-            "prediction was right. Above it: the robot is worse than promised. Below: better. The poses share one set of parameters, so "
-            "the whole row of points may lie somewhat to one side by chance.",
+            "prediction was right. Above it: errors are larger than predicted. Below: smaller. Errors are correlated between poses, so "
+            "all points may lie on one side by chance.",
             "Sorted observed errors against the quantiles predicted from the covariance of the parameters.",
         ),
         Text(_floor_words(study), "What limits the accuracy"),
-        Text(_rigid_words(study), "Why a rigid model is not enough"),
+        Text(_rigid_words(study), "Comparison with a rigid model"),
     ]
     return Section(
         "verification",
@@ -88,12 +88,12 @@ def accuracy_table(study: TwoStageStudy) -> Table:
     rows.append(row(f"elastic calibration, {len(study.points.poses)} poses", elastic.all))
     if elastic.ambiguous.any():
         rows.append(row("… where the backlash flank is certain", elastic.unambiguous))
-    rows.append(row("… as the instrument sees it", study.errors("measured"), "instrument"))
-    rows.append(row("floor: every parameter known", study.errors("floor")))
+    rows.append(row("… as measured by the instrument", study.errors("measured"), "instrument"))
+    rows.append(row("floor: all parameters known exactly", study.errors("floor")))
     return Table(
         "table-accuracy",
         "Accuracy on fresh poses",
-        ("model", "poses", "mean / mm", "90 % within / mm", "worst / mm", "against"),
+        ("model", "poses", "mean / mm", "P90 / mm", "max / mm", "against"),
         tuple(rows),
         text_columns=(5,),
         strong=(strong,),
@@ -104,9 +104,10 @@ def _floor_words(study: TwoStageStudy) -> tuple[str, ...]:
     elastic, floor = study.verification.all, study.errors("floor")
     std = study.verification.parameter_rms
     return (
-        f"With every parameter known exactly, {millimetres(floor.p90)} mm would remain at 90 % of the poses, "
-        f"{millimetres(floor.mean)} mm on average: encoder steps, friction that holds the motor short of rest, and other things "
-        f"that no calibration can take out. The calibrated robot reaches {millimetres(elastic.p90)} and {millimetres(elastic.mean)} mm.",
+        f"With every parameter known exactly, {millimetres(floor.p90)} mm would remain (P90), "
+        f"{millimetres(floor.mean)} mm on average: encoder resolution, friction that stops the motor short of its target, and other "
+        f"errors that no calibration can remove. The calibrated robot reaches {millimetres(elastic.p90)} and {millimetres(elastic.mean)} "
+        f"mm.",
         f"Uncertainty of the parameters alone predicts errors of {millimetres(float((std**2).mean() ** 0.5))} mm (root mean square). "
         "More poses, or a better tracker, would lower that part; the floor stays.",
     )
@@ -116,13 +117,13 @@ def _rigid_words(study: TwoStageStudy) -> tuple[str, ...]:
     rigid, elastic = study.fresh.statistics(RIGID), study.verification.all
     first, last = study.rigid[0], study.rigid[-1]
     more = (
-        f" With {last.poses} poses instead of {first.poses} the worst becomes {millimetres(last.errors.max)} mm: measuring more does "
-        "not remove the cause."
+        f" With {last.poses} poses instead of {first.poses} the worst becomes {millimetres(last.errors.max)} mm: more measurements do "
+        f"not remove the cause."
         if last is not first
         else ""
     )
     return (
-        "A rigid model has to explain by lengths and angles what gravity bends. It can do so near the poses it was fitted to, and misses "
-        f"elsewhere: the best rigid fit leaves up to {millimetres(rigid.max)} mm, {ratio(rigid.max, elastic.max)} the worst error of the "
+        "A rigid model compensates deflection by lengths and angles, which holds only near the poses of the fit: "
+        f"the best rigid fit leaves errors up to {millimetres(rigid.max)} mm, {ratio(rigid.max, elastic.max)} the worst error of the "
         f"elastic one.{more} It had its own poses, its own rank and backlash, so the comparison is fair.",
     )
