@@ -76,7 +76,7 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     assert check["verdict"] == "unknown" and check["low"] > 1 and check["applied"] == check["factor"]
     assert any("no sigma" in remark for remark in document["remarks"])
     page = (ur5 / "map.html").read_text(encoding="utf-8")
-    assert "accuracy map" in page and "figure-predicted" in page and "nothing is made smaller" in page
+    assert "accuracy map" in page and "figure-predicted" in page and "predictions are not reduced" in page
     seen = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "some.csv", "--json")
     assert seen.document["verification"]["fitted"] == ["some.csv"]
     assert seen.document["verdict"]["trusted"] is None
@@ -171,7 +171,7 @@ def test_drift_of_a_robot_that_warms_up(run, ur5: Path) -> None:
     course = each[1]["ap_calibrated_mm"]
     assert each[1]["dap_calibrated_mm"] == pytest.approx(abs(course[-1] - course[0]), rel=1e-12)
     page = (ur5 / "drift" / "report.html").read_text(encoding="utf-8")
-    assert "figure-drift" in page and "What drifts? All poses together went" in page
+    assert "figure-drift" in page and "Drift: all poses moved together by" in page
     shown = run("repeatability", ur5 / "robot.yaml", ur5 / "cycles.csv").out
     assert "drift of repeatability, dRP" in shown and "moved beyond chance at 5 of 5 poses" in shown
 

@@ -62,7 +62,7 @@ def test_text_names_what_could_not_be_told_apart(run, ur5_folder: Path, some: Pa
     assert page.status == 0
     assert "25 of 45 parameters" in page.out
     assert "wrist_3_joint.offset" in page.out and "the measurements do not depend on it" in page.out
-    assert "weakest combinations" in page.out
+    assert "least determined combinations" in page.out
     assert "next: flexcal verify" in page.out
 
 

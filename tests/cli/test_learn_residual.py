@@ -49,7 +49,7 @@ def test_unseen_torques_are_predicted_better(folder: Path) -> None:
     inside = [joint["inside_interval_percent"] for joint in found["per_joint"].values()]
     assert 90 < np.mean(inside) <= 100
     said = (folder / "said.txt").read_text()
-    assert f"missed by {error['cross_validation']['with']:.2f} % instead of" in said
+    assert f"relative torque error is {error['cross_validation']['with']:.2f} % instead of" in said
     assert f"wrote {folder / 'out' / 'learned_residual.npz'}" in said
 
 

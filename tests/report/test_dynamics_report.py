@@ -82,7 +82,7 @@ def test_figures_have_traces_for_every_joint(outline: Outline) -> None:
         (
             "measured",
             "predicted, in the fit",
-            "predicted, never seen by the fit",
+            "predicted, outside the fit",
             "measured torque",
             "measured minus predicted",
         ),
@@ -101,11 +101,11 @@ def test_recordings_are_chosen_by_name(folder: Path, tmp_path: Path) -> None:
     shown = {(t["meta"]["log"], t["name"]) for t in figure["data"] if t["name"].startswith("predicted")}
     assert shown == {
         ("1: exciting.parquet", "predicted, in the fit"),
-        ("2: fresh.parquet", "predicted, never seen by the fit"),
+        ("2: fresh.parquet", "predicted, outside the fit"),
     }
     assert {a["data-key"] for a in page.all("select")} == {"log"}
     assert figure["selected"] == {"log": "1: exciting.parquet"}
-    assert "Of fresh.parquet" in page.words and "fresh.parquet" in page.words[page.words.index("What made") :]
+    assert "On fresh.parquet" in page.words and "fresh.parquet" in page.words[page.words.index("What made") :]
 
 
 def test_correlations_are_those_of_the_covariance(study: DynamicsStudy) -> None:

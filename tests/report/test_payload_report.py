@@ -48,7 +48,7 @@ def test_numbers_are_those_of_the_results(
         decimals = 1 - int(np.floor(np.log10(factor * (item["high"] - item["low"]) / 2)))
         estimate, low, high = (f"{factor * item[key]:.{decimals}f}" for key in ("estimate", "low", "high"))
         assert f"{estimate} {low} to {high}" in words
-    assert "not told, stays as robot.yaml declares it 70" in words and results["declaration"] in words
+    assert "not determined, stays as robot.yaml declares it 70" in words and results["declaration"] in words
     assert "1 recording with the payload and 1 without" in words and "robot.yaml: 3 kg" in words
     assert "samples to one row 2 robot.yaml" in words and "flexcal identify payload r l" in words
     for file in ("loaded.csv", "free.csv", "robot.yaml", "two_links.urdf"):

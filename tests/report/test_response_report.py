@@ -96,7 +96,7 @@ def test_what_limits_it_and_what_helps(tmp_path: Path) -> None:
         study = left(tmp_path, [response])
         assert limit_of(study.results["responses"]) == limit
         check = response_checks(study.results["responses"], [response])[0]
-        assert check.status == "care" and "To 20.0 %" in check.answer and cure in check.answer
+        assert check.status == "care" and "20.0 %" in check.answer and cure in check.answer
         verdict = response_page(study).verdict
         assert verdict.facts[1].value == limit.capitalize()
         assert verdict.facts[0].value == "20.0 %"

@@ -245,7 +245,7 @@ def test_stage_zero_stands_beside_cad_alone(study: TwoStageStudy, tmp_path: Path
     section = section[section.index('id="table-stage0-gain"') : section.index('id="stage1"')]
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", section))
     both = f"{document_millimetres(rigid['p90_mm'])} {millimetres(study.verification.all.p90)}"
-    assert f"stage 2: 90 % of them within / mm {both}" in text
+    assert f"stage 2: P90 at fresh poses / mm {both}" in text
     expected = float(np.sqrt(np.mean(study.verification.parameter_rms**2)))
     assert f"rms / mm 0.432 {millimetres(expected)}" in text
     assert "link_2.com_x mm 230 10.0 234 0.100" in text or "link_2.com_x mm 230 10.0 235 0.100" in text
