@@ -1,3 +1,4 @@
+from .bearing_axes import BearingAxes, compare_bearings
 from .before import ErrorsBefore, RobotBefore, robot_before
 from .drift import Drift
 from .elastic_prior import ElasticPrior
@@ -23,6 +24,7 @@ __all__ = [
     "CYCLES",
     "VISITS_A_SET",
     "AccuracyMap",
+    "BearingAxes",
     "Calibration",
     "ConsideredTerm",
     "Drift",
@@ -43,6 +45,7 @@ __all__ = [
     "best_placement",
     "calibrate",
     "common_way",
+    "compare_bearings",
     "drift_of_poses",
     "enough_for_points",
     "error_scale",

@@ -102,4 +102,6 @@ class Calibrate:
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
         )
+        if found.bearings is not None and found.bearings.contradicted:
+            following = f"write `bearings: {found.bearings.preferred}` in {self.robot}, and calibrate again"
         console.finish(document, following)

@@ -9,6 +9,7 @@ from typing import Any
 
 from flexcal.calibration import ErrorStatistics
 from flexcal.estimation import Estimate
+from flexcal.report.bearings_check import check_bearings
 from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
 from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
 from flexcal.report.considered_terms import considered_terms, left_out_errors
@@ -133,6 +134,7 @@ def calibration_checks(
         check_rank(found.parameters, found.rank, found.gap).named("rank"),
         check_drift(results["drift"]).named("drift"),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
+        *check_bearings(results.get("bearings")),
     )
 
 

@@ -134,6 +134,10 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "it is not clear which parameters the poses determine",
     },
     "drift": {"good": "no drift was detected", "else": "residuals drift with time"},
+    "bearings": {
+        "good": "the bearings tilt about the declared axes",
+        "else": "the points fit other bearing axes than the declared ones",
+    },
     "outliers": {"good": "there are no outliers", "else": "there are outliers"},
     "springs": {
         "good": "all stiffnesses are determined",

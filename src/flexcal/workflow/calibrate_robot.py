@@ -11,11 +11,13 @@ from typing import Any, Literal
 import numpy as np
 
 from flexcal.calibration import (
+    BearingAxes,
     Calibration,
     Drift,
     ErrorsBefore,
     TermSelection,
     calibrate,
+    compare_bearings,
     require_points,
     robot_before,
     select_terms,
@@ -35,6 +37,7 @@ from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
+from flexcal.workflow.bearing_remarks import bearing_remarks, bearings_block
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
@@ -57,6 +60,7 @@ class RobotCalibration:
 
     `before` are the errors of the uncalibrated robot; `rigid` is the fit without elasticity and further terms, `selected` the one that is
     stored in the file `estimates`; `selection` is None where the terms were given. `command` is the command line, where there was one.
+    `bearings` says which bearing axes the points prefer.
     """
 
     before: ErrorsBefore
@@ -66,6 +70,7 @@ class RobotCalibration:
     estimate: Estimate
     estimates: Path
     command: str = ""
+    bearings: BearingAxes | None = None
 
     @property
     def points(self) -> MeasuredPoints:
@@ -115,9 +120,11 @@ class RobotCalibration:
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)
             ],
+            "bearings": bearings_block(self.bearings),
             "remarks": [
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *calibration_remarks(selected),
+                *bearing_remarks(self.bearings, selected),
             ],
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
@@ -181,6 +188,9 @@ def calibrate_robot(
     elastic = bool(model.elastic)
     same = not elastic and tuple(wanted) == base
     selected = rigid if same else fit(model, wanted, "selected fit", elastic=elastic)
+    bearings = compare_bearings(
+        model, selected, lambda robot_, chosen: fit(robot_, chosen, "other bearing axes", elastic=True)
+    )
     options = {
         "terms": " ".join(wanted),
         "loss": loss,
@@ -191,7 +201,7 @@ def calibrate_robot(
     estimate = replace(selected.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
     before = robot_before(model, poses).errors(poses)
-    result = RobotCalibration(before, rigid, selection, selected, estimate, target, command)
+    result = RobotCalibration(before, rigid, selection, selected, estimate, target, command, bearings)
     store_block(source, target, blocks, "calibration", estimate)
     if out is not None:
         progress("report", 0.0)
