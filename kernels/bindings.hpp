@@ -3,5 +3,6 @@
 #include <nanobind/nanobind.h>
 
 void bind_closed_loop(nanobind::module_& m);
+void bind_geared_loop(nanobind::module_& m);
 void bind_tree(nanobind::module_& m);
 void bind_triangle(nanobind::module_& m);

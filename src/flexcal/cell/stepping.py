@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-import ctypes
 from dataclasses import dataclass
-from functools import cache
-from pathlib import Path
 
 import numpy as np
 
 from flexcal.cell.plant import Plant
 from flexcal.errors import FlexcalError
 from flexcal.kernels import closed_loop
+from flexcal.mujoco_step import step_address
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,7 +69,7 @@ def run_loop(
     shape = command.torque.shape
     log = LoopLog(np.empty(shape), np.empty(shape), np.empty(shape))
     done = closed_loop(
-        step=_step_address(),
+        step=step_address(),
         model=model._address,
         data=data._address,
         position=data.qpos,
@@ -99,17 +97,3 @@ def run_loop(
             f"the virtual robot's loop diverged after {done / gains.rate_hz:.3g} s; lower kp, kd or the excitation."
         )
     return log
-
-
-@cache
-def _step_address() -> int:
-    """Address of mj_step in the library that the mujoco package has loaded."""
-    import mujoco
-
-    folder = Path(mujoco.__file__).parent
-    for pattern in ("libmujoco*.so*", "libmujoco*.dylib", "mujoco.dll"):
-        for library in sorted(folder.glob(pattern)):
-            address = ctypes.cast(ctypes.CDLL(str(library)).mj_step, ctypes.c_void_p).value
-            if address:
-                return address
-    raise FlexcalError(f"no MuJoCo library lies in {folder}; reinstall the package mujoco.")

@@ -1,0 +1,187 @@
+#include "geared_loop.hpp"
+
+#include <nanobind/nanobind.h>
+#include <nanobind/ndarray.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <stdexcept>
+
+#include "bindings.hpp"
+
+namespace nb = nanobind;
+
+namespace flexcal {
+
+constexpr double too_fast = 500.0;  // rad/s
+
+double ElasticHinge::torque(double twist, double rate) {
+    slip = std::clamp(slip + twist - last_twist, -slip_limit, slip_limit);
+    last_twist = twist;
+    double total = -slipping_stiffness * slip;
+    const double wound = std::abs(twist) - lost_motion;
+    if (wound > 0.0 || lost_motion == 0.0) {
+        const double stretch = std::copysign(wound, twist);
+        total -= stiffness * (stretch + hardening * stretch * stretch * stretch) + damping * rate;
+    }
+    return total;
+}
+
+double BristleFriction::torque(double rate, double load, double step) {
+    const double speed = std::abs(rate), slowness = rate / stribeck_velocity;
+    const double level = coulomb + per_load * std::abs(load) + stribeck * std::exp(-slowness * slowness);
+    if (!(bristle_stiffness > 0.0) || !(level > 0.0)) return viscous * rate;
+    const double sliding = std::copysign(level / bristle_stiffness, rate);
+    const double before = deflection;
+    deflection = sliding + (before - sliding) * std::exp(-bristle_stiffness * speed * step / level);
+    return viscous * rate + bristle_stiffness * deflection + bristle_damping * (deflection - before) / step;
+}
+
+double TransmissionError::angle(double motor) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 4; ++k)
+        sum += amplitude[k] * std::sin((k < 2 ? 1.0 : ratio) * (k % 2 ? 2.0 : 1.0) * motor + phase[k]);
+    return sum;
+}
+
+double TransmissionError::slope(double motor) const {
+    double sum = 0.0;
+    for (std::size_t k = 0; k < 4; ++k) {
+        const double order = (k < 2 ? 1.0 : ratio) * (k % 2 ? 2.0 : 1.0);
+        sum += amplitude[k] * order * std::cos(order * motor + phase[k]);
+    }
+    return sum;
+}
+
+namespace {
+
+using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using State = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+using Log = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
+using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
+
+struct Axis {
+    std::size_t motor;
+    std::ptrdiff_t twist;  // -1: a rigid gear
+    double torque_gain, proportional, derivative;
+    BristleFriction friction;
+    TransmissionError error;
+    double seen = 0.0, rate = 0.0, held = 0.0, asked = 0.0;
+};
+
+void require(bool fits, const char* what) {
+    if (!fits) throw std::invalid_argument(std::string(what) + " has the wrong shape");
+}
+
+std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, State angle, State velocity,
+                        State applied, Table hinges, Indices motors, Indices twists, Table frictions, Table errors,
+                        Table gains, double tick, std::size_t substeps, double count, double filter, Table torque,
+                        Table reference, Table reference_rate, Log angle_log, Log torque_log) {
+    const std::size_t size = angle.shape(0), axes = motors.shape(0), ticks = torque.shape(0);
+    require(velocity.shape(0) == size && applied.shape(0) == size, "velocity or applied");
+    require(hinges.shape(0) == size && hinges.shape(1) == 6, "hinges");
+    require(twists.shape(0) == axes, "twists");
+    require(frictions.shape(0) == axes && frictions.shape(1) == 7, "frictions");
+    require(errors.shape(0) == axes && errors.shape(1) == 9, "errors");
+    require(gains.shape(0) == axes && gains.shape(1) == 3, "gains");
+    for (const Table* table : {&torque, &reference, &reference_rate})
+        require(table->shape(0) == ticks && table->shape(1) == axes, "a signal");
+    for (const Log* log : {&angle_log, &torque_log})
+        require(log->shape(0) == ticks && log->shape(1) == axes, "a log");
+    if (substeps == 0 || !(tick > 0.0)) throw std::invalid_argument("tick and substeps must be positive");
+
+    std::vector<ElasticHinge> springs(size);
+    for (std::size_t i = 0; i < size; ++i)
+        springs[i] = {hinges(i, 0), hinges(i, 1), hinges(i, 2), hinges(i, 3), hinges(i, 4), hinges(i, 5)};
+    std::vector<Axis> axis(axes);
+    for (std::size_t m = 0; m < axes; ++m) {
+        if (motors(m) < 0 || motors(m) >= static_cast<std::int64_t>(size) ||
+            twists(m) >= static_cast<std::int64_t>(size))
+            throw std::invalid_argument("a motor or twist lies outside the arm's hinges");
+        axis[m].motor = static_cast<std::size_t>(motors(m));
+        axis[m].twist = static_cast<std::ptrdiff_t>(twists(m));
+        axis[m].torque_gain = gains(m, 0);
+        axis[m].proportional = gains(m, 1);
+        axis[m].derivative = gains(m, 2);
+        axis[m].friction = {frictions(m, 0), frictions(m, 1), frictions(m, 2), frictions(m, 3),
+                            frictions(m, 4), frictions(m, 5), frictions(m, 6)};
+        axis[m].error.ratio = errors(m, 0);
+        for (std::size_t k = 0; k < 4; ++k) {
+            axis[m].error.amplitude[k] = errors(m, 1 + k);
+            axis[m].error.phase[k] = errors(m, 5 + k);
+        }
+    }
+    const HingedArm arm{reinterpret_cast<void (*)(const void*, void*)>(step),
+                        reinterpret_cast<const void*>(model),
+                        reinterpret_cast<void*>(data),
+                        angle.data(),
+                        velocity.data(),
+                        applied.data(),
+                        size};
+
+    nb::gil_scoped_release release;
+    const double h = tick / static_cast<double>(substeps);
+    std::vector<double> free_twist(size, 0.0), rate(size), last(arm.velocity, arm.velocity + size);
+    for (const Axis& a : axis)
+        if (a.twist >= 0) free_twist[a.twist] = a.error.angle(arm.angle[a.motor]);
+    for (std::size_t i = 0; i < size; ++i) springs[i].last_twist = arm.angle[i] - free_twist[i];
+
+    for (std::size_t k = 0; k < ticks; ++k) {
+        for (std::size_t m = 0; m < axes; ++m) {
+            Axis& a = axis[m];
+            const double exact = arm.angle[a.motor];
+            const double counted = count > 0.0 ? count * std::nearbyint(exact / count) : exact;
+            a.rate = k == 0 ? arm.velocity[a.motor] : a.rate + filter * ((counted - a.seen) / tick - a.rate);
+            a.seen = counted;
+            a.asked = torque(k, m) + a.proportional * (reference(k, m) - counted) +
+                      a.derivative * (reference_rate(k, m) - a.rate);
+            angle_log(k, m) = counted;
+            torque_log(k, m) = a.asked;
+            if (k == 0) a.held = a.asked;
+        }
+        for (std::size_t s = 0; s < substeps; ++s) {
+            // MuJoCo's Euler step is Störmer's, q+ - 2 q + q- = h² a, with velocities half a step behind: what depends on them is
+            // extrapolated by a line, and a torque that jumps now counts as the mean of both sides.
+            for (std::size_t i = 0; i < size; ++i) {
+                const double newest = arm.velocity[i];
+                if (!(std::abs(newest) < too_fast)) return k;
+                rate[i] = 1.5 * newest - 0.5 * last[i];
+                last[i] = newest;
+            }
+            for (const Axis& a : axis)
+                if (a.twist >= 0) free_twist[a.twist] = a.error.angle(arm.angle[a.motor]);
+            for (std::size_t i = 0; i < size; ++i)
+                arm.applied[i] = springs[i].torque(arm.angle[i] - free_twist[i], rate[i]);
+            for (Axis& a : axis) {
+                const double load = a.twist >= 0 ? arm.applied[a.twist] : 0.0;
+                const double drive = a.torque_gain * (s == 0 ? 0.5 * (a.held + a.asked) : a.asked);
+                arm.applied[a.motor] += drive - a.friction.torque(rate[a.motor], load, h) -
+                                        a.error.slope(arm.angle[a.motor]) * load;
+            }
+            arm.step(arm.model, arm.data);
+        }
+        for (Axis& a : axis) a.held = a.asked;
+    }
+    return ticks;
+}
+
+}  // namespace
+}  // namespace flexcal
+
+void bind_geared_loop(nb::module_& m) {
+    m.def("geared_loop", &flexcal::geared_loop, nb::arg("step"), nb::arg("model"), nb::arg("data"),
+          nb::arg("angle").noconvert(), nb::arg("velocity").noconvert(), nb::arg("applied").noconvert(),
+          nb::arg("hinges"), nb::arg("motors"), nb::arg("twists"), nb::arg("frictions"), nb::arg("errors"),
+          nb::arg("gains"), nb::arg("tick"), nb::arg("substeps"), nb::arg("count"), nb::arg("filter"),
+          nb::arg("torque"), nb::arg("reference"), nb::arg("reference_rate"), nb::arg("angle_log").noconvert(),
+          nb::arg("torque_log").noconvert(),
+          "Run the hard cell's closed loop on a MuJoCo arm of hinges; returns the ticks done.\n\n"
+          "step, model, data: addresses of mj_step, of an mjModel and an mjData; angle, velocity, applied: views of its\n"
+          "qpos, qvel and qfrc_applied. hinges (d, 6): stiffness, damping, lost motion, hardening (1/rad²), stiffness and\n"
+          "twist limit of the slipping element. Per axis: motors, twists (-1: rigid gear); frictions (m, 7): viscous,\n"
+          "Coulomb, Stribeck, its velocity, share of the load, bristle stiffness and damping; errors (m, 9): ratio,\n"
+          "amplitudes and phases of harmonics 1, 2 of the joint and of the motor; gains (m, 3): true over believed torque,\n"
+          "kp, kd. Signals and logs are (ticks, m). The interpreter lock is released.");
+}
