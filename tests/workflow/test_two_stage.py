@@ -167,19 +167,13 @@ def test_every_block_says_where_it_came_from(demo: Path) -> None:
 
 def test_the_truth_stays_hidden(demo: Path, examples: Path, tmp_path: Path) -> None:
     """With the truth unreadable once the cell has been built, everything that is identified comes out byte for byte the same."""
-    calls = 0
-    readable = two_stage.read_truth
 
-    def only_for_the_cell(path: Path) -> dict[str, float]:
-        nonlocal calls
-        calls += 1
-        if calls > 1:
-            raise PermissionError(path)
-        return readable(path)
+    def unreadable(path: Path) -> dict[str, float]:
+        raise PermissionError(path)
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(two_stage, "frequency_plan", short_plan)
-        patch.setattr(two_stage, "read_truth", only_for_the_cell)
+        patch.setattr(two_stage, "read_truth", unreadable)
         with pytest.raises(PermissionError):
             two_stage.run_two_stage(examples / "tx90l" / "robot.yaml", tmp_path, seed=77)
     for name in ("estimates.yaml", "calibration_poses.csv", "calibrated.urdf"):

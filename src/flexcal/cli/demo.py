@@ -22,6 +22,9 @@ class Demo:
     plan: Literal["default", "paper", "designed", "quick"] = "default"
     """default: six poses with a payload; paper: three poses without, which leave more unknown; designed: poses and amplitudes chosen for
     this robot; quick: the same in half the time, and 25 calibration poses."""
+    cell: Literal["virtual", "hard"] = "virtual"
+    """virtual: a robot of the kind that is identified, its values drawn; hard: a robot of code of its own, with an elastic wrist, gear
+    errors, wear of friction, drift and a tracker that misstates its noise, which the identification does not know."""
     truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
         None
     )
@@ -50,6 +53,7 @@ class Demo:
                 self.out,
                 seed=self.seed,
                 plan=self.plan,
+                cell=self.cell,
                 truth=self.truth,
                 command=command_line(),
                 progress=progress,

@@ -76,14 +76,16 @@ class ArmDescription:
 def read_description(robot: Path) -> ArmDescription:
     """The arm of a robot.yaml as its files declare it.
 
-    Raises `FlexcalError` for a robot that the hard cell cannot be: with sliding joints, branches or joints that stand locked, without a point.
+    Raises `FlexcalError` for a robot that the hard cell cannot be: with sliding or locked joints, with branches, without a point.
     """
     config = read_yaml(robot, RobotConfig)
     links = _read_links(robot.parent / config.robot)
     turning = [link for link in links if link.axis is not None]
     names, n = [link.joint for link in turning], len(turning)
     if config.locked:
-        raise FlexcalError(f"{robot}: the hard cell has no locked joints; run the demonstration with the virtual cell.")
+        raise FlexcalError(
+            f"{robot}: the hard cell has no locked joints; run the demonstration with the virtual cell."
+        )
     if not config.points:
         raise FlexcalError(f"{robot} declares no point to measure; add `points:`.")
     springs, dampers = np.full((n, 3), np.inf), np.zeros((n, 3))
@@ -139,7 +141,9 @@ def _read_links(urdf: Path) -> tuple[Link, ...]:
         for joint in joints.get(parent, []):
             name, kind = _name(joint, "child"), str(joint.get("type"))
             if kind not in ("revolute", "continuous", "fixed"):
-                raise FlexcalError(f"{urdf}: the hard cell has no {kind} joints as '{joint.get('name')}'; use the virtual cell.")
+                raise FlexcalError(
+                    f"{urdf}: the hard cell has no {kind} joints as '{joint.get('name')}'; use the virtual cell."
+                )
             translation, rotation = _pose(joint.find("origin"))
             axis = None if kind == "fixed" else _unit(_numbers(joint.find("axis"), "xyz", (1.0, 0.0, 0.0)))
             mass, com, inertia = _inertial(inertials[name])
@@ -160,7 +164,9 @@ def _check_serial(urdf: Path, links: list[Link]) -> None:
         while above >= 0 and links[above].axis is None:
             above = links[above].parent
         if above != carrier:
-            raise FlexcalError(f"{urdf}: the hard cell has no branches as at '{link.joint}'; use the virtual cell.")
+            raise FlexcalError(
+                f"{urdf}: the hard cell has no branches as at '{link.joint}'; use the virtual cell."
+            )
         carrier = links.index(link)
 
 
@@ -169,7 +175,10 @@ def _inertial(element: ElementTree.Element | None) -> tuple[float, np.ndarray, n
         return 0.0, np.zeros(3), np.zeros((3, 3))
     mass, tensor = element.find("mass"), element.find("inertia")
     com, rotation = _pose(element.find("origin"))
-    moment = {key: 0.0 if tensor is None else float(tensor.get(key, "0")) for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")}
+    moment = {
+        key: 0.0 if tensor is None else float(tensor.get(key, "0"))
+        for key in ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+    }
     own = np.array(
         [
             [moment["ixx"], moment["ixy"], moment["ixz"]],

@@ -20,7 +20,10 @@ WRIST, WRIST_DAMPING = (50e3, 200e3), 3e-4  # N m/rad; s: damping over stiffness
 GAP = (2e-5, 5e-5)  # rad, half
 HARDENING = 0.2  # relative, at most, at HARDENING_TWIST
 HARDENING_TWIST = 1e-3  # rad
-HYSTERESIS, HYSTERESIS_TWIST = 1e-5, 1e-4  # rad: half width of the loop at most, and the twist that turns it over
+HYSTERESIS, HYSTERESIS_TWIST = (
+    1e-5,
+    1e-4,
+)  # rad: half width of the loop at most, and the twist that turns it over
 JOINT_ERROR, MOTOR_ERROR = 6e-5, 2e-5  # rad, at most: transmission error, harmonic 1; half of it harmonic 2
 REPEATABILITY = (3e-5, 1e-4)  # m: root mean square distance of visits to a pose from their mean
 SIGMA_FACTOR = (0.2, 5.0)  # stated over true standard deviation of the tracker
@@ -102,7 +105,7 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
     springs = described.springs * np.exp(STIFFNESS * normal((n, 3)))
     dampers = described.dampers * np.exp(DAMPING * normal((n, 3)))
     wrist = ~np.isfinite(springs[:, 2])
-    springs[wrist, 2] = np.exp(uniform(*np.log(WRIST), wrist.sum()))
+    springs[wrist, 2] = np.exp(uniform(np.log(WRIST[0]), np.log(WRIST[1]), int(wrist.sum())))
     dampers[wrist, 2] = WRIST_DAMPING * springs[wrist, 2]
     name, link, place = described.point
     held = described.held_com
@@ -120,7 +123,12 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
     gap = np.zeros(n)
     gap[list(arm.gaps)] = uniform(*GAP, len(arm.gaps))
     repeatability = float(uniform(*REPEATABILITY))
-    amplitude = np.column_stack([uniform(0, JOINT_ERROR, (n, 2)), uniform(0, MOTOR_ERROR, (n, 2))]) * [1, 0.5, 1, 0.5]
+    amplitude = np.column_stack([uniform(0, JOINT_ERROR, (n, 2)), uniform(0, MOTOR_ERROR, (n, 2))]) * [
+        1,
+        0.5,
+        1,
+        0.5,
+    ]
     turn = Rotation.from_rotvec([0, 0, uniform(-np.pi, np.pi)]) * Rotation.from_rotvec(0.02 * normal(3))
     stand = arm.station[1] + 0.2 * normal(3)
     return HardRobot(

@@ -74,7 +74,12 @@ def counted(angles: np.ndarray) -> np.ndarray:
 
 
 def _excite(
-    moving: MovingArm, follow: Command, plan: MultisinePlan, pose: np.ndarray, label: RecordingLabel, seed: int
+    moving: MovingArm,
+    follow: Command,
+    plan: MultisinePlan,
+    pose: np.ndarray,
+    label: RecordingLabel,
+    seed: int,
 ) -> Recording:
     joints = list(moving.free)
     period = multisine.torque(plan, label.realisation, label.experiment, label.sign)

@@ -36,7 +36,9 @@ class Multibody:
 
     def springs(self, per_joint: np.ndarray) -> np.ndarray:
         """Values (d,) of the hinges out of those of the springs (n, 3); motors have 0."""
-        return np.array([0.0 if part == "motor" else per_joint[j, COMPONENTS.index(part)] for j, part in self.hinges])
+        return np.array(
+            [0.0 if part == "motor" else per_joint[j, COMPONENTS.index(part)] for j, part in self.hinges]
+        )
 
     def gravity(self, angles: np.ndarray) -> np.ndarray:
         """Torque (d,) N m of gravity on the hinges at rest at `angles` (d,) rad, as the springs and motors must hold it."""
@@ -80,20 +82,26 @@ def build(
     ElementTree.SubElement(option, "flag", dict.fromkeys(_OFF, "disable"))
     bodies = [ElementTree.SubElement(root, "worldbody")]
     for k, link in enumerate(arm.links):
-        turned = link.rotation
+        turned, j, motor, at = link.rotation, -1, False, 0.0
         if link.axis is not None:
             j = arm.joints.index(k)
             motor = free is None or j in free
             at = 0.0 if motor or held_at is None else float(held_at[j])
             turned = link.rotation @ Rotation.from_rotvec(at * link.axis).as_matrix()
         body = ElementTree.SubElement(
-            bodies[link.parent + 1], "body", name=link.name, pos=_text(link.translation), quat=_quaternion(turned)
+            bodies[link.parent + 1],
+            "body",
+            name=link.name,
+            pos=_text(link.translation),
+            quat=_quaternion(turned),
         )
         bodies.append(body)
         mass, com, inertia = _loaded(arm, k, arm.payload if payload is None else payload)
         if mass > 0:
             moments = inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
-            ElementTree.SubElement(body, "inertial", mass=repr(float(mass)), pos=_text(com), fullinertia=_text(moments))
+            ElementTree.SubElement(
+                body, "inertial", mass=repr(float(mass)), pos=_text(com), fullinertia=_text(moments)
+            )
         if link.axis is not None:
             for part in _parts(robot, j, motor, rigid):
                 axis = link.axis if part in ("motor", "twist") else arm.bearing[j][:, COMPONENTS.index(part)]
@@ -101,7 +109,12 @@ def build(
                     axis = Rotation.from_rotvec(-at * link.axis).apply(axis)
                 rotor = arm.rotor_inertia[j] if part == "motor" else 0.0
                 ElementTree.SubElement(
-                    body, "joint", name=f"{j}.{part}", type="hinge", axis=_text(axis), armature=repr(float(rotor))
+                    body,
+                    "joint",
+                    name=f"{j}.{part}",
+                    type="hinge",
+                    axis=_text(axis),
+                    armature=repr(float(rotor)),
                 )
         if k == arm.point[1]:
             ElementTree.SubElement(body, "site", name=_POINT, pos=_text(arm.point[2]))

@@ -64,7 +64,7 @@ def stand(
     free = transmission_error(robot, motors) + (0.0 if scatter is None else scatter)
     offset[twist[driven]] = free[driven]
     if slip is not None:
-        load[twist[driven]] = (robot.hysteresis * robot.arm.springs[:, 2] * slip)[driven]
+        load[twist[driven]] = (robot.hysteresis * slip)[driven] * robot.arm.springs[driven, 2]
     angles = np.zeros(len(arm.hinges))
     angles[motor] = motors + np.where(driven, 0.0, free)
     for _ in range(ITERATIONS):
@@ -75,4 +75,6 @@ def stand(
         if moved < TOLERANCE:
             held = arm.gravity(angles)
             return Standing(angles, held[motor], arm.point)
-    raise FlexcalError("the hard cell's robot finds no rest: gravity is too strong for its springs; check the stiffness values.")
+    raise FlexcalError(
+        "the hard cell's robot finds no rest: gravity is too strong for its springs; check the stiffness values."
+    )

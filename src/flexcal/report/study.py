@@ -94,6 +94,13 @@ class TwoStageStudy:
         return tuple(name for name in self.stiffness.parameters.names if name.endswith(f".{kind}"))
 
     @property
-    def unpredicted_noise(self) -> np.ndarray:
-        """1σ (N, 3) m of what errors at the fresh poses hold beyond the parameters': the floor."""
-        return np.full(self.fresh.poses.position.shape, self.errors("floor").mean / MAXWELL_MEAN)
+    def floor(self) -> ErrorStatistics | None:
+        """What would remain at the fresh poses with every parameter known; None of a robot that has other parameters than the model."""
+        return None if self.results["verification"]["floor"] is None else self.errors("floor")
+
+    @property
+    def unpredicted_noise(self) -> np.ndarray | None:
+        """1σ (N, 3) m of what errors at the fresh poses hold beyond the parameters': the floor, where it is known."""
+        if self.floor is None:
+            return None
+        return np.full(self.fresh.poses.position.shape, self.floor.mean / MAXWELL_MEAN)

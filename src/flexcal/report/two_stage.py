@@ -137,5 +137,6 @@ def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
     rungs.append(rung(words, study.fresh.statistics(CALIBRATED), "elastic"))
     if paper is not None and paper.elastic is not None:
         rungs.append(rung("paper: elastic, hardware", paper.elastic, "published"))
-    rungs.append(rung("floor: all known", study.errors("floor"), "floor"))
+    if study.floor is not None:
+        rungs.append(rung("floor: all known", study.floor, "floor"))
     return tuple(rungs)

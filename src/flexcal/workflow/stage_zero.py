@@ -5,8 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from flexcal.cell import VirtualCell
-from flexcal.data import write_plan
+from flexcal.data import Cell, write_plan
 from flexcal.estimates_file import provenance, write_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
@@ -15,9 +14,7 @@ from flexcal.workflow.design_trajectory import exciting_plan
 from flexcal.workflow.identify_inertials import identify_recorded
 
 
-def run_stage_zero(
-    cell: VirtualCell, nominal: RobotModel, out: Path, *, seed: int, progress: Progress
-) -> Estimate:
+def run_stage_zero(cell: Cell, nominal: RobotModel, out: Path, *, seed: int, progress: Progress) -> Estimate:
     """Design trajectories without payload, record them, and identify with robot.yaml's prior; the block `dynamics` is stored in `out`.
 
     Leaves trajectory_plan.yaml and estimates.yaml.

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify
-from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
-from flexcal.data import MultisinePlan, Recording, write_plan, write_poses
+from flexcal.cell import read_truth
+from flexcal.data import Cell, MultisinePlan, Recording, write_plan, write_poses
 from flexcal.design import MeasuringSetup, design_poses, random_poses
 from flexcal.elasticity import StiffnessResult, identify_stiffness
 from flexcal.estimates_file import Block, provenance, write_estimates
@@ -26,6 +26,7 @@ from flexcal.report.fitted_response import fitted_responses
 from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
 from flexcal.report.two_stage import two_stage_checks
+from flexcal.workflow.demo_cells import CellName, open_cell
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.fitted_files import write_fitted
 from flexcal.workflow.frequency_plans import frequency_plan
@@ -35,7 +36,6 @@ from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
 from flexcal.workflow.two_stage_results import VERIFICATION, two_stage_document, write_verification
 from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
-from flexcal.yaml_reader import read_yaml
 
 CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)
@@ -65,37 +65,34 @@ def run_two_stage(
     *,
     seed: int = 0,
     plan: PlanName = "default",
+    cell: CellName = "virtual",
     truth: Path | None = None,
     inertias_known: bool = False,
     report: bool = True,
     command: str = "",
     progress: Progress = silent,
 ) -> TwoStageRun:
-    """Run the two-stage calibration on the virtual cell and leave every intermediate file, results.json and report.html in `out`.
+    """Run the two-stage calibration on a simulated robot and leave every intermediate file, results.json and report.html in `out`.
 
-    `robot` is a robot.yaml with cell.yaml and frequency_poses.csv beside it. The hidden truth is drawn from `seed`, or taken from the file
-    `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and stored. `inertias_known` gives
-    the identification the true link inertias, to see what CAD costs. The plans `designed` and `quick` are chosen for the robot as stage 0
-    left it; `quick` takes half the time, and 25 calibration poses instead of 40. Raises `FlexcalError` for files that do not fit.
+    `robot` is a robot.yaml with frequency_poses.csv and, for the virtual cell, cell.yaml beside it. The hidden truth is drawn from
+    `seed`, or taken from the file `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and
+    stored. `inertias_known` gives the identification the true link inertias, to see what CAD costs. The plans `designed` and `quick` are
+    chosen for the robot as stage 0 left it; `quick` takes half the time, and 25 calibration poses instead of 40. The robot of the hard
+    `cell` has other parameters than the model: truth.yaml holds those that have a counterpart.
+
+    Raises `FlexcalError` for files that do not fit.
     """
     watch = Stopwatch()
     nominal = RobotModel.from_yaml(robot, estimates=False)
-    config = read_yaml(robot.parent / "cell.yaml", CellConfig)
     out.mkdir(parents=True, exist_ok=True)
     hidden = out / "truth.yaml"
-    write_truth(
-        hidden,
-        draw_truth(nominal, config.spread, np.random.default_rng([seed, 0]))
-        if truth is None
-        else read_truth_of(truth, nominal),
-    )
-    cell = VirtualCell(nominal.with_values(read_truth(hidden)), config, seed, controller_model=nominal)
+    robot_in_cell = open_cell(cell, robot, nominal, truth=truth, hidden=hidden, seed=seed)
     dynamics = None
     if inertias_known:
         believed = nominal.with_values(_inertias(read_truth(hidden)))
     else:
         with watch.stage("dynamics"):
-            dynamics = run_stage_zero(cell, nominal, out, seed=seed, progress=progress)
+            dynamics = run_stage_zero(robot_in_cell, nominal, out, seed=seed, progress=progress)
         believed = nominal.with_estimate(dynamics)
 
     if plan == "default" or plan == "paper":
@@ -107,7 +104,7 @@ def run_two_stage(
     write_plan(out / "frequency_plan.yaml", frequency)
     with watch.stage("frequency"):
         responses = tuple(
-            measure_responses(cell, frequency, believed, lambda share: progress("frequency", share))
+            measure_responses(robot_in_cell, frequency, believed, lambda share: progress("frequency", share))
         )
     files = [out / f"response_pose_{response.pose + 1}.npz" for response in responses]
     for response, file in zip(responses, files, strict=True):
@@ -143,10 +140,10 @@ def run_two_stage(
         progress("poses", 1.0)
     with watch.stage("stage2"):
         progress("stage2", 0.0)
-        measured = cell.measure(chosen)
+        measured = robot_in_cell.measure(chosen)
         calibration = calibrate(elastic, measured)
         progress("stage2", 0.5)
-        rigid = tuple(calibrate(believed, cell.measure(p), elastic=False) for p in for_rigid)
+        rigid = tuple(calibrate(believed, robot_in_cell.measure(p), elastic=False) for p in for_rigid)
         progress("stage2", 1.0)
     write_poses(out / "calibration_poses.csv", measured)
     options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
@@ -155,11 +152,13 @@ def run_two_stage(
     exported = write_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):
         progress("verification", 0.0)
-        seen = cell.measure(anywhere)
+        seen = robot_in_cell.measure(anywhere)
         write_poses(out / "verification_poses.csv", seen)
         known = read_truth(hidden)
-        exact = replace(seen, position=cell.noise_free(anywhere))
-        floor = exact.position - predict(nominal.with_values(known), exact).position
+        exact = replace(seen, position=robot_in_cell.noise_free(anywhere))
+        floor = None
+        if cell == "virtual":
+            floor = ErrorStatistics.of(exact.position - predict(nominal.with_values(known), exact).position)
         placed = robot_before(nominal, measured)
         assert placed.registered is not None and placed.own is not None
         run = TwoStageRun(
@@ -178,10 +177,11 @@ def run_two_stage(
             elastic_verification=verify(calibration.model, exact),
             rigid_verification=tuple(verify(c.model, exact, elastic=False) for c in rigid),
             measured_verification=verify(calibration.model, seen),
-            floor=ErrorStatistics.of(floor),
+            floor=floor,
             truth=known,
             seconds=watch.seconds,
             seed=seed,
+            cell=cell,
             command=command,
         )
         progress("verification", 1.0)
@@ -211,7 +211,7 @@ def run_two_stage(
 
 
 def measure_responses(
-    cell: VirtualCell, plan: MultisinePlan, model: RobotModel, progress: Callable[[float], None]
+    cell: Cell, plan: MultisinePlan, model: RobotModel, progress: Callable[[float], None]
 ) -> Iterator[FrequencyResponse]:
     """Run a frequency experiment and reduce every pose to its response as the recordings come; none is kept."""
     total = len(plan.poses) * plan.recordings_per_pose

@@ -44,7 +44,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
             "reduced_chi2": run.calibration.estimate.reduced_chi2,
             "nominal": run.before.document()["registered"],
             "rigid": run.rigid[0].errors.in_millimetres(),
-            "wrong_flanks": wrong_flanks(run),
+            "wrong_flanks": None if run.floor is None else wrong_flanks(run),
             "drift": drift.document(),
         },
         "rigid_fits": [{"poses": len(c.poses), "rank": c.identifiability.rank} for c in run.rigid],
@@ -54,7 +54,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
             **_verified(run.elastic_verification),
             "rigid": run.rigid_verification[0].all.in_millimetres(),
             "measured": run.measured_verification.all.in_millimetres(),
-            "floor": run.floor.in_millimetres(),
+            "floor": None if run.floor is None else run.floor.in_millimetres(),
         }
         | {name: v.all.in_millimetres() for name, v in rigid.items()},
         "export": {
@@ -68,6 +68,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
         "robot": run.nominal.name,
         "joints": {joint.name: joint.kind for joint in run.nominal.joints},
         "plan": run.plan.name,
+        "cell": run.cell,
         "command": run.command,
     }
 

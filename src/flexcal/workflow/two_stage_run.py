@@ -13,6 +13,7 @@ from flexcal.estimation import Estimate
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.report.trust import Trust
+from flexcal.workflow.demo_cells import CellName
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +33,10 @@ class TwoStageRun:
     identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds
     fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
     `verification_poses` are against the noise-free truth; `measured_verification`, at the same poses, is against the instrument. `floor` is
-    the error that would remain with every parameter known. `truth` maps parameter names to SI values.
-    `before` are the errors of the nominal robot at the calibration poses; `nominal_verification` is of the same registered robot, and
-    `own_verification` with the measured point found too. `results` is the document of results.json, `trust` the verdict in it, `seconds`
-    durations by stage.
+    the error that would remain with every parameter known, None of a robot that has other parameters than the model. `truth` maps
+    parameter names to SI values. `before` are the errors of the nominal robot at the calibration poses; `nominal_verification` is of the
+    same registered robot, and `own_verification` with the measured point found too. `results` is the document of results.json, `trust` the
+    verdict in it, `seconds` durations by stage.
     """
 
     nominal: RobotModel
@@ -52,7 +53,7 @@ class TwoStageRun:
     elastic_verification: Verification
     rigid_verification: tuple[Verification, ...]
     measured_verification: Verification
-    floor: ErrorStatistics
+    floor: ErrorStatistics | None
     truth: Mapping[str, float]
     dynamics: Estimate | None = None
     cad_alone: CadAlone | None = None
@@ -60,4 +61,5 @@ class TwoStageRun:
     results: Mapping[str, Any] = field(default_factory=dict)
     trust: Trust = field(default_factory=Trust)
     seed: int = 0
+    cell: CellName = "virtual"
     command: str = ""

@@ -89,7 +89,8 @@ def accuracy_table(study: TwoStageStudy) -> Table:
     if elastic.ambiguous.any():
         rows.append(row("… where the backlash flank is certain", elastic.unambiguous))
     rows.append(row("… as measured by the instrument", study.errors("measured"), "instrument"))
-    rows.append(row("floor: all parameters known exactly", study.errors("floor")))
+    if study.floor is not None:
+        rows.append(row("floor: all parameters known exactly", study.floor))
     return Table(
         "table-accuracy",
         "Accuracy on fresh poses",
@@ -101,8 +102,13 @@ def accuracy_table(study: TwoStageStudy) -> Table:
 
 
 def _floor_words(study: TwoStageStudy) -> tuple[str, ...]:
-    elastic, floor = study.verification.all, study.errors("floor")
+    elastic, floor = study.verification.all, study.floor
     std = study.verification.parameter_rms
+    if floor is None:
+        return (
+            f"Uncertainty of the parameters alone predicts errors of {millimetres(float((std**2).mean() ** 0.5))} mm (root mean square); "
+            f"the calibrated robot is {millimetres(elastic.mean)} mm off on average.",
+        )
     return (
         f"With every parameter known exactly, {millimetres(floor.p90)} mm would remain (P90), "
         f"{millimetres(floor.mean)} mm on average: encoder resolution, friction that stops the motor short of its target, and other "
