@@ -24,7 +24,7 @@ class Demo:
     this robot; quick: the same in half the time, and 25 calibration poses."""
     cell: Literal["virtual", "hard"] = "virtual"
     """virtual: a robot of the kind that is identified, its values drawn; hard: a robot of code of its own, with an elastic wrist, gear
-    errors, wear of friction, drift and a tracker that misstates its noise, which the identification does not know."""
+    errors, friction of another kind, drift and a tracker that misstates its noise, which the identification does not know."""
     truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
         None
     )
