@@ -59,14 +59,14 @@ class StrangerArm:
         last = self.origin[-1] + 0.107 * self.direction[-1]
         facing = turn(np.pi * np.array([1.0, 0, 0])) if self.direction[-1][2] < 0 else np.eye(3)
         self.flange = rigid(facing, last)
-        self.true_direction = np.array(
-            [turn(self.size * 5e-4 * rng.normal(size=3)) @ d for d in self.direction]
-        )
+        turns = [turn(self.size * 5e-4 * rng.normal(size=3)) for _ in self.direction]
+        self.true_direction = np.array([r @ d for r, d in zip(turns, self.direction, strict=True)])
         self.true_origin = self.origin + self.size * 3e-4 * rng.normal(size=(n, 3))
         self.zeros = self.size * 8e-4 * rng.normal(size=n)
-        self.true_flange = self.flange @ rigid(
-            turn(self.size * 3e-4 * rng.normal(size=3)), self.size * 1e-4 * rng.normal(size=3)
-        )
+        # the flange is turned on the last axis: it goes where that goes, and is centred on it
+        carried = rigid(turns[-1], self.true_origin[-1] - turns[-1] @ self.origin[-1])
+        own = rigid(turn(self.size * 2e-4 * rng.normal(size=3)), self.size * 3e-5 * rng.normal(size=3))
+        self.true_flange = carried @ self.flange @ own
         self.true_xyz = np.array(self.declared_xyz) + np.array(self.point_error)
         self.tracker = (
             np.eye(4)

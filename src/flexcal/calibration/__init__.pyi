@@ -3,6 +3,7 @@ from .before import ErrorsBefore, RobotBefore, robot_before
 from .drift import Drift
 from .elastic_prior import ElasticPrior
 from .error_statistics import ErrorStatistics
+from .gauge import found_point, probable_robot
 from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
 from .measured_points import require_points
@@ -50,10 +51,12 @@ __all__ = [
     "enough_for_points",
     "error_scale",
     "error_sources",
+    "found_point",
     "geometric_parameters",
     "moved_far",
     "noise_repeatability",
     "predict",
+    "probable_robot",
     "propagation",
     "random_poses_in",
     "register",

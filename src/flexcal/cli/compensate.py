@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import with_estimates
-from flexcal.cli.options import Estimates, Json, Numbers, Robot, require_robot
+from flexcal.cli.options import Estimates, Json, MaybeText, Numbers, Robot, require_robot
+from flexcal.units import MILLIMETRE
 
 _LISTED = 10
+
+
+def _point_words(name: str, point: Mapping[str, Any]) -> str:
+    """Which point is compensated, where it is, and how to have another one."""
+    if point["found_xyz_m"] is None:
+        what = f"the frame {name}" if name == point["frame"] else f"the point '{name}' in {point['frame']}"
+        return (
+            f"{what}, which was not measured: what the measured points do not tell of it "
+            "(how the flange is turned, where it is along and about the last axis) stays nominal"
+        )
+    found, declared = (point[key] for key in ("found_xyz_m", "declared_xyz_m"))
+    off = float(sum((a - b) ** 2 for a, b in zip(found, declared, strict=True)) ** 0.5) / MILLIMETRE
+    place = ", ".join(f"{value:.5f}" for value in found)
+    return (
+        f"the point '{name}', found at [{place}] m in {point['frame']}, {off:.2f} mm from where it was declared; "
+        f"--frame {point['frame']} takes that frame itself"
+    )
 
 
 @dataclass(frozen=True)
@@ -31,6 +50,13 @@ class Compensate:
     out: Annotated[Path, arg(metavar="FILE", aliases=["-o"])] = Path("commands.csv")
     """File for the commands (CSV or Parquet)."""
     estimates: Estimates = None
+    target: Annotated[
+        MaybeText,
+        arg(metavar="NAME", help_behavior_hint="(default: the column target, else the first point)"),
+    ] = None
+    """Point under `points:` that is brought to the targets."""
+    frame: Annotated[MaybeText, arg(metavar="FRAME", help_behavior_hint="(default: a point)")] = None
+    """URDF frame, as tool0, whose origin is brought to the targets, in place of a point under `points:`."""
     start: Annotated[
         Numbers, arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
     ] = ()
@@ -49,6 +75,8 @@ class Compensate:
                 self.targets,
                 self.out,
                 estimates=self.estimates,
+                target=self.target,
+                frame=self.frame,
                 start=self.start,
                 progress=progress,
             )
@@ -61,6 +89,8 @@ class Compensate:
                 f"{len(document['from_other_postures'])} of them were found from another posture only, where the arm may stand in another "
                 "configuration: from_other_postures in --json"
             )
+        for name, point in document["points"].items():
+            console.say(f"the targets are of {_point_words(name, point)}")
         before = document["error_before_mm"]
         console.say(
             f"with nominal commands the tool would be {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"

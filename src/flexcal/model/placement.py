@@ -49,3 +49,10 @@ def point_placement(model: RobotModel, name: str) -> tuple[int, np.ndarray, np.n
     length = tool[3:] if name == next(iter(model.points)) else np.zeros(3)
     position = point.translation + model.geometry[point.joint, 3:] + rotation @ (point.xyz + own + length)
     return point.joint, position, rotation
+
+
+def found_xyz(model: RobotModel, name: str) -> np.ndarray:
+    """Position (3,) m of a target in the frame in which robot.yaml declares it, with the errors of link and tool."""
+    point = model.point(name)
+    _, position, _ = point_placement(model, name)
+    return point.rotation.T @ (position - point.translation)

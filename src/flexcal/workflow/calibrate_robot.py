@@ -38,6 +38,7 @@ from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints, er
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.bearing_remarks import bearing_remarks, bearings_block
+from flexcal.workflow.calibrated_robot import TARGETS, TARGETS_BETWEEN
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
@@ -196,6 +197,7 @@ def calibrate_robot(
         "loss": loss,
         "secant_scale": secant_scale,
         "elasticity": elasticity,
+        TARGETS: TARGETS_BETWEEN.join(poses.targets),
     }
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(selected.estimate, provenance=origin)

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
+from flexcal.calibration import found_point, probable_robot
 from flexcal.errors import InputError
 from flexcal.estimates_file import BLOCKS, Block, read_estimates
 from flexcal.estimation import Estimate
@@ -13,6 +15,10 @@ from flexcal.model import RobotModel
 from flexcal.model.stored import with_blocks
 from flexcal.workflow.stored_block import ESTIMATES
 from flexcal.yaml_reader import read_yaml_file
+
+TARGETS = "targets"
+"""Option in the provenance of a calibration: the points that it measured."""
+TARGETS_BETWEEN = ", "
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,6 +29,33 @@ class CalibratedRobot:
     model: RobotModel
     stored: Path
     blocks: Mapping[Block, Estimate]
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """The points that the calibration measured."""
+        return measured_points(self.nominal, self.blocks)
+
+    @cached_property
+    def probable(self) -> RobotModel:
+        """`model` with what the measured points cannot tell where it is most probable: for every frame but these points."""
+        return probable_robot(self.model, self.measured)
+
+    @cached_property
+    def found(self) -> RobotModel:
+        """`nominal` with the measured points where the calibration found them on the tool."""
+        return found_point(self.nominal, self.probable, self.measured)
+
+
+def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tuple[str, ...]:
+    """The points that the calibration among `blocks` measured; none without one."""
+    if "calibration" not in blocks:
+        return ()
+    estimate = blocks["calibration"]
+    said = estimate.provenance.get(f"option.{TARGETS}")
+    if said is not None:
+        return tuple(name for name in said.split(TARGETS_BETWEEN) if name in nominal.points)
+    further = (name for name in nominal.points if f"point.{name}.x" in estimate.parameters)
+    return tuple(dict.fromkeys([*list(nominal.points)[:1], *further]))
 
 
 def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:

@@ -189,9 +189,11 @@ def certify_robot(
             f"{before} is given as --before and as --after; measure the compensated commands too."
         )
     calibrated = calibrated_robot(robot, estimates, "certify")
-    model = calibrated.model
+    model = calibrated.probable
     wanted = read_targets(targets, model)
-    base = wanted_pose(model, calibrated.nominal, wanted).position
+    base, as_declared = (
+        wanted_pose(model, nominal, wanted).position for nominal in (calibrated.found, calibrated.nominal)
+    )
     sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
     rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
     if wanted.q is not None:
@@ -213,14 +215,16 @@ def certify_robot(
         )
     known, roots = verify_jointly(model, visited[after][0])
     there = _visited(visited[after][0], _placed(model, *visited[after]))
-    placed = robot_before(calibrated.nominal, visited[before][0]).declared
+    start = visited[before][0]
+    declared = as_declared[rows[before][np.isin(wanted.pose[rows[before]], common)]]
+    placed = robot_before(calibrated.nominal, start).declared
     result = RobotCertificate(
         calibrated,
-        None if placed is None else _visited(visited[before][0], _placed(placed, *visited[before])),
-        _visited(visited[before][0], _registered(*visited[before])),
-        _visited(visited[before][0], _best_fit(calibrated.nominal, *visited[before])),
+        None if placed is None else _visited(start, _placed(placed, start, declared)),
+        _visited(start, _registered(start, declared)),
+        _visited(start, _best_fit(calibrated.found, *visited[before])),
         there,
-        _visited(visited[after][0], _best_fit(calibrated.nominal, *visited[after])),
+        _visited(visited[after][0], _best_fit(calibrated.found, *visited[after])),
         len(every) - len(common),
         known,
         error_scale(known, roots, _noise(there)),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +14,9 @@ from flexcal.data import ToolTargets, read_targets, write_commands
 from flexcal.data.table import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
+from flexcal.model.added_point import with_frame
 from flexcal.model.joint_space import joint_limits
+from flexcal.model.placement import found_xyz
 from flexcal.model.resting_tool import points_kinematics
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
@@ -26,13 +28,18 @@ _FAR = 0.25
 
 @dataclass(frozen=True, eq=False)
 class RobotCompensation:
-    """The commands for the `targets` of a `file`; `start` (n,): where inverse kinematics started, None where it says joint positions."""
+    """The commands for the `targets` of a `file`; `start` (n,): where inverse kinematics started, None with joint positions.
+
+    `nominal` is the uncalibrated robot with the `measured` points where they were found.
+    """
 
     model: RobotModel
     file: TableFile
     targets: ToolTargets
     result: Compensation
     start: np.ndarray | None
+    nominal: RobotModel
+    measured: tuple[str, ...]
 
     @property
     def refused(self) -> list[dict[str, Any]]:
@@ -46,6 +53,19 @@ class RobotCompensation:
             for k in np.flatnonzero(~self.result.found)
         ]
 
+    @property
+    def points(self) -> dict[str, dict[str, Any]]:
+        """The points that are brought to the targets: frame, and place in it (m) as declared and, where measured, as found."""
+        named = dict.fromkeys(self.targets.target.tolist())
+        return {
+            name: {
+                "frame": self.model.points[name].frame,
+                "declared_xyz_m": self.model.points[name].xyz,
+                "found_xyz_m": found_xyz(self.model, name) if name in self.measured else None,
+            }
+            for name in named
+        }
+
     def document(self) -> dict[str, Any]:
         """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
         result, found = self.result, self.result.found
@@ -53,6 +73,7 @@ class RobotCompensation:
         change = np.abs(result.q - result.nominal)[found].max(axis=0)
         return {
             "targets": len(self.targets),
+            "points": self.points,
             "compensated": int(found.sum()),
             "ambiguous": int((found & ~result.unambiguous).sum()),
             "error_before_mm": {
@@ -75,10 +96,16 @@ def compensate_robot(
     out: Path,
     *,
     estimates: Path | None = None,
+    target: str | None = None,
+    frame: str | None = None,
     start: Sequence[float] = (),
     progress: Progress = silent,
 ) -> RobotCompensation:
     """Write the motor commands that bring the calibrated robot's tool to the targets of `file` to `out`, CSV or Parquet.
+
+    The targets are of the point `target` under `points:`, or of the origin of the URDF frame `frame`; by default of what the column
+    `target` says, or the first point. Wanted poses are those of the nominal robot with the measured point where it was found, so that
+    its ruler's error is not put into the commands.
 
     A target without a command is left out there, and stands with its reason in the result; the others keep their numbers and order. `start`
     (n values, rad or m; none: a posture far from singular) is where inverse kinematics starts for targets without joint positions.
@@ -86,8 +113,17 @@ def compensate_robot(
     compensated: then nothing is written.
     """
     calibrated = calibrated_robot(robot, estimates, "compensate with")
-    model, nominal = calibrated.model, calibrated.nominal
-    targets = read_targets(file, model)
+    if target is not None:
+        calibrated.nominal.point(target)
+        if frame is not None:
+            raise InputError(
+                "--target and --frame both say what is brought to the targets; give one of them."
+            )
+    model, nominal = (
+        robot_ if frame is None else with_frame(robot_, frame)
+        for robot_ in (calibrated.probable, calibrated.found)
+    )
+    targets = _of_point(read_targets(file, model), file, target if frame is None else frame)
     for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
         if not found_station(model, station):
             raise InputError(
@@ -108,7 +144,18 @@ def compensate_robot(
     commands = ToolTargets(found.pose, found.target, result.q[result.found], payload=found.payload)
     table = open_table(file)
     write_commands(out, model, commands, result.unambiguous[result.found], table)
-    return RobotCompensation(model, table, targets, result, origin)
+    return RobotCompensation(model, table, targets, result, origin, nominal, calibrated.measured)
+
+
+def _of_point(targets: ToolTargets, file: Path, name: str | None) -> ToolTargets:
+    """The targets as those of the point `name`, where one is given."""
+    if name is None:
+        return targets
+    if "target" in open_table(file).columns:
+        raise InputError(
+            f"{file} says in its column 'target' which point goes there; leave --target and --frame out."
+        )
+    return replace(targets, target=np.full(len(targets), name))
 
 
 def _check_frame(file: Path, nominal: RobotModel, targets: ToolTargets) -> None:

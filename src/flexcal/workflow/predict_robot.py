@@ -42,11 +42,11 @@ def predict_robot(robot: Path, file: Path, out: Path, *, estimates: Path | None 
     Raises `FlexcalError` where there is no calibration or a file does not fit; then nothing is written.
     """
     calibrated = calibrated_robot(robot, estimates, "predict with")
-    model = calibrated.model
+    model = calibrated.probable
     commands = read_commands(file, model)
     assert commands.q is not None
     at = tool_at_rest(model, commands.q, commands.payload, commands.target)
-    nominal = points_kinematics(calibrated.nominal, commands.q, None, commands.target, jacobians=False)
+    nominal = points_kinematics(calibrated.found, commands.q, None, commands.target, jacobians=False)
     payload = carried_mass(model, commands.payload, len(commands))
     certain = certain_flank(model, commands.q, at.rest.torque, payload)[:, list(model.backlash_joints)]
     tool = ToolTargets(
