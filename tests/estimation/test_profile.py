@@ -20,7 +20,7 @@ def test_rise_of_a_linear_problem(rng):
     x = fitted.parameters.coordinates()
     x[1] += 0.7
     variance = np.linalg.inv(design.T @ design + np.eye(3) / 4)[1, 1]
-    assert profile_rise(problem, fitted, x, 1) == pytest.approx(0.5 * 0.7**2 / variance, rel=1e-9)
+    assert profile_rise(problem, fitted, x, [1]) == pytest.approx(0.5 * 0.7**2 / variance, rel=1e-9)
 
 
 def stiffness_problem(residual):

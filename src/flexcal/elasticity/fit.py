@@ -20,7 +20,7 @@ from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 
 ROUNDS = 2
-"""How often model error and reference motion are evaluated about the last estimate and the fit is repeated."""
+"""Fits, each with model error and reference motion evaluated at the last optimum."""
 
 FINE, COARSE = 1e-7, 1e-3
 """Tolerances of the last fit, and of those before it."""
@@ -40,6 +40,11 @@ class ResponseData:
     tolerances: Tolerances = field(default_factory=Tolerances)
     inertias_known: bool = False
 
+    @property
+    def effects(self) -> bool:
+        """Whether the fit depends on anything that is evaluated at its start: model error, or effects of the experiment."""
+        return self.tolerances.any or self.plan is not None
+
     def parameters(self, model: RobotModel) -> tuple[Parameters, np.ndarray]:
         """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` where responses do not fit the robot."""
         return model.posterior.prior(
@@ -53,11 +58,12 @@ class ResponseData:
 class ResponseFit:
     """The fit of one robot: `estimate` with the posterior covariance of `problem`.
 
-    `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest.
+    `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest; `error` what the model leaves out.
     """
 
     residual: StageOneResidual
     effects: tuple[ExperimentEffect, ...]
+    error: ModelError | None
     problem: Problem
     estimate: Estimate
 
@@ -65,6 +71,10 @@ class ResponseFit:
     def x(self) -> np.ndarray:
         """Estimation coordinates (p,) of the optimum."""
         return self.estimate.parameters.coordinates()
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (m,) or (m, c) that the measurement's covariance has whitened, whitened by the model error too."""
+        return rows if self.error is None else self.error.whiten(rows)
 
     def predicted(self) -> tuple[np.ndarray, ...]:
         """Responses (L, E, E) of every pose at the optimum, effects of the experiment included."""
@@ -75,32 +85,39 @@ class ResponseFit:
 def fit_responses(
     model: RobotModel, data: ResponseData, x: np.ndarray, progress: Progress = silent
 ) -> ResponseFit:
-    """Levenberg–Marquardt from the coordinates `x` (p,), repeated with model error and experiment effects evaluated at the optimum."""
+    """Fit from the coordinates `x` (p,), then once more with model error and experiment effects evaluated at the optimum."""
+    progress("fitting", 0.0)
+    first = first_fit(model, data, x)
+    progress("fitting", 1 / (ROUNDS + 1))
+    return final_fit(model, data, first)
+
+
+def first_fit(model: RobotModel, data: ResponseData, x: np.ndarray) -> ResponseFit:
+    """Fit from the coordinates `x` (p,), at which model error and experiment effects are evaluated."""
+    return _fit(model, data, x, COARSE if data.effects else FINE)
+
+
+def final_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
+    """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, where there are any."""
+    return _fit(model, data, first.x, FINE) if data.effects else first
+
+
+def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float) -> ResponseFit:
+    """Levenberg–Marquardt from `x` (p,), at which model error and experiment effects are evaluated."""
     parameters, prior = data.parameters(model)
     plan, responses = data.plan, data.responses
-    reference = None if plan is None or plan.reference_amplitude == 0 else ReferenceMotion.of(plan)
     predicting = ResponseModel.of(model, responses, parameters)
-    measured = StageOneResidual.of(predicting, responses, data.weighting)
     effects = [ExperimentEffect.none(response) for response in responses]
-    rounds = ROUNDS if data.tolerances.any or plan is not None else 1
-    progress("fitting", 0.0)
-    fit = None
-    for number in range(rounds):
-        if plan is not None:
-            predicting = predicting.with_open_gaps(x, plan)
-        if reference is not None:
-            effects = experiment_effects(predicting, x, reference)
-        residual = measured.shifted(predicting, [effect.shift for effect in effects])
-        error = (
-            ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
-        )
-        problem = _problem(residual, error, parameters, prior)
-        fitted = solve(problem, starts=x[None], tolerance=FINE if number == rounds - 1 else COARSE)
-        fit = ResponseFit(residual, tuple(effects), problem, fitted)
-        x = fit.x
-        progress("fitting", (number + 1) / (rounds + 1))
-    assert fit is not None
-    return fit
+    if plan is not None:
+        predicting = predicting.with_open_gaps(x, plan)
+        if plan.reference_amplitude > 0:
+            effects = experiment_effects(predicting, x, ReferenceMotion.of(plan))
+    residual = StageOneResidual.of(predicting, responses, data.weighting)
+    residual = residual.shifted(predicting, [effect.shift for effect in effects])
+    error = ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
+    problem = _problem(residual, error, parameters, prior)
+    fitted = solve(problem, starts=x[None], tolerance=tolerance)
+    return ResponseFit(residual, tuple(effects), error, problem, fitted)
 
 
 def _problem(

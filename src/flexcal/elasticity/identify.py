@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.elasticity.fit import FINE, ResponseData, fit_responses
+from flexcal.elasticity.fit import FINE, ResponseData, ResponseFit, final_fit, first_fit, fit_responses
+from flexcal.elasticity.held_joints import HeldJoints
 from flexcal.elasticity.model_error import Tolerances
 from flexcal.elasticity.parameters import check_responses
 from flexcal.elasticity.profile import profile_stretch
@@ -18,7 +19,7 @@ from flexcal.estimation import Estimate, Problem, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.further_springs import with_brakes
+from flexcal.model.further_springs import with_brakes, with_drive_springs
 from flexcal.model.names import spring_names
 from flexcal.progress import Progress, silent
 
@@ -80,7 +81,16 @@ def identify_stiffness(
     model = with_brakes(model, responses[0].joints)
     search = MultiStart() if search is None else search
     x = search.find(model, responses, *data.parameters(model), rng, progress)
-    fit = fit_responses(model, data, x, progress)
+    progress("fitting", 0.0)
+    first = first_fit(model, data, x)
+    progress("fitting", 0.3)
+    held = HeldJoints.of(model, responses)
+    fit = None
+    if held.asked_for(model, data, first):
+        model, fit = _with_held_joints(model, held, data, search, rng, progress)
+    if fit is None:
+        fit = final_fit(model, data, first)
+    progress("fitting", 0.8)
     estimate = _widened(fit.problem, fit.estimate, data.tolerances.inflation(responses))
     progress("fitting", 1.0)
     predicted = fit.predicted()
@@ -93,6 +103,40 @@ def identify_stiffness(
         ]
     )
     return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
+
+
+def _with_held_joints(
+    model: RobotModel,
+    held: HeldJoints,
+    data: ResponseData,
+    search: Search,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[RobotModel, ResponseFit | None]:
+    """The robot with springs at those of the `held` joints for which the data ask, and its fit; the same robot and None for none."""
+
+    values: dict[str, float] = {}
+    while held.springs:
+        wider = with_drive_springs(model, held.springs)
+        parameters, prior = data.parameters(wider)
+        if values:
+            x = parameters.coordinates({name: values[name] for name in parameters.names})
+        else:
+            x = search.find(
+                wider,
+                data.responses,
+                parameters,
+                prior,
+                rng,
+                lambda _, share: progress("fitting", 0.3 + 0.3 * share),
+            )
+        fit = fit_responses(wider, data, x)
+        needless = held.needless(wider, data, fit)
+        if needless is None:
+            return wider, fit
+        held = held.only([i for i in held.springs if i != needless])
+        values = fit.estimate.values
+    return model, None
 
 
 def _widened(problem: Problem, fitted: Estimate, inflation: float) -> Estimate:

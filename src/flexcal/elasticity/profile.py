@@ -28,6 +28,6 @@ def profile_stretch(problem: Problem, fitted: Estimate) -> np.ndarray:
             continue
         held = x.copy()
         held[number] += np.log(2.0)
-        rise = profile_rise(problem, fitted, held, number)
+        rise = profile_rise(problem, fitted, held, [number])
         stretch[number] = max(1.0, 0.5 / (std * np.sqrt(max(2.0 * rise, 1e-3))))
     return stretch

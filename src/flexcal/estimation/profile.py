@@ -1,6 +1,8 @@
-"""The profile likelihood of one parameter."""
+"""The profile likelihood of some parameters."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,12 +13,12 @@ from flexcal.estimation.objective import Objective
 from flexcal.estimation.problem import Problem
 
 
-def profile_rise(problem: Problem, fitted: Estimate, x: np.ndarray, number: int) -> float:
-    """Rise of the cost above that of `fitted` where parameter `number` is held as in `x` (p,) and the others are fitted from there.
+def profile_rise(problem: Problem, fitted: Estimate, x: np.ndarray, held: Sequence[int]) -> float:
+    """Rise of the cost above that of `fitted` where the parameters `held` stay as in `x` (p,) and the others are fitted from there.
 
-    Twice the rise is χ² with one degree of freedom at the true value (Wilks 1938). Raises FlexcalError where the model cannot be
-    evaluated at `x`.
+    Twice the rise is χ² with as many degrees of freedom as are held, at their true values (Wilks 1938).
+    Raises FlexcalError where the model cannot be evaluated at `x`.
     """
     objective = Objective.of(problem, Squares(), problem.linearise(x)[0].size)
-    free = np.arange(len(x)) != number
+    free = ~np.isin(np.arange(len(x)), held)
     return minimise(objective, x, free, max_iterations=50, tolerance=1e-6).cost - fitted.cost

@@ -21,6 +21,8 @@ GAP_TOLERANCE = 1e-4
 SPRING_LOG_STD = 1.5
 """Prior of every stiffness and damping that a frequency response is to find, 1σ of the logarithm (a factor of 4.5): it only keeps the
 posterior proper."""
+FURTHER_SPRING_LOG_STD = 2.0
+"""The same for a spring that robot.yaml does not declare and the responses ask for, about a mode at the highest line."""
 FRICTION_LOG_STD = 1.5
 """Prior of the motor's viscous coefficient in one pose of a frequency response, 1σ of the logarithm about what is seen or predicted."""
 FRICTION_TOLERANCE = 0.05
@@ -59,8 +61,13 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
     for name in (*names, *rotors):
         if not model.value(name) > 0:
             raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")
+    declared_joints = {entry.joint for entry in model.config.elastic}
+
+    def width(name: str) -> float:
+        return SPRING_LOG_STD if name.split(".")[0] in declared_joints else FURTHER_SPRING_LOG_STD
+
     springs = (
-        Parameter(name, unit_of(name), model.value(name), prior_std=SPRING_LOG_STD, scale="log")
+        Parameter(name, unit_of(name), model.value(name), prior_std=width(name), scale="log")
         for name in names
     )
     return (*springs, *(declared(model, name) for name in rotors))
