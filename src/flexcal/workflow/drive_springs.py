@@ -26,13 +26,13 @@ def drive_springs(
         raise InputError(
             f"--estimator {estimator} is for rigid robots; take one of {', '.join(_KNOWING)}, or leave --flexible out."
         )
-    if not model.elastic:
+    if not model.driven:
         raise InputError(
             f"{model.path} declares no elastic joint, which --flexible is about; add it under `elastic:`, or leave --flexible out."
         )
-    springs = tuple(DriveSpring(joint.index) for joint in model.elastic)
+    springs = tuple(DriveSpring(joint.index) for joint in model.driven)
     for entry in model.config.drives.coupling:
-        for joint in model.elastic:
+        for joint in model.driven:
             if joint.name in (entry.motor, entry.joint):
                 raise InputError(
                     f"{model.path}: {joint.name} is elastic and coupled with another motor, which the flexible model does not know; "

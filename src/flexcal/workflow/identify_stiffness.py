@@ -28,7 +28,7 @@ from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.trust import Trust
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
-from flexcal.workflow.results import dropped_parameters, quantities, write_results
+from flexcal.workflow.results import dropped_parameters, quantities, springs_block, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 WeightingName = Literal["covariance", "paper", "uniform"]
@@ -69,7 +69,7 @@ class RobotStiffness:
         """The content of results.json."""
         estimate = self.estimate
         return {
-            "stage1": springs(estimate),
+            "stage1": springs_block(estimate),
             "fit": {
                 "status": estimate.status,
                 "message": estimate.message,
@@ -85,17 +85,6 @@ class RobotStiffness:
             "estimates": self.estimates,
             "command": self.command,
         }
-
-
-def springs(estimate: Estimate) -> dict[str, Any]:
-    """{stiffness, damping} of every spring as quantities, by joint and drive, bearing_x or bearing_y."""
-    found: dict[str, Any] = {"stiffness": {}, "damping": {}}
-    for name in estimate.parameters.names:
-        owner, _, kind = name.rpartition(".")
-        joint, _, spring = owner.rpartition(".")
-        if kind in found and joint:
-            found[kind].setdefault(joint, {})[spring] = estimate.quantity(name)
-    return found
 
 
 def identify_robot_stiffness(

@@ -94,3 +94,14 @@ def plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value
+
+
+def springs_block(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, Any]:
+    """{stiffness, damping} of every spring as quantities, by joint and drive, bearing_x or bearing_y."""
+    found: dict[str, Any] = {"stiffness": {}, "damping": {}}
+    for name in estimate.parameters.names:
+        owner, _, kind = name.rpartition(".")
+        joint, _, spring = owner.rpartition(".")
+        if kind in found and joint:
+            found[kind].setdefault(joint, {})[spring] = estimate.quantity(name, (truth or {}).get(name))
+    return found

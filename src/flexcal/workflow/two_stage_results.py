@@ -14,10 +14,14 @@ from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.export import Exported
-from flexcal.model.names import SPRINGS
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.results import identifiability_block, identifiability_spectrum, quantities
+from flexcal.workflow.results import (
+    identifiability_block,
+    identifiability_spectrum,
+    quantities,
+    springs_block,
+)
 from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
 
 VERIFICATION = "verification.csv"
@@ -94,15 +98,7 @@ def _verified(verification: Verification) -> dict[str, Any]:
 
 def _springs(run: TwoStageRun, estimate: Estimate, kind: str) -> dict[str, Any]:
     """Every stiffness or damping as a quantity, by joint and spring."""
-    return {
-        joint.name: {
-            SPRINGS[c]: estimate.quantity(
-                f"{joint.name}.{SPRINGS[c]}.{kind}", run.truth.get(f"{joint.name}.{SPRINGS[c]}.{kind}")
-            )
-            for c in joint.components
-        }
-        for joint in run.nominal.elastic
-    }
+    return springs_block(estimate, run.truth)[kind]
 
 
 def wrong_flanks(run: TwoStageRun) -> int:
