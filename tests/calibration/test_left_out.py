@@ -25,12 +25,12 @@ def test_left_out_errors_are_those_of_fits_without_the_fold(folds: int, rng: np.
         np.testing.assert_allclose(found[fold == k], expected, rtol=1e-4)
 
 
-def test_the_criterion_is_that_of_schwarz(rng: np.random.Generator) -> None:
+def test_what_the_fit_leaves_is_that_of_least_squares(rng: np.random.Generator) -> None:
     columns, residuals = rng.standard_normal((50, 3, 6)), 1e-4 * rng.standard_normal((50, 3))
-    solution, left, *_ = np.linalg.lstsq(columns.reshape(150, 6), residuals.ravel(), rcond=None)
-    expected = 150 * np.log(left[0] / 150) + 6 * np.log(150)
-    assert left_out([columns], [0.0], residuals, []).bic == pytest.approx(expected, abs=1e-3)
-    assert solution.shape == (6,)
+    left = np.linalg.lstsq(columns.reshape(150, 6), residuals.ravel(), rcond=None)[1]
+    found = left_out([columns], [0.0], residuals, [])
+    assert found.squares == pytest.approx(left[0], rel=1e-5)
+    assert found.freedom == pytest.approx(6, abs=1e-3)
 
 
 def test_a_column_that_one_pose_alone_sees_is_held_there(rng: np.random.Generator) -> None:

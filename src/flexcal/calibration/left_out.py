@@ -15,12 +15,13 @@ _REACH = 1e-2
 class LeftOut:
     """A linear fit of p columns to the residuals of N points.
 
-    `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `bic` is the
-    Bayesian information criterion (Schwarz 1978) of Gaussian residuals of unknown variance.
+    `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `squares` (m²) is
+    what the fit to all points leaves, a prior's penalty included; `freedom` the trace of the hat matrix, its number of parameters.
     """
 
     distances: tuple[np.ndarray, ...]
-    bic: float
+    squares: float
+    freedom: float
 
     def mean(self, kinds: Sequence[int]) -> float:
         """Mean distance at left-out poses over some kinds of folds, m."""
@@ -55,11 +56,9 @@ def left_out(
     basis, _ = np.linalg.qr(np.concatenate([stacked, np.diag(np.concatenate(roots))]))
     seen = basis[: residuals.size]
     left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
-    size = residuals.size
-    freedom = float((seen**2).sum())
-    bic = size * np.log(float(left @ residuals.ravel()) / size) + freedom * np.log(size)
     q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
-    return LeftOut(tuple(_distances(q, r, fold) for fold in folds), bic)
+    distances = tuple(_distances(q, r, fold) for fold in folds)
+    return LeftOut(distances, float(left @ residuals.ravel()), float((seen**2).sum()))
 
 
 def _scale(block: np.ndarray) -> np.ndarray:

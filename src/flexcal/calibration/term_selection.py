@@ -59,8 +59,8 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     open_terms = candidates(model, poses)
     rigid = calibrate(model, poses, terms=base, elastic=bool(model.elastic))
     folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
-    trials = TermTrials(rigid, open_terms.model, folds, many=distinct >= MANY_POSES)
-    chosen, rows = base, [trials.start(base)]
+    trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
+    chosen, rows = base, [trials.start()]
     left: dict[str, ConsideredTerm] = {}
 
     def grow(options: list[str], extra: float) -> list[str]:

@@ -45,14 +45,20 @@ def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> ConsideredTerm
 
 
 class TermTrials:
-    """Linear fits of sets of terms about the fit of the base terms to all poses.
+    """Linear fits of sets of terms about the fit of the `base` terms to all poses.
 
     `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses. With
     `many` the first two decide, otherwise the third.
     """
 
     def __init__(
-        self, rigid: Calibration, model: RobotModel, folds: tuple[np.ndarray, ...], *, many: bool
+        self,
+        rigid: Calibration,
+        model: RobotModel,
+        base: tuple[str, ...],
+        folds: tuple[np.ndarray, ...],
+        *,
+        many: bool,
     ) -> None:
         self.rigid = rigid
         self.model = replace(rigid.model, config=model.config)
@@ -60,16 +66,17 @@ class TermTrials:
         self.deciding = (0, 1) if many else (2,)
         self._columns: dict[str, np.ndarray] = {}
         self._fits: dict[tuple[str, ...], LeftOut] = {}
+        self._base = base
 
-    def start(self, base: tuple[str, ...]) -> ConsideredTerm:
+    def start(self) -> ConsideredTerm:
         """The row of the base terms."""
-        return self._row(None, base, 0.0, taken=True, reason="")
+        return self._row(None, self._base, 0.0, taken=True, reason="")
 
     def compare(self, chosen: tuple[str, ...], term: str, extra: float) -> ConsideredTerm:
         """Whether a term is taken beside those chosen; `extra` is what the criterion must fall by beyond 0."""
         terms = (*chosen, term)
         old, new = self.fit(chosen), self.fit(terms)
-        bic = new.bic - old.bic
+        bic = self._criterion(old, new)
         gains = [self._gain(old, new, k) for k in self.deciding]
         errors = (
             f"{old.mean(self.deciding) / MILLIMETRE:.4f} to {new.mean(self.deciding) / MILLIMETRE:.4f} mm"
@@ -108,6 +115,11 @@ class TermTrials:
         order, workspace, single = (float(d.mean()) for d in fit.distances)
         largest = fit.largest(self.deciding)
         return ConsideredTerm(term, terms, order, workspace, single, largest, bic, taken, reason)
+
+    def _criterion(self, old: LeftOut, new: LeftOut) -> float:
+        """Change of the Bayesian information criterion of the coordinates that the base terms leave free (Schwarz 1978)."""
+        free = max(self.rigid.residuals.size - self.fit(self._base).freedom, 1.0)
+        return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
 
     def _gain(self, old: LeftOut, new: LeftOut, kind: int) -> tuple[float, float]:
         """Mean gain (m) over the folds of a kind, which are the independent units, and its standard error."""
