@@ -88,7 +88,11 @@ class TermTrials:
         elif any(gain <= error for gain, error in gains):
             reason = f"the mean error at left-out poses falls by less than its standard error ({errors})"
         elif bic >= -extra:
-            reason = f"the BIC changes by {bic:+.0f}, where less than {-extra:.0f} would speak for it"
+            reason = (
+                f"the BIC rises by {bic:.0f}"
+                if bic >= 0
+                else f"the BIC falls by {-bic:.1f}, less than {extra:.1f}"
+            )
         elif most[1] > _WORSE * most[0]:
             reason = f"the largest error at a left-out pose would rise from {most[0] / MILLIMETRE:.4f} to {most[1] / MILLIMETRE:.4f} mm"
         else:
