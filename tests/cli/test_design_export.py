@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexcal.calibration import rigid_motion
 from flexcal.data import PosePlan, read_plan_of
 from flexcal.estimates_file import read_estimates
 from flexcal.model import RobotModel, point_kinematics
@@ -108,7 +109,9 @@ def test_exported_urdf_is_the_calibrated_robot(run, ur5_folder: Path) -> None:
     q = np.random.default_rng(3).uniform(-3, 3, (50, 6))
     there = point_kinematics(RobotModel.from_yaml(again), q, jacobians=False).position
     here = point_kinematics(model, q, jacobians=False).position
-    assert np.abs(there - here).max() < 1e-12
+    # where the base stands before a tracker with a frame of its own is a choice: the most probable robot's here
+    turn, shift = rigid_motion(here, there)
+    assert np.abs(there - here @ turn.T - shift).max() < 1e-9 and np.linalg.norm(shift) < 5e-3
     assert (
         np.abs(
             here - point_kinematics(RobotModel.from_yaml(robot, estimates=False), q, jacobians=False).position

@@ -40,7 +40,10 @@ def test_every_format_of_a_calibrated_robot(run, ur5_folder: Path) -> None:
             assert document["tool_error"]["mean_mm"] < 0.8 * document["without_offsets"]["mean_mm"]
             joints = document["joints"]
             assert list(joints) == list(RobotModel.from_yaml(robot).joint_names)
-            assert all(0 < joint["std"] < 1e-3 for joint in list(joints.values())[:5])
+            ends, middle = ("shoulder_pan_joint", "wrist_3_joint"), list(joints.values())[1:5]
+            assert all(0 < joint["std"] < 1e-3 and joint["determined"] for joint in middle)
+            for joint in (joints[name] for name in ends):
+                assert joint["offset"] == 0.0 and not joint["determined"] and joint["std"] is None
         else:
             assert lost == [] and document["tool_error"]["max_mm"] < 1e-6
     page = run("export", "json", robot, "--out", ur5_folder / "exported" / FORMATS["json"])

@@ -3,7 +3,7 @@ from .before import ErrorsBefore, RobotBefore, robot_before
 from .drift import Drift
 from .elastic_prior import ElasticPrior
 from .error_statistics import ErrorStatistics
-from .gauge import found_point, probable_robot
+from .gauge import found_point, probable_robot, probable_robots
 from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
 from .measured_points import require_points
@@ -57,6 +57,7 @@ __all__ = [
     "noise_repeatability",
     "predict",
     "probable_robot",
+    "probable_robots",
     "propagation",
     "random_poses_in",
     "register",

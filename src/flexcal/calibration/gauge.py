@@ -34,15 +34,21 @@ _UNSEEN = 1e-8
 
 
 def probable_robot(model: RobotModel, targets: Sequence[str]) -> RobotModel:
+    """The first of `probable_robots`."""
+    return probable_robots(model, targets)[0]
+
+
+def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotModel, RobotModel]:
     """`model` with the directions of its geometry that do not move the measured points `targets` where they are most probable.
 
     Weighted least squares of all geometric errors, subject to unchanged positions of the points as every calibrated station sees them, by
     Gauss-Newton. The posterior follows: what was estimated is propagated, and the free directions have the tolerances as their
-    covariance. The robot itself where nothing was calibrated.
+    covariance. The second robot is the same with only these in its posterior: what the measured points leave open. Both are the
+    robot itself where nothing was calibrated.
     """
     stations = [name for name in model.stations if f"station.{name}.x" in model.posterior.parameters]
     if not stations or not targets:
-        return model
+        return model, model
     names = _names(model, targets, stations)
     std = np.array([_std(model, name, targets) for name in names])
     poses = _random_poses(model, targets, stations)
@@ -64,7 +70,8 @@ def probable_robot(model: RobotModel, targets: Sequence[str]) -> RobotModel:
         found = found.with_values(dict(zip(names, changed.tolist(), strict=True)))
         if np.abs(step).max() < _SMALL:
             break
-    return replace(found, posterior=_propagated(found, names, free, weight))
+    whole, unseen = _propagated(found, names, free, weight)
+    return replace(found, posterior=whole), replace(found, posterior=unseen)
 
 
 def found_point(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
@@ -124,8 +131,11 @@ def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[
     )
 
 
-def _propagated(model: RobotModel, names: list[str], free: np.ndarray, weight: np.ndarray) -> Posterior:
-    """The posterior about `model`: free directions, spanned by `free` (p, k), follow the others to where they are most probable."""
+def _propagated(
+    model: RobotModel, names: list[str], free: np.ndarray, weight: np.ndarray
+) -> tuple[Posterior, Posterior]:
+    """The posterior about `model`, whose free directions, spanned by `free` (p, k), follow the others to where they are most probable; and
+    the part of it that these directions alone make."""
     old = model.posterior
     added = [name for name in names if name not in old.parameters]
     every = [*old.parameters.names, *added]
@@ -136,11 +146,12 @@ def _propagated(model: RobotModel, names: list[str], free: np.ndarray, weight: n
     across = np.eye(len(every))
     across[np.ix_(rows, rows)] -= free @ np.linalg.lstsq(precision, free.T * weight**2, rcond=None)[0]
     covariance = across @ covariance @ across.T
-    covariance[np.ix_(rows, rows)] += free @ np.linalg.pinv(precision, hermitian=True) @ free.T
+    unseen = np.zeros_like(covariance)
+    unseen[np.ix_(rows, rows)] = free @ np.linalg.pinv(precision, hermitian=True) @ free.T
     moved = {name: model.value(name) for name in names}
     kept = Parameters(
         replace(item, value=moved[item.name], prior_mean=None) if item.name in moved else item
         for item in old.parameters
     )
     more = Parameters(Parameter(name, unit_of(name), moved[name]) for name in added)
-    return Posterior(kept + more, covariance)
+    return Posterior(kept + more, covariance + unseen), Posterior(kept + more, unseen)

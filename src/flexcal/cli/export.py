@@ -37,7 +37,7 @@ class Export(ABC):
         """Write the file."""
 
     @abstractmethod
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         """What to do with it."""
 
     def tables(self, document: dict[str, Any]) -> list[Table]:
@@ -55,7 +55,7 @@ class Export(ABC):
         console.say(f"wrote {found.export.path}")
         for sentence in (*found.export.loss.sentences, *found.export.remarks):
             console.say(sentence)
-        following = self.following()
+        following = self.following(document)
         if not found.calibrated:
             console.say("there is no calibration: the joints are where the nominal robot has them")
             following = f"flexcal calibrate {self.robot} POSES…, and export again"
@@ -75,7 +75,7 @@ class ExportUrdf(Export):
 
         return export_urdf(self.robot, self.out, estimates=self.estimates)
 
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         return f"load {self.out} wherever the nominal URDF was loaded"
 
 
@@ -92,7 +92,7 @@ class ExportMjcf(Export):
 
         return export_mjcf(self.robot, self.out, estimates=self.estimates)
 
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         return f"load {self.out} in MuJoCo, or look at it with 'python -m mujoco.viewer --mjcf={self.out}'"
 
 
@@ -108,7 +108,7 @@ class ExportSdf(Export):
 
         return export_sdf(self.robot, self.out, estimates=self.estimates)
 
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         return f"include {self.out} in a Gazebo world"
 
 
@@ -124,7 +124,7 @@ class ExportKinematics(Export):
 
         return export_kinematics(self.robot, self.out, estimates=self.estimates)
 
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         return f"give {self.out} to the description or driver as kinematics_params_file"
 
 
@@ -140,7 +140,7 @@ class ExportJson(Export):
 
         return export_json(self.robot, self.out, estimates=self.estimates)
 
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         return f"read {self.out} in your own program; docs/file-formats.md says what stands in it"
 
 
@@ -155,7 +155,7 @@ class ExportDh(Export):
     convention: ClassVar[Literal["standard", "modified"]] = "standard"
     point: Point = None
     four_parameters: bool = False
-    """Never use beta: for controllers that take four parameters a joint; d may become very large."""
+    """Never use beta: for controllers that take four parameters a joint; what axes are tilted that are nominally parallel is left out."""
 
     def write(self) -> ExportedRobot:
         from flexcal.workflow.export_robot import export_dh
@@ -169,8 +169,10 @@ class ExportDh(Export):
             estimates=self.estimates,
         )
 
-    def following(self) -> str:
-        return f"enter the calibrated values of {self.out} in the controller, base and tool too"
+    def following(self, document: dict[str, Any]) -> str:
+        if not document["safe"]:
+            return f"compare the nominal values of {self.out} with the controller's before entering anything: see above"
+        return f"where the controller has the nominal values of {self.out}, enter the calibrated ones, base and tool too"
 
     def tables(self, document: dict[str, Any]) -> list[Table]:
         from flexcal.cli.export_tables import dh_table, frame_table
@@ -209,8 +211,10 @@ class ExportOffsets(Export):
             self.robot, self.out, point=self.point, keep_frames=self.keep_frames, estimates=self.estimates
         )
 
-    def following(self) -> str:
+    def following(self, document: dict[str, Any]) -> str:
         frames = "" if self.keep_frames else ", and set base and tool as it says"
+        if not document["safe"]:
+            return f"look why the offsets of {self.out} are so large before adding any to the joint zeros of the controller: see above"
         return f"add the offsets of {self.out} to the joint zeros of the controller{frames}"
 
     def tables(self, document: dict[str, Any]) -> list[Table]:

@@ -24,7 +24,11 @@ def dh_table(document: Mapping[str, Any]) -> Table:
     for name, row in document["joints"].items():
         new, old, std = row["calibrated"], row["nominal"], row["std"]
         lines = (
-            (_shown(key, new[key]), f"({_change(key, new[key] - old[key])})", _spread(key, std))
+            (
+                _shown(key, new[key]),
+                f"({_change(key, new[key] - old[key])})",
+                "not determined" if key in row["undetermined"] else _spread(key, std),
+            )
             for key in keys
         )
         table.add_row(name, *("\n".join(filter(None, cell)) for cell in lines))
@@ -40,10 +44,12 @@ def offset_table(document: Mapping[str, Any]) -> Table:
     table.add_column("unit")
     for name, row in document["joints"].items():
         unit, scale = ("mm", MILLIMETRE) if row["unit"] == "m" else ("°", DEGREE)
-        cells = (
+        cells = [
             "" if value is None else f"{value / scale:.5f}"
             for value in (row["offset"], row["std"], row["motor_offset"])
-        )
+        ]
+        if not row["determined"]:
+            cells[1] = "not determined"
         table.add_row(name, *cells, unit)
     return table
 

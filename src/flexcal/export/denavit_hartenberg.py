@@ -11,7 +11,8 @@ d keeps its nominal value and beta, the turn about y, takes its place (Hayati, M
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -21,8 +22,8 @@ from flexcal.model.joint import normals_to
 from flexcal.model.placement import joint_placement, link_placement, point_placement
 
 NEARLY_PARALLEL = np.deg2rad(1.0)
-_PARALLEL = 1e-7
-"""rad: of axes closer to parallel than this, what rounding leaves of the common normal is worse than to take them as parallel."""
+_COINCIDENT = 1e-3
+"""m: of nominally parallel axes closer than this the common normal has no direction to speak of."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +73,9 @@ def chain_axes(model: RobotModel, point: str, chain: tuple[int, ...]) -> Axes:
 def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChain:
     """The parameters of a chain; of the choices that they leave, those of the chain `like` (default: the smallest angles).
 
-    With `hayati`, consecutive axes within 1° of parallel (in `like`, where given) get beta and keep d; without, every beta is zero.
+    Consecutive axes within 1° of parallel (in `like`, where given) keep d, for their common normal is far away or nowhere; with `hayati`
+    they get beta, without, the tilt about y is left out. Where they coincide in `like`, theta stays too, and what they are apart
+    across x is left out.
     """
     count = len(axes.joints)
     theta, d, a, alpha, beta = np.zeros((5, count))
@@ -80,8 +83,8 @@ def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChai
     base = frame = _first_frame(axes.points[0], axes.directions[0])
     for k in range(count - 1):
         z, following = frame[:3, 2], axes.directions[k + 1]
-        angle = _angle_between(z, following) if like is None or not hayati else nominal_angle(like, k)
-        parallel = angle < (NEARLY_PARALLEL if hayati else _PARALLEL)
+        angle = _angle_between(z, following) if like is None else nominal_angle(like, k)
+        parallel = angle < NEARLY_PARALLEL
         preferred = frame[:3, 0] if like is None else like.x[k]
         if parallel:
             d[k] = 0.0 if like is None else like.d[k]
@@ -92,7 +95,8 @@ def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChai
             across = np.cross(z, following)
             d[k] = _foot(frame[:3, 3], z, axes.points[k + 1], following)
             start = frame[:3, 3] + d[k] * z
-        x = _unit(across, z, preferred)
+        together = parallel and like is not None and abs(like.a[k]) < _COINCIDENT
+        x = _unit(np.zeros(3) if together else across, z, preferred)
         theta[k] = np.arctan2(x @ frame[:3, 1], x @ frame[:3, 0])
         a[k] = across @ x if parallel else (axes.points[k + 1] - start) @ x
         beta[k] = np.arcsin(following @ x) if hayati and parallel else 0.0
@@ -103,6 +107,20 @@ def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChai
     normals[-1] = frame[:3, 0]
     frame = frame @ joint_transform(0.0, d[-1])
     return DhChain(base, theta, d, a, alpha, beta, np.linalg.solve(frame, axes.tool), normals)
+
+
+def slides_moved(axes: Axes, nominal: Axes, kinds: Sequence[str]) -> Axes:
+    """The chain with the axes of prismatic joints, which may lie anywhere, moved to where they lie `nominal`ly from what follows them.
+
+    So theta of a slide that is parallel to the next axis does not turn with hundredths of a millimetre.
+    """
+    points = axes.points.copy()
+    after, before = axes.tool[:3, 3], nominal.tool[:3, 3]
+    for k in reversed(range(len(points))):
+        if kinds[k] == "prismatic":
+            points[k] = nominal.points[k] + after - before
+        after, before = points[k], nominal.points[k]
+    return replace(axes, points=points)
 
 
 def joint_transform(theta: float, d: float) -> np.ndarray:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +15,11 @@ from flexcal.model.rotations import rotation_vector, vector_rotation
 _STEPS = 8
 _SMALL = 1e-8
 """m and rad: a step after which there is no other."""
+_SOME = 300
+_UNSEEN = 1e-6
+"""Of the largest column: what rounding leaves of an offset that base and tool can do as well."""
+_MADE_WITHIN = {"revolute": 5e-4, "prismatic": 3e-4}
+"""rad and m: how well the zero of a joint is known without any calibration."""
 _REST = 1e-4
 """Weight, relative to a tool error, of moving base and tool by as much: what offsets can do as well, offsets do."""
 
@@ -22,27 +28,65 @@ _REST = 1e-4
 class OffsetFit:
     """`offsets` (n,), rad or m, that are added to q of the nominal robot, and their standard deviations `std` (n,), zero where unknown.
 
-    `base` (6,): position, m, and rotation vector, rad, of the nominal robot's base in that of the real one; `tool` (3,) m is added to the
-    target in its frame. `before` is the tool error of the nominal robot with the same freedom of base and tool and no offsets.
+    `determined` (n,): False for those that the measured points do not tell, which are zero. `base` (6,): position, m, and
+    rotation vector, rad, of the nominal robot's base in that of the real one; `tool` (3,) m is added to the target in its frame.
+    `before` is the tool error of the nominal robot with the same freedom of base and tool and no offsets.
     """
 
     offsets: np.ndarray
     std: np.ndarray
+    determined: np.ndarray
     base: np.ndarray
     tool: np.ndarray
     before: Distances
 
 
-def fit_offsets(model: RobotModel, nominal: RobotModel, point: str, *, keep_frames: bool) -> OffsetFit:
+def fit_offsets(
+    model: RobotModel,
+    nominal: RobotModel,
+    point: str,
+    *,
+    keep_frames: bool,
+    undetermined: Collection[int] = (),
+) -> OffsetFit:
     """Least squares of the tool error between `model` at rest and `nominal` with offsets, base and tool, over random poses.
 
     The poses are those of the working volume where one is declared. With `keep_frames` base and tool stay. The standard deviations are
-    those that the covariance of the model's parameters gives, to first order.
+    those that the covariance of the model's parameters gives, to first order. Offsets of the joints `undetermined` are held at zero, and so
+    are those that are known less well than a joint is made and do not differ from zero by two standard deviations.
     """
+    held = np.isin(np.arange(model.n), sorted(undetermined))
+    fit = _fit(model, nominal, point, held, keep_frames=keep_frames)
+    made = np.array([_MADE_WITHIN[joint.kind] for joint in model.joints])
+    weak = ~held & (fit.std > made) & (np.abs(fit.offsets) < 2 * fit.std)
+    return _fit(model, nominal, point, held | weak, keep_frames=keep_frames) if weak.any() else fit
+
+
+def undetermined_offsets(nominal: RobotModel, points: Sequence[str], *, base: bool) -> tuple[int, ...]:
+    """Joints whose zero is no matter of measured `points`: as well could each point sit elsewhere on the tool, or, with `base`, the base
+    elsewhere before the instrument."""
+    rng = np.random.default_rng(2)
+    free = np.ones(nominal.n + 9, dtype=bool)
+    seen = np.zeros(nominal.n, dtype=bool)
+    frames = np.arange(nominal.n + (0 if base else 6), nominal.n + 9)
+    for point in points:
+        q, _ = random_poses(nominal, point, rng)
+        columns = _columns(nominal, q[:_SOME], np.zeros(nominal.n + 9), point, free)
+        orthogonal = np.linalg.qr(columns[:, frames])[0]
+        offsets = columns[:, : nominal.n]
+        left = np.linalg.norm(offsets - orthogonal @ (orthogonal.T @ offsets), axis=0)
+        seen |= left > _UNSEEN * np.linalg.norm(columns[:, : nominal.n], axis=0).max()
+    return tuple(np.flatnonzero(~seen).tolist())
+
+
+def _fit(
+    model: RobotModel, nominal: RobotModel, point: str, held: np.ndarray, *, keep_frames: bool
+) -> OffsetFit:
+    """The fit without the offsets that are `held` (n,) at zero."""
     q, _ = random_poses(model, point, np.random.default_rng(1))
     wanted, flank = tool_positions(model, q, point=point)
     n = model.n
-    free = _free(n, frames=not keep_frames)
+    free = _free(n, frames=not keep_frames) & ~np.concatenate([held, np.zeros(9, dtype=bool)])
     fitted = _solve(nominal, q, wanted, point, free)
     still = _solve(nominal, q, wanted, point, free & (np.arange(n + 9) >= n))
     columns = _columns(nominal, q, fitted, point, free)
@@ -51,7 +95,9 @@ def fit_offsets(model: RobotModel, nominal: RobotModel, point: str, *, keep_fram
     response = _least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
     std = np.linalg.norm(response, axis=1)
     before = Distances.of(wanted - offset_tool(nominal, q, still, point))
-    return OffsetFit(fitted[:n], std[:n], fitted[n : n + 6], fitted[n + 6 :], before)
+    return OffsetFit(
+        np.where(held, 0.0, fitted[:n]), std[:n], ~held, fitted[n : n + 6], fitted[n + 6 :], before
+    )
 
 
 def offset_tool(nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, point: str) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+from collections.abc import Collection
 from io import StringIO
 
 import numpy as np
@@ -16,24 +17,47 @@ from flexcal.model import RobotModel
 from flexcal.model.rotations import rotation_vector, vector_rotation
 from flexcal.units import DEGREE, MILLIMETRE
 
-COLUMNS = ("joint", "parameter", "unit", "value", "std", "value_deg", "motor_deg")
+COLUMNS = ("joint", "parameter", "unit", "value", "std", "value_deg", "motor_deg", "determined")
+_LARGE = 5 * DEGREE
+"""An offset from which on it is rather another zero in the URDF than an error."""
 
 
 def render_offsets(
-    model: RobotModel, nominal: RobotModel, *, point: str | None = None, keep_frames: bool = False
+    model: RobotModel,
+    nominal: RobotModel,
+    *,
+    point: str | None = None,
+    keep_frames: bool = False,
+    undetermined: Collection[int] = (),
 ) -> Rendered:
-    """The best joint offsets as a CSV table, with base and tool that go with them unless `keep_frames`.
+    """The best joint offsets as a CSV table, with base and tool that go with them unless `keep_frames`; zero for the joints `undetermined`.
 
     Raises `FlexcalError` for a robot without points, or an unknown point.
     """
     target, chain = chain_to(model, point, "Joint offsets")
-    fit = fit_offsets(model, nominal, target, keep_frames=keep_frames)
+    fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined)
     text = _csv(model, fit, chain, keep_frames=keep_frames)
-    placed = "as it is" if keep_frames else "with base and tool placed as well as they go"
+    placed = "as it is" if keep_frames else "with base and tool placed by best fit"
     remarks = [
         f"Without offsets, {placed}, the nominal robot is off by {fit.before.mean / MILLIMETRE:.3f} mm on average, "
         f"{fit.before.max / MILLIMETRE:.3f} mm at most."
     ]
+    open_ = [model.joint_names[i] for i in chain if not fit.determined[i]]
+    if open_:
+        remarks.append(
+            f"Not determined, and zero here: {', '.join(open_)}. What was measured cannot tell their zeros from another place of the "
+            "base or of the measured point on the tool; leave these zeros as they are."
+        )
+    large = [
+        model.joint_names[i]
+        for i in chain
+        if abs(fit.offsets[i]) > _LARGE and model.joints[i].kind != "prismatic"
+    ]
+    if large:
+        remarks.append(
+            f"Larger than any error of manufacture: {', '.join(large)}. Look whether URDF and controller have the same zeros before "
+            "entering any."
+        )
     left = [name for i, name in enumerate(model.joint_names) if i not in chain]
     if left:
         remarks.append(
@@ -55,7 +79,8 @@ def render_offsets(
         model.joints[i].name: {
             "offset": float(fit.offsets[i]),
             "unit": "m" if model.joints[i].kind == "prismatic" else "rad",
-            "std": float(fit.std[i]) if fit.std[i] > 0 else None,
+            "std": float(fit.std[i]) if fit.determined[i] and fit.std[i] > 0 else None,
+            "determined": bool(fit.determined[i]),
             "motor_offset": float(fit.offsets[i] * model.ratio[i]) if np.isfinite(model.ratio[i]) else None,
         }
         for i in chain
@@ -69,11 +94,13 @@ def render_offsets(
             "Joint offsets: with the joints at q, the nominal robot at q + offset is nearest to the real one. "
             "Least squares over random poses; no other geometry is changed.",
             *frames,
+            "determined: no for an offset that the measured points do not tell, which is left at zero.",
             "std: what the uncertainty of the calibrated parameters leaves. motor_deg: at the motor, by drives: ratio of robot.yaml.",
         ),
         remarks=tuple(remarks),
         table={
             "joints": document,
+            "safe": not large,
             "without_offsets": fit.before.in_millimetres(),
             "base": None if keep_frames else _base_numbers(fit.base),
             "tool": None if keep_frames else dict(zip("xyz", fit.tool.tolist(), strict=True)),
@@ -117,18 +144,19 @@ def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_fram
     writer.writerow(COLUMNS)
     for i in chain:
         joint, value = model.joints[i], float(fit.offsets[i])
-        std = repr(float(fit.std[i])) if fit.std[i] > 0 else ""
+        std = repr(float(fit.std[i])) if fit.determined[i] and fit.std[i] > 0 else ""
+        told = "yes" if fit.determined[i] else "no"
         if joint.kind == "prismatic":
-            writer.writerow([joint.name, "offset", "m", repr(value), std, "", ""])
+            writer.writerow([joint.name, "offset", "m", repr(value), std, "", "", told])
             continue
         at_motor = value * model.ratio[i] / DEGREE
         motor = f"{at_motor:.6f}" if np.isfinite(at_motor) else ""
-        writer.writerow([joint.name, "offset", "rad", repr(value), std, f"{value / DEGREE:.6f}", motor])
+        writer.writerow([joint.name, "offset", "rad", repr(value), std, f"{value / DEGREE:.6f}", motor, told])
     if not keep_frames:
         for key, value in _base_numbers(fit.base).items():
             angle = key in SIX[3:]
             degrees = f"{value / DEGREE:.6f}" if angle else ""
-            writer.writerow(["base", key, "rad" if angle else "m", repr(value), "", degrees, ""])
+            writer.writerow(["base", key, "rad" if angle else "m", repr(value), "", degrees, "", ""])
         for key, value in zip("xyz", fit.tool.tolist(), strict=True):
-            writer.writerow(["tool", key, "m", repr(value), "", "", ""])
+            writer.writerow(["tool", key, "m", repr(value), "", "", "", ""])
     return stream.getvalue()

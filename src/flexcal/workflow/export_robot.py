@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from flexcal.calibration import probable_robots
 from flexcal.errors import InputError
 from flexcal.estimates_file import read_estimates
 from flexcal.export.dh import Convention, render_dh
@@ -14,15 +15,35 @@ from flexcal.export.exported import Exported, Rendered, write_rendered
 from flexcal.export.json_document import render_json
 from flexcal.export.kinematics import render_kinematics
 from flexcal.export.mjcf_file import render_mjcf
+from flexcal.export.offset_fit import undetermined_offsets
 from flexcal.export.offsets import render_offsets
 from flexcal.export.sdf import render_sdf
 from flexcal.export.urdf import render_urdf
 from flexcal.model import RobotModel
-from flexcal.model.stored import apply_estimates
-from flexcal.workflow.calibrated_robot import stored_estimates
+from flexcal.model.stored import with_blocks
+from flexcal.workflow.calibrated_robot import measured_points, stored_estimates
 
-Render = Callable[[RobotModel, RobotModel], Rendered]
-"""The calibrated and the nominal robot to the text of a file."""
+
+@dataclass(frozen=True, eq=False)
+class Exportable:
+    """The `nominal` robot and the calibrated `model`; `unseen` has only that in its posterior which the `measured` points leave open."""
+
+    nominal: RobotModel
+    model: RobotModel
+    unseen: RobotModel | None
+    measured: tuple[str, ...]
+
+    @property
+    def undetermined(self) -> tuple[int, ...]:
+        """Joints whose zeros the measured points do not tell; before an instrument with a frame of its own the base is anywhere."""
+        if not self.measured:
+            return ()
+        registered = bool(self.model.station[:, 3:].any())
+        return undetermined_offsets(self.nominal, self.measured, base=registered)
+
+
+Render = Callable[[Exportable], Rendered]
+"""A robot to the text of a file."""
 
 
 @dataclass(frozen=True)
@@ -55,27 +76,27 @@ def export_urdf(robot: Path, out: Path, *, estimates: Path | None = None) -> Exp
 
     Raises `FlexcalError`, as every export here, as reading and the format's rendering do, and where `out` is one of the robot's own files.
     """
-    return _export(robot, out, estimates, lambda model, _: render_urdf(model))
+    return _export(robot, out, estimates, lambda robot_: render_urdf(robot_.model))
 
 
 def export_mjcf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
     """Write the robot as MJCF with elastic joints."""
-    return _export(robot, out, estimates, lambda model, _: render_mjcf(model))
+    return _export(robot, out, estimates, lambda robot_: render_mjcf(robot_.model))
 
 
 def export_sdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
     """Write the robot as SDFormat."""
-    return _export(robot, out, estimates, render_sdf)
+    return _export(robot, out, estimates, lambda robot_: render_sdf(robot_.model, robot_.nominal))
 
 
 def export_json(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
     """Write everything of the robot as one JSON document."""
-    return _export(robot, out, estimates, render_json)
+    return _export(robot, out, estimates, lambda robot_: render_json(robot_.model, robot_.nominal))
 
 
 def export_kinematics(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
     """Write the placements of six joints as the `kinematics` YAML of Universal Robots' ROS description."""
-    return _export(robot, out, estimates, render_kinematics)
+    return _export(robot, out, estimates, lambda robot_: render_kinematics(robot_.model, robot_.nominal))
 
 
 def export_dh(
@@ -89,8 +110,15 @@ def export_dh(
 ) -> ExportedRobot:
     """Write the Denavit-Hartenberg table of the chain to a point; see `render_dh`."""
 
-    def render(model: RobotModel, nominal: RobotModel) -> Rendered:
-        return render_dh(model, nominal, convention, point=point, four_parameters=four_parameters)
+    def render(robot_: Exportable) -> Rendered:
+        return render_dh(
+            robot_.model,
+            robot_.nominal,
+            convention,
+            point=point,
+            four_parameters=four_parameters,
+            unseen=robot_.unseen,
+        )
 
     return _export(robot, out, estimates, render)
 
@@ -105,8 +133,14 @@ def export_offsets(
 ) -> ExportedRobot:
     """Write the best joint offsets of the chain to a point; see `render_offsets`."""
 
-    def render(model: RobotModel, nominal: RobotModel) -> Rendered:
-        return render_offsets(model, nominal, point=point, keep_frames=keep_frames)
+    def render(robot_: Exportable) -> Rendered:
+        return render_offsets(
+            robot_.model,
+            robot_.nominal,
+            point=point,
+            keep_frames=keep_frames,
+            undetermined=robot_.undetermined,
+        )
 
     return _export(robot, out, estimates, render)
 
@@ -120,6 +154,9 @@ def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> E
     if estimates is not None and not path.exists():
         raise InputError(f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out.")
     stored = path.exists()
-    model = apply_estimates(nominal, path) if stored else nominal
-    calibrated = stored and "calibration" in read_estimates(path)
-    return ExportedRobot(write_rendered(model, out, render(model, nominal)), calibrated)
+    blocks = read_estimates(path) if stored else {}
+    model = with_blocks(nominal, blocks, path) if stored else nominal
+    measured = measured_points(nominal, blocks)
+    probable, unseen = probable_robots(model, measured) if measured else (model, None)
+    exportable = Exportable(nominal, probable, unseen, measured)
+    return ExportedRobot(write_rendered(probable, out, render(exportable)), "calibration" in blocks)
