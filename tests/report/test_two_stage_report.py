@@ -145,7 +145,7 @@ def test_table_1_has_every_interval_and_the_papers_value(
 
 def test_the_poses_are_drawn_in_space(outline: Outline, study: TwoStageStudy) -> None:
     traces = outline.figures()["figure-10"]["data"]
-    assert {trace["type"] for trace in traces} <= {"scatter3d", "cone"}
+    assert {trace["type"] for trace in traces} == {"scatter3d", "cone", "mesh3d"}
     assert len(study.points.poses) == 40
 
 
@@ -242,7 +242,7 @@ def test_stage_zero_stands_beside_cad_alone(study: TwoStageStudy, tmp_path: Path
         path, replace(study, results=results, estimates={**study.estimates, "dynamics": found})
     )
     section = path.read_text("utf-8")
-    section = section[section.index('id="table-stage0-gain"') : section.index('id="stage1"')]
+    section = section[section.index('id="table-stage0-gain"') : section.index('id="provenance"')]
     text = re.sub(r"\s+", " ", re.sub(r"<[^>]*>", " ", section))
     both = f"{document_millimetres(rigid['p90_mm'])} {millimetres(study.verification.all.p90)}"
     assert f"stage 2: P90 at fresh poses / mm {both}" in text

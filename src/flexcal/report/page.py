@@ -179,6 +179,11 @@ class Page:
         """All figures in the order of the page."""
         return tuple(b for s in self.sections for b in s.blocks if isinstance(b, FigureBlock))
 
+    @property
+    def numbers(self) -> dict[str, int]:
+        """Number of each figure by its id, in the order of the page."""
+        return {block.id: number for number, block in enumerate(self.figures, start=1)}
+
 
 def tally(checks: Sequence[Check]) -> str:
     """How many checks are good, and how many could not be judged, in words."""

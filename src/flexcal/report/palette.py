@@ -11,6 +11,7 @@ LIGHT = {
     "elastic": "#1f6fd0",
     "rigid": "#d9541e",
     "nominal": "#7d8690",
+    "links": "#c3cad2",
 }
 DARK = {
     "page": "#14181d",
@@ -21,10 +22,11 @@ DARK = {
     "elastic": "#5a9df0",
     "rigid": "#f0804f",
     "nominal": "#949ea9",
+    "links": "#6f7985",
 }
 
 PAGE, INK, QUIET, GRID, AXIS = (LIGHT[k] for k in ("page", "ink", "quiet", "grid", "axis"))
-ELASTIC, RIGID, NOMINAL = (LIGHT[k] for k in ("elastic", "rigid", "nominal"))
+ELASTIC, RIGID, NOMINAL, LINKS = (LIGHT[k] for k in ("elastic", "rigid", "nominal", "links"))
 
 
 def dark_of() -> dict[str, str]:

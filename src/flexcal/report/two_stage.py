@@ -54,11 +54,11 @@ def two_stage_page(study: TwoStageStudy) -> Page:
         f"{results['seed']}",
         verdict=two_stage_verdict(study),
         sections=(
-            *([before] if before is not None else []),
-            stiffness_section(study),
+            verification_section(study),
             geometry_section(study),
             residuals_section(results["joints"], points.poses, points.calibrated, study.geometry.outliers),
-            verification_section(study),
+            stiffness_section(study),
+            *([before] if before is not None else []),
             comparison_section(study),
             provenance_section(
                 results["command"], results["seed"], results["seconds"], common_origin(study.estimates)

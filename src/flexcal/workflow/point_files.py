@@ -82,7 +82,13 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
 
 def write_arm(folder: Path, arms: ArmPoses) -> None:
     """Leave `arms` as arm.npz in `folder`, atomically."""
-    arrays = {"corners": arms.corners, "pose": arms.pose, "tip": arms.tip}
+    arrays = {
+        "corners": arms.corners,
+        "surface": arms.surface,
+        "triangles": arms.triangles,
+        "pose": arms.pose,
+        "tip": arms.tip,
+    }
     arrays |= {f"errors_{model}": errors for model, errors in arms.errors.items()}
     with atomic_path(folder / ARM) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
@@ -94,7 +100,9 @@ def read_arm(folder: Path) -> ArmPoses:
     try:
         with np.load(path) as file:
             errors = {model: file[f"errors_{model}"] for model in _MODELS if f"errors_{model}" in file}
-            return ArmPoses(file["corners"], file["pose"], file["tip"], errors)
+            return ArmPoses(
+                file["corners"], file["surface"], file["triangles"], file["pose"], file["tip"], errors
+            )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         raise _unreadable(path, problem) from problem
 

@@ -13,12 +13,15 @@ from flexcal.model import RobotModel
 from flexcal.model.names import STATION
 from flexcal.model.rotations import vector_rotation
 from flexcal.report.figures.canvas import canvas, single
+from flexcal.report.link_surface import LinkSurface
 from flexcal.report.measured_points import CALIBRATED, ArmPoses
-from flexcal.report.palette import ELASTIC, GRID, INK, NOMINAL, QUIET, RIGID
+from flexcal.report.palette import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID
 from flexcal.units import MILLIMETRE
 
 _EXAMPLES = 3
-"""Poses drawn boldly, as in the paper's figure."""
+"""Poses in which the links are drawn, as in the paper's figure."""
+_FAINT = 0.25
+"""Opacity of the links in all of these but the first."""
 
 _MOST_ARMS = 60
 _MOST_ARROWS = 1500
@@ -31,22 +34,23 @@ def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray])
     rows = _evenly(len(poses), _MOST_ARROWS)
     corners = skeletons(model, poses.subset(rows))
     turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
-    return ArmPoses(corners[_evenly(len(rows), _MOST_ARMS)], poses.pose[rows], corners[:, -1], turned)
+    surface = LinkSurface.of(model)
+    drawn = surface.at(model, poses.q[rows[_evenly(len(rows), _EXAMPLES)]]).astype(np.float32)
+    arms = corners[_evenly(len(rows), _MOST_ARMS)]
+    return ArmPoses(arms, drawn, surface.triangles, poses.pose[rows], corners[:, -1], turned)
 
 
 def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> go.Figure:
-    """Skeletons of the arm, and at each measured point an error vector.
+    """The links in a few poses, the arm as lines in others, and at each measured point an error vector.
 
     `labels` are the words for the models of `arms.errors`, `factors` how many times longer than they are their arrows are drawn. The
     traces of a model carry `meta = {"arrows": label, "exaggeration": factor}`, by which the page chooses and stretches them. Everything is
     drawn in the robot's base frame.
     """
     figure = canvas(620)
-    figure.add_trace(polyline(arms.corners, "the arm", NOMINAL, 2.5, opacity=0.45))
-    chosen = arms.corners[:: max(1, len(arms.corners) // _EXAMPLES)][:_EXAMPLES]
-    examples = polyline(chosen, f"{len(chosen)} of the poses", INK, 9.0)
-    examples.update(mode="lines+markers", marker={"size": 4, "color": INK})
-    figure.add_trace(examples)
+    figure.add_trace(polyline(arms.corners, "arm at other poses", NOMINAL, 2.5, opacity=0.45))
+    for number, vertices in enumerate(arms.surface):
+        figure.add_trace(solid(vertices, arms.triangles, 1.0 if number == 0 else _FAINT, legend=number == 0))
     tips = arms.tip
     figure.add_trace(
         go.Scatter3d(
@@ -130,6 +134,18 @@ def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity:
         opacity=opacity,
         hoverinfo="skip",
     )
+
+
+def solid(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend: bool) -> go.Mesh3d:
+    """The links of the arm (V, 3), (F, 3) as one shaded trace."""
+    numbers = triangles.astype(np.int32)
+    return go.Mesh3d(
+        x=single(vertices[:, 0]), y=single(vertices[:, 1]), z=single(vertices[:, 2]),
+        i=numbers[:, 0], j=numbers[:, 1], k=numbers[:, 2],
+        color=LINKS, opacity=opacity, flatshading=True, name="links", showlegend=legend, hoverinfo="skip",
+        lightposition={"x": 1000, "y": 2000, "z": 4000},
+        lighting={"ambient": 0.8, "diffuse": 0.35, "specular": 0.05},
+    )  # fmt: skip
 
 
 def in_base(model: RobotModel, poses: PoseSet, vectors: np.ndarray) -> np.ndarray:

@@ -36,8 +36,8 @@ def geometry_section(study: TwoStageStudy) -> Section:
         f"computed for each pose; the remaining errors are geometric: axes that are not parallel, link lengths, joint offsets and "
         f"backlash.",
         (
-            arm_figure(study.arms, len(poses), "Figure 10"),
-            *([] if before is None else [error_figure(poses, before, after, "Figure 11")]),
+            arm_figure(study.arms, len(poses)),
+            *([] if before is None else [error_figure(poses, before, after)]),
             component_figure(poses, after),
             *identifiability_blocks(study.determined, study.paper),
             parameter_table(study.geometry, study.kept, study.truth),
@@ -45,7 +45,7 @@ def geometry_section(study: TwoStageStudy) -> Section:
     )
 
 
-def arm_figure(arms: ArmPoses, total: int, number: str = "") -> FigureBlock:
+def arm_figure(arms: ArmPoses, total: int) -> FigureBlock:
     """Fig. 10; `total` points were measured, and `arms` shows some or all of them."""
     labels = {model: words for model, words in _ARROWS.items() if model in arms.errors}
     length = min(_ARROW_LENGTH, _OVER_SPACING * _spacing(arms.tip))
@@ -58,22 +58,23 @@ def arm_figure(arms: ArmPoses, total: int, number: str = "") -> FigureBlock:
     )
     return FigureBlock(
         "figure-10",
-        title(number, f"arm and error vectors of the {total} measured points"),
+        f"Arm and error vectors of the {total} measured points",
         arm_poses(arms, labels, factors),
-        f"{some}The arm as lines from joint to joint, {drawn}; drag to turn it. Arrows point from the predicted to the measured point, "
+        f"{some}The links in {len(arms.surface)} poses, and lines from joint to joint {drawn}. Drag to rotate, Ctrl and the wheel to "
+        f"zoom. Arrows point from the predicted to the measured point, "
         f"exaggerated as chosen above; the longest is {largest}.",
-        f"Three-dimensional line drawing of the arm {drawn} with exaggerated error arrows; the longest is {largest}.",
+        f"Three-dimensional drawing of the arm {drawn} with exaggerated error arrows; the longest is {largest}.",
         (Selector("Error arrows", "arrows", tuple(labels.values())),),
         Slider("Exaggeration", "arrows", _FACTORS, {labels[model]: factors[model] for model in labels}),
     )
 
 
-def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray, number: str = "") -> FigureBlock:
+def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> FigureBlock:
     """Fig. 11."""
     was, now = (millimetres(float(np.linalg.norm(e, axis=1).max())) for e in (before, after))
     return FigureBlock(
         "figure-11",
-        title(number, "error at the calibration poses, before and after"),
+        "Error at the calibration poses, before and after",
         calibration_errors(poses, before, after),
         "Distance between measured and predicted point. The scale is logarithmic: one step of the grid is about a factor of two. These "
         "poses were used for the fit, so this is not yet the accuracy to expect elsewhere.",
@@ -86,7 +87,7 @@ def component_figure(poses: PoseSet, residuals: np.ndarray) -> FigureBlock:
     largest = np.abs(residuals).max(axis=0)
     return FigureBlock(
         "figure-12",
-        "Figure 12: residuals at the calibration poses, by coordinate",
+        "Residuals at the calibration poses, by coordinate",
         error_components(poses, residuals),
         "Measured minus predicted position in the instrument's frame. Bars that stay within the dotted lines and change sign at random are "
         "measurement noise; a pattern indicates a term that the model lacks.",
@@ -94,11 +95,6 @@ def component_figure(poses: PoseSet, residuals: np.ndarray) -> FigureBlock:
         + ", ".join(f"{millimetres(float(v))} mm in {axis}" for v, axis in zip(largest, "xyz", strict=True))
         + ".",
     )
-
-
-def title(number: str, words: str) -> str:
-    """ "Figure 10: the poses", or "The poses" without a number."""
-    return f"{number}: {words}" if number else words[0].upper() + words[1:]
 
 
 def exaggeration(errors: np.ndarray, length: float) -> float:

@@ -1,4 +1,4 @@
-"""Table 1: stiffness and damping with intervals, beside the truth and what was published."""
+"""Stiffness and damping with intervals, beside the truth and what was published."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def spring_table(
     )
     return Table(
         id=f"table-{kind}",
-        caption=f"Table 1: {kind} of drives and bearings",
+        caption=f"{kind.capitalize()} of drives and bearings",
         columns=tuple(columns),
         rows=rows,
         note=note,

@@ -39,7 +39,7 @@ def stiffness_section(study: TwoStageStudy) -> Section:
             "Each dot is an estimate relative to the truth, each bar its 95 % interval: about 19 of 20 bars should reach zero. Bars "
             "beyond the axis are cut.",
             f"Dot plot of {len(stiffness)} stiffnesses and {len(damping)} dampings relative to the truth, with 95 % intervals. "
-            "The numbers are in Table 1.",
+            "The numbers are in the table.",
         ),
         *response_blocks(study.responses, estimate),
     ]
@@ -60,13 +60,13 @@ def response_blocks(responses: Sequence[FittedResponse], estimate: Estimate) -> 
     return (
         levels_block(
             "figure-5",
-            f"Figure 5: the measured frequency response, {labels[0].lower()}",
+            f"Measured frequency response, {labels[0].lower()}",
             responses[:1],
             labels[:1],
         ),
         FigureBlock(
             "figure-7",
-            "Figures 7 to 9: measured responses against the fitted model",
+            "Measured frequency responses against the fitted model",
             response_fit(responses, labels),
             "Dots: measured. Lines: model with one set of springs and dampers fitted to all poses. Where an element "
             "nearly vanishes, because the pose hardly couples the two axes, dots scatter and carry little weight.",

@@ -34,7 +34,7 @@ def verification_section(study: TwoStageStudy) -> Section:
         accuracy_table(study),
         FigureBlock(
             "figure-13",
-            f"Figure 13: error at {elastic.all.poses} poses outside the fit",
+            f"Error at {elastic.all.poses} poses outside the fit",
             verification_errors(fresh.poses, series, elastic, paper.elastic if paper else None),
             "Distance from the noise-free truth, on a logarithmic scale. Orange: the best fit of a rigid arm. Blue: with elasticity. "
             + (

@@ -6,7 +6,7 @@
   // Buttons by name: the default ones would offer to send the data to a server.
   const config = { displaylogo: false, plotlyServerURL: "" };
   const flatButtons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
-  const spaceButtons = [["toImage", "resetCameraDefault3d"]];
+  const spaceButtons = [["toImage", "zoom3d", "pan3d", "orbitRotation", "resetCameraDefault3d"]];
   const figures = new Map();
   let printing = false;
   const widths = new ResizeObserver(function (entries) {
@@ -106,6 +106,13 @@
     if (missing > 0) Plotly.relayout(place, { "margin.t": layout.margin.t + missing, height: layout.height + missing });
   }
 
+  // The wheel scrolls the page over a figure in space too; with Ctrl it zooms.
+  function passWheel(place) {
+    place.addEventListener("wheel", function (event) {
+      if (!event.ctrlKey) event.stopPropagation();
+    }, { capture: true, passive: true });
+  }
+
   function drawAll() {
     for (const id of figures.keys()) draw(id);
   }
@@ -117,7 +124,9 @@
     document.head.append(program);
     for (const holder of document.querySelectorAll("script[data-specification]")) {
       figures.set(holder.dataset.specification, JSON.parse(holder.textContent));
-      widths.observe(document.getElementById(holder.dataset.specification));
+      const place = document.getElementById(holder.dataset.specification);
+      widths.observe(place);
+      if (figures.get(place.id).layout.scene) passWheel(place);
     }
     const waiting = [...figures.keys()];
     (function next() {
