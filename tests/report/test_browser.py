@@ -57,8 +57,15 @@ OF_DEMO = """const choice = frame.contentDocument.querySelector('select[data-fig
   slider.value = Number(slider.value) + 3;
   slider.dispatchEvent(new Event("input"));
   document.body.dataset.stretched = longest() / before;
-  document.body.dataset.said = slider.getAttribute("aria-valuetext");"""
-"""What only the demo's page has: poses to choose from, and arrows to stretch."""
+  document.body.dataset.said = slider.getAttribute("aria-valuetext");
+  const canvas = frame.contentDocument.querySelector("#figure-10 canvas");
+  const caught = [false, true].map(function (ctrlKey) {
+    const wheel = new frame.contentWindow.WheelEvent("wheel", { deltaY: 40, ctrlKey, bubbles: true, cancelable: true });
+    canvas.dispatchEvent(wheel);
+    return wheel.defaultPrevented;
+  });
+  document.body.dataset.caught = caught.join();"""
+"""What only the demo's page has: poses to choose from, arrows to stretch, and a scene that lets the page scroll."""
 
 
 def browse(page: Path, profile: Path, *flags: str) -> str:
@@ -100,6 +107,7 @@ def test_figures_are_drawn_and_fit_and_nobody_is_shut_out(
     found = seen(report.read_text("utf-8"), tmp_path, width, scheme, OF_DEMO)
     assert found["pose"] == "Pose 2"
     assert float(found["stretched"]) == pytest.approx(10, rel=1e-5) and found["said"].endswith("0 times")
+    assert found["caught"] == "false,true"
 
 
 def test_a_long_name_of_a_recording_fits_a_telephone(payload_folder: Path, tmp_path: Path) -> None:
