@@ -42,9 +42,21 @@ def test_declared_as_they_are_they_cost_nothing(
     assert 1e3 * FLOOR < 0.043 and mean < 0.06
 
 
+def test_not_declared_they_are_found(run, tmp_path: Path) -> None:
+    robot = cell(tmp_path, 1, None)
+    calibrated = run("calibrate", robot, tmp_path / "fit.csv", "--terms", "kinematic", "--json").document
+    assert calibrated["bearings"]["declared"] is None and calibrated["bearings"]["preferred"] == "before"
+    assert any(
+        "these were taken; `bearings: before` in robot.yaml" in remark for remark in calibrated["remarks"]
+    )
+    assert "bearings" not in calibrated["verdict"]["reasons"]
+    verified = run("verify", robot, tmp_path / "fresh.csv", "--json").document
+    assert verified["verification"]["measured"]["mean_mm"] < 0.06
+
+
 @pytest.mark.parametrize("sigma", [None, TRACKER])
-def test_not_declared_it_is_said_and_not_trusted(run, tmp_path: Path, sigma: float | None) -> None:
-    robot = cell(tmp_path, 1, None, sigma=sigma)
+def test_declared_wrongly_it_is_said_and_not_trusted(run, tmp_path: Path, sigma: float | None) -> None:
+    robot = cell(tmp_path, 1, "after", sigma=sigma)
     outcome = run("calibrate", robot, tmp_path / "fit.csv", "--terms", "kinematic", "--out", tmp_path / "out")
     said = " ".join(outcome.out.split())
     assert "the points fit bearing axes fixed to the parent link better (mean error 0.03" in said
@@ -52,10 +64,21 @@ def test_not_declared_it_is_said_and_not_trusted(run, tmp_path: Path, sigma: flo
     assert "next: write `bearings: before`" in said
     assert "Trusted: no" in said and "the points fit other bearing axes than the declared ones" in said
     assert "No: with bearing axes fixed to the parent link" in (tmp_path / "out" / "report.html").read_text()
-    mean = run("verify", robot, tmp_path / "fresh.csv", "--estimates", tmp_path / "out", "--json").document[
-        "verification"
-    ]["measured"]["mean_mm"]
-    assert mean > 0.2
+    fresh = run("verify", robot, tmp_path / "fresh.csv", "--estimates", tmp_path / "out", "--json").document
+    assert fresh["verification"]["measured"]["mean_mm"] > 0.2
+
+
+def test_estimates_of_other_bearings_are_refused(run, tmp_path: Path) -> None:
+    robot = cell(tmp_path, 1, "after")
+    run("calibrate", robot, tmp_path / "fit.csv", "--terms", "kinematic")
+    robot.write_text(robot.read_text().replace("bearings: after", "bearings: before"))
+    refused = run("verify", robot, tmp_path / "fresh.csv")
+    assert refused.status == 2
+    said = " ".join(refused.err.split())
+    assert "the block 'calibration' was estimated with `bearings: after`" in said
+    assert "run 'flexcal calibrate' again" in said
+    assert run("calibrate", robot, tmp_path / "fit.csv", "--terms", "kinematic").status == 0
+    assert run("verify", robot, tmp_path / "fresh.csv").status == 0
 
 
 def compared(
@@ -70,8 +93,11 @@ def compared(
     for sigma in sigmas:
         write_poses(folder / "poses.csv", q, xyz, sigma)
         measured = read_poses([folder / "poses.csv"], model)
-        fit = calibrate(model, measured, terms=("kinematic",))
-        found = compare_bearings(model, fit, lambda robot, terms: calibrate(robot, measured, terms=terms))  # noqa: B023
+        found = compare_bearings(
+            model,
+            ("kinematic",),
+            lambda robot, terms: calibrate(robot, measured, terms=terms),  # noqa: B023
+        )
         assert found is not None
         yield found
 
@@ -82,7 +108,7 @@ def test_transmission_errors_are_not_taken_for_bearings(tmp_path: Path) -> None:
     q = poses(300, rng)
     wavy = q + 2e-4 * np.sin(2 * q + rng.uniform(0, 6, 6))
     (found,) = compared(tmp_path, q, robot.measured(wavy, rng), "after", (TRACKER,))
-    assert found.other_errors.mean < 0.8 * found.errors.mean
+    assert found.errors["before"].mean < 0.8 * found.errors["after"].mean
     assert not found.contradicted
 
 

@@ -68,7 +68,7 @@ def test_the_spec_is_exact_where_text_rounds(tx90l: RobotModel, rng: np.random.G
 
 def test_springs_dampers_and_rotors_are_joints_of_one_tree(tx90l: RobotModel) -> None:
     """Locked-motor modes of the bare arm stretched out."""
-    expected = {"after": [11.1, 13.3, 39.7, 63.7], "before": [11.0, 13.3, 39.9, 63.7]}[tx90l.config.bearings]
+    expected = {"after": [11.1, 13.3, 39.7, 63.7], "before": [11.0, 13.3, 39.9, 63.7]}[tx90l.bearings]
     q = np.array([0, 90, 0, 0, 0, 0]) * DEGREE
     compiled = mjcf_spec(tx90l, q=q, free=(), payload=0.0).compile()
     data = mujoco.MjData(compiled)

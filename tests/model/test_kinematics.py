@@ -47,7 +47,7 @@ def written_out(model: RobotModel, q: np.ndarray, deflection: np.ndarray) -> np.
             axis_rotation(z, q[i] + offset + twist),
             axis_rotation(y, tilt_y) @ axis_rotation(x, tilt_x),
         )
-        motion = tilts @ spin if model.config.bearings == "before" else spin @ tilts
+        motion = tilts @ spin if model.bearings == "before" else spin @ tilts
         total = (
             total
             @ matrix(joint.rotation, joint.translation + length)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import get_args
 
@@ -23,62 +23,63 @@ _RELEVANT = 0.95
 
 @dataclass(frozen=True)
 class BearingAxes:
-    """Errors of a calibration with the `declared` bearings and of one with the other, at the same points.
+    """What measured points say of bearings that tilt `before` and `after` the joint's rotation, from a fit with each.
 
-    `statistic` is Vuong's (1989) for models of which neither contains the other: the sum over poses of the differences of the log
-    likelihoods, each fit with the scatter that it leaves, over its standard deviation. Standard normal where both are equally far from
-    the truth, whatever that is; positive where the declared fit better. `preferred` are the bearings with which the points are met
-    clearly better, None where both do about as well.
+    `declared` are those that robot.yaml or stage 1 says, None where neither does. `statistic` is Vuong's (1989) for models of which neither
+    contains the other: the sum over poses of the differences of the log likelihoods, each fit with the scatter that it leaves, over its
+    standard deviation. Standard normal where both are equally far from the truth, whatever that is; positive where `before` fits better.
+    `preferred` are the bearings with which the points are met clearly better, None where both do about as well.
     """
 
-    declared: Bearings
-    errors: ErrorStatistics
-    other_errors: ErrorStatistics
+    declared: Bearings | None
+    errors: Mapping[Bearings, ErrorStatistics]
     statistic: float
     preferred: Bearings | None
 
     @classmethod
-    def compare(cls, fit: Calibration, other: Calibration) -> BearingAxes:
-        """Two fits to the same poses, `other` with the bearings not declared; points that either takes for outliers do not count."""
-        inside = np.setdiff1d(np.arange(len(fit.poses)), [*fit.estimate.outliers, *other.estimate.outliers])
-        squares = np.array([np.sum(f.residuals[inside] ** 2, axis=1) for f in (fit, other)])
+    def compare(cls, declared: Bearings | None, before: Calibration, after: Calibration) -> BearingAxes:
+        """Two fits to the same poses; points that either takes for outliers do not count."""
+        outliers = {*before.estimate.outliers, *after.estimate.outliers}
+        inside = np.setdiff1d(np.arange(len(before.poses)), list(outliers))
+        squares = np.array([np.sum(f.residuals[inside] ** 2, axis=1) for f in (before, after)])
         variance = np.maximum(squares.mean(axis=1, keepdims=True) / 3, np.finfo(float).tiny)
         likelihood = -1.5 * np.log(variance) - squares / (2 * variance)
-        places = np.unique(fit.poses.q[inside].round(6), axis=0, return_inverse=True)[1].ravel()
+        places = np.unique(before.poses.q[inside].round(6), axis=0, return_inverse=True)[1].ravel()
         gain = np.bincount(places, likelihood[0] - likelihood[1])
         spread = np.sqrt(len(gain)) * gain.std()
         statistic = float(gain.sum() / spread) if spread > 0 else 0.0
         better, worse = np.sqrt(np.sort(variance.ravel()))
         clear = abs(statistic) > _CERTAIN and better < _RELEVANT * worse
-        robots = (fit.model, other.model)
-        preferred = robots[0 if statistic > 0 else 1].config.bearings if clear else None
-        return cls(fit.model.config.bearings, fit.errors, other.errors, statistic, preferred)
+        preferred: Bearings = "before" if statistic > 0 else "after"
+        errors: dict[Bearings, ErrorStatistics] = {"before": before.errors, "after": after.errors}
+        return cls(declared, errors, statistic, preferred if clear else None)
 
     @property
     def contradicted(self) -> bool:
-        """Whether the points clearly prefer the bearings that are not declared."""
-        return self.preferred not in (None, self.declared)
+        """Whether the points clearly prefer other bearings than the declared ones."""
+        return self.declared is not None and self.preferred not in (None, self.declared)
 
 
 def compare_bearings(
-    model: RobotModel, fit: Calibration, refit: Callable[[RobotModel, tuple[str, ...]], Calibration]
+    model: RobotModel, terms: tuple[str, ...], fit: Callable[[RobotModel, tuple[str, ...]], Calibration]
 ) -> BearingAxes | None:
-    """The `fit` of a robot beside what `refit` makes of its points and terms with the other bearings.
+    """What the points say that `fit` fits a robot and its `terms` to.
 
-    Where the points contradict the declaration, that must hold with transmission errors in both fits, too: bearings of the wrong kind can
-    take a part of those up. None for a robot without bearings, or where a robot with the others has no fit.
+    A preference for others than the bearings of `model` must hold with transmission errors in both fits, too: bearings of the wrong kind
+    can take a part of those up. None for a robot without bearings, or where one of the two has no fit.
     """
-    if not any(joint.bearings for joint in model.elastic):
+    if not model.has_bearings:
         return None
-    before, after = get_args(Bearings)
-    other = model.with_bearings(before if model.config.bearings == after else after)
-    harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
-    wider = tuple(dict.fromkeys((*fit.terms, *harmonics)))
+
+    def compared(terms: tuple[str, ...]) -> BearingAxes:
+        before, after = (fit(model.with_bearings(bearings), terms) for bearings in get_args(Bearings))
+        return BearingAxes.compare(model.config.bearings, before, after)
+
+    wider = tuple(dict.fromkeys((*terms, *(f"transmission_{order}" for order in model.harmonics))))
     try:
-        found = BearingAxes.compare(fit, refit(other, fit.terms))
-        if not found.contradicted or wider == fit.terms:
+        found = compared(terms)
+        if found.preferred in (None, model.bearings) or compared(wider).preferred == found.preferred:
             return found
-        again = BearingAxes.compare(refit(model, wider), refit(other, wider))
     except FlexcalError:
         return None
-    return found if again.preferred == found.preferred else replace(found, preferred=None)
+    return replace(found, preferred=None)

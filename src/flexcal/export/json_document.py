@@ -76,7 +76,7 @@ def _joint(model: RobotModel, i: int, parent: str | None) -> dict[str, Any]:
         if spring is None
         else {
             "frame": bearing_placement(model, spring).tolist(),
-            "bearings": model.config.bearings,
+            "bearings": model.bearings,
             **{
                 ("bearing_x", "bearing_y", "drive")[c]: {
                     kind: _quantity(model, f"{joint.name}.{('bearing_x', 'bearing_y', 'drive')[c]}.{kind}")

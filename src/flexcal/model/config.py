@@ -244,7 +244,8 @@ class SignalConfig:
 class RobotConfig:
     """The whole of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and where (rad or m).
 
-    `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after).
+    `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after); without it the data
+    decide, where they tell.
     """
 
     robot: str
@@ -255,7 +256,7 @@ class RobotConfig:
     prior: PriorConfig = PriorConfig()
     drives: DrivesConfig = DrivesConfig()
     elastic: tuple[ElasticConfig, ...] = ()
-    bearings: Bearings = "after"
+    bearings: Bearings | None = None
     geometry: GeometryConfig = GeometryConfig()
     dynamics: DynamicsConfig = DynamicsConfig()
     stations: dict[str, StationConfig] = field(default_factory=dict)

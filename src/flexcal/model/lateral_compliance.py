@@ -15,7 +15,7 @@ def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
     from flexcal.model.loading import bearing_frame
 
     result = np.zeros((*q.shape, 2, 2))
-    motion = q + model.geometry[:, 0] if model.config.bearings == "after" else np.zeros(q.shape)
+    motion = q + model.geometry[:, 0] if model.bearings == "after" else np.zeros(q.shape)
     cosine, sine = np.cos(motion), np.sin(motion)
     for i, joint in enumerate(model.joints):
         if joint.kind != "revolute":

@@ -176,7 +176,7 @@ def bearing_frame(joint: Joint) -> np.ndarray:
 
 
 def kinematic_tree(
-    joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings = "after"
+    joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings | None = None
 ) -> Tree:
     """The kernels' view of some joints, of the bearing frames (3, 3) of the elastic ones by joint index, and of where bearings tilt."""
     return Tree.build(

@@ -94,7 +94,7 @@ class RobotModel:
         )
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
-        """The robot whose bearings tilt before or after the joint's rotation, its parameters and posterior as they are."""
+        """The robot whose bearings are known to tilt before or after the joint's rotation, its parameters and posterior as they are."""
         from flexcal.model.loading import kinematic_tree
 
         config = replace(self.config, bearings=bearings)
@@ -127,6 +127,16 @@ class RobotModel:
         return self.config.controller
 
     @property
+    def bearings(self) -> Bearings:
+        """Whether bearings tilt before the joint's rotation or after it: as Eq. (1) has it where nothing is known."""
+        return self.config.bearings or "after"
+
+    @property
+    def has_bearings(self) -> bool:
+        """Whether a joint has bearing springs, so that it matters where they tilt."""
+        return any(joint.bearings for joint in self.elastic)
+
+    @property
     def backlash_joints(self) -> tuple[int, ...]:
         """Indices of the joints declared to have backlash."""
         return tuple(self.joint_index(name) for name in self.config.geometry.backlash)
@@ -142,7 +152,7 @@ class RobotModel:
                 self.stiffness[i],
                 self.damping[i],
                 bool(np.isfinite(self.stiffness[i, 0])),
-                self.config.bearings == "before",
+                self.bearings == "before",
             )
             for i, frame in sorted(self.bearing_frames.items())
         )

@@ -6,12 +6,14 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
+from flexcal.model.config import Bearings
 from flexcal.model.further_springs import with_estimated_springs
 from flexcal.model.held_payload import holding
 from flexcal.model.pseudo_inertia import is_body
@@ -19,6 +21,8 @@ from flexcal.model.robot_model import RobotModel
 
 PAYLOAD_FRAME = "frame"
 """Of the provenance of the block `payload`: the URDF frame that its values are in."""
+BEARINGS = "option.bearings"
+"""Of the provenance of the blocks `stiffness` and `calibration`: the bearings that they were estimated with."""
 NUISANCE = re.compile(
     r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|drive\.torque_offset|drive\.gap_torque)"
 )
@@ -37,8 +41,10 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     payload that was identified as declared in its frame.
     Raises `InputError` for a name that the robot does not have: the file is then of another robot, or robot.yaml has changed since; where
     robot.yaml declares the payload in another frame; and for an elastic robot where `dynamics` has links that no body can be, as linear
-    least squares may: they give the right torques at the joints, and wrong ones everywhere else.
+    least squares may: they give the right torques at the joints, and wrong ones everywhere else. Bearings that robot.yaml does not declare
+    are those of the blocks; raises too where they are others than declared, or not the same in all blocks.
     """
+    model = _with_bearings(model, blocks, path)
     if "payload" in blocks:
         model = _with_payload(model, blocks["payload"], path)
     for block, estimate in blocks.items():
@@ -54,6 +60,22 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
         model = _with_backlash_joints(model.with_estimate(estimate), estimate)
         if block == "dynamics" and model.elastic:
             _check_bodies(model, estimate, path)
+    return model
+
+
+def _with_bearings(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
+    for block, estimate in blocks.items():
+        if BEARINGS not in estimate.provenance:
+            continue
+        bearings = cast(Bearings, estimate.provenance[BEARINGS])
+        if model.config.bearings is None:
+            model = model.with_bearings(bearings)
+        elif model.bearings != bearings:
+            again = "calibrate" if block == "calibration" else f"identify {block}"
+            raise InputError(
+                f"{path}: the block '{block}' was estimated with `bearings: {bearings}`, but the robot has `bearings: {model.bearings}` "
+                f"by {model.path} or by another block; run 'flexcal {again}' again."
+            )
     return model
 
 

@@ -19,21 +19,13 @@ def check_bearings(block: Mapping[str, Any] | None) -> tuple[Check, ...]:
     """The check from the block `bearings` of results.json; none where there are no bearings, or the points do not tell."""
     if block is None or block["preferred"] is None:
         return ()
-    question = "Do the bearings tilt about the axes that robot.yaml declares?"
-    declared = block["declared"]
-    other = "after" if declared == "before" else "before"
-    mean, other_mean = (
-        f"{millimetres(ErrorStatistics.of_millimetres(block[key]).mean)} mm"
-        for key in ("errors", "other_errors")
-    )
-    if block["preferred"] == declared:
-        return (
-            Check(
-                question,
-                f"Yes: with {_WHERE[other]} the mean error is {other_mean} in place of {mean}.",
-                "good",
-                "bearings",
-            ),
-        )
-    answer = f"No: with {_WHERE[other]} the mean error is {other_mean} in place of {mean}. Declare them, and calibrate again."
-    return (Check(question, answer, "bad", "bearings"),)
+    question = "Do the bearings tilt about the right axes?"
+    better = block["preferred"]
+    worse = "after" if better == "before" else "before"
+    means = [
+        millimetres(ErrorStatistics.of_millimetres(block["errors"][key]).mean) for key in (better, worse)
+    ]
+    found = f"with {_WHERE[better]} the mean error of a first fit is {means[0]} mm, with {_WHERE[worse]} {means[1]} mm"
+    if block["declared"] in (None, better):
+        return (Check(question, f"Yes: {found}.", "good", "bearings"),)
+    return (Check(question, f"No: {found}. Declare the former, and calibrate again.", "bad", "bearings"),)

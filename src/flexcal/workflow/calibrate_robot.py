@@ -179,6 +179,11 @@ def calibrate_robot(
 
     base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
     rigid = fit(model, base, "rigid fit", elastic=False)
+    bearings = compare_bearings(
+        model, base, lambda robot_, chosen: fit(robot_, chosen, "bearing axes", elastic=True)
+    )
+    if bearings is not None and bearings.declared is None and bearings.preferred is not None:
+        model = model.with_bearings(bearings.preferred)
     selection = None
     if wanted is None:
         progress("terms", 0.0)
@@ -189,16 +194,13 @@ def calibrate_robot(
     elastic = bool(model.elastic)
     same = not elastic and tuple(wanted) == base
     selected = rigid if same else fit(model, wanted, "selected fit", elastic=elastic)
-    bearings = compare_bearings(
-        model, selected, lambda robot_, chosen: fit(robot_, chosen, "other bearing axes", elastic=True)
-    )
     options = {
         "terms": " ".join(wanted),
         "loss": loss,
         "secant_scale": secant_scale,
         "elasticity": elasticity,
         TARGETS: TARGETS_BETWEEN.join(poses.targets),
-    }
+    } | ({"bearings": model.bearings} if model.has_bearings else {})
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(selected.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
