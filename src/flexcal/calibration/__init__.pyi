@@ -13,6 +13,7 @@ from .pose_drift import VISITS_A_SET, PoseDrift, common_way, drift_of_poses
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
 from .prediction import Prediction, predict
 from .propagated_covariance import Propagation, propagation
+from .refit import Refit, Refitted, refitted
 from .registration import register, rigid_motion
 from .scaled_errors import ErrorScale, error_scale
 from .sources import error_sources
@@ -39,6 +40,8 @@ __all__ = [
     "PoseRepeatability",
     "Prediction",
     "Propagation",
+    "Refit",
+    "Refitted",
     "RobotBefore",
     "TermSelection",
     "Verification",
@@ -60,6 +63,7 @@ __all__ = [
     "probable_robots",
     "propagation",
     "random_poses_in",
+    "refitted",
     "register",
     "registrable",
     "repeatability",

@@ -18,7 +18,6 @@ from flexcal.calibration.placement import best_placement, enough_for_points, reg
 from flexcal.calibration.prediction import predict
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
-from flexcal.model.rotations import rotation_vector
 
 DECLARED_WITHIN = 0.05
 """Of the reach: with a larger median distance between nominal and measured points the instrument's frame is not the declared one."""
@@ -87,10 +86,11 @@ def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
     declared = _declared(at_base, poses)
     if not registrable(poses):
         return RobotBefore(declared, None, None)
-    registered = at_base.with_values(_station_values(rigid_placement(poses, nominal.position).stations))
+    registered = at_base.with_values(rigid_placement(poses, nominal.position).values(at_base))
     own = None
     if enough_for_points(poses):
-        own = _with_points_found(at_base, poses, nominal.position, nominal.kinematics.orientation)
+        found = best_placement(poses, nominal.position, nominal.kinematics.orientation)
+        own = at_base.with_values(found.values(at_base))
     return RobotBefore(declared, registered, own)
 
 
@@ -109,28 +109,3 @@ def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
         if np.median(np.linalg.norm(away, axis=1)) < DECLARED_WITHIN * model.reach:
             return candidate
     return None
-
-
-def _with_points_found(
-    model: RobotModel, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray
-) -> RobotModel:
-    """The robot with stations and measured points where they fit best."""
-    found = best_placement(poses, nominal, orientation)
-    values = _station_values(found.stations)
-    values |= {
-        f"point.{name}.{axis}": model.value(f"point.{name}.{axis}") + float(value)
-        for name, shift in found.shifts.items()
-        for axis, value in zip("xyz", shift, strict=True)
-    }
-    return model.with_values(values)
-
-
-def _station_values(placed: Mapping[str, tuple[np.ndarray, np.ndarray]]) -> dict[str, float]:
-    values: dict[str, float] = {}
-    for name, (turn, offset) in placed.items():
-        numbers = (*offset, *rotation_vector(turn))
-        values |= {
-            f"station.{name}.{key}": float(v)
-            for key, v in zip(("x", "y", "z", "rx", "ry", "rz"), numbers, strict=True)
-        }
-    return values

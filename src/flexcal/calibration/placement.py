@@ -10,7 +10,9 @@ import numpy as np
 
 from flexcal.calibration.registration import rigid_motion
 from flexcal.data import PoseSet
-from flexcal.model.rotations import vector_rotation
+from flexcal.model import RobotModel
+from flexcal.model.names import STATION
+from flexcal.model.rotations import rotation_vector, vector_rotation
 
 _LEAST_POINTS = 4
 _STEPS = 20
@@ -26,6 +28,17 @@ class Placement:
 
     stations: Mapping[str, tuple[np.ndarray, np.ndarray]]
     shifts: Mapping[str, np.ndarray]
+
+    def values(self, model: RobotModel) -> dict[str, float]:
+        """The parameters of stations and points that put `model` there."""
+        found: dict[str, float] = {}
+        for name, (turn, offset) in self.stations.items():
+            numbers = (*offset, *rotation_vector(turn))
+            found |= {f"station.{name}.{key}": float(v) for key, v in zip(STATION, numbers, strict=True)}
+        for name, shift in self.shifts.items():
+            for axis, value in zip("xyz", shift, strict=True):
+                found[f"point.{name}.{axis}"] = model.value(f"point.{name}.{axis}") + float(value)
+        return found
 
     def expected(self, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Where the instrument should read the targets (N, 3) m, which are at `nominal` (N, 3), turned by `orientation` (N, 3, 3)."""

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
 
     from flexcal.workflow.export_robot import ExportedRobot
 
+_WORTH = 0.9
+"""Of the mean error without offsets: what they leave less than is worth entering them."""
 Point = Annotated[
     MaybeText,
     arg(metavar="NAME", help="the point at the end of the chain", help_behavior_hint="(default: the first)"),
@@ -215,6 +217,9 @@ class ExportOffsets(Export):
         frames = "" if self.keep_frames else ", and set base and tool as it says"
         if not document["safe"]:
             return f"look why the offsets of {self.out} are so large before adding any to the joint zeros of the controller: see above"
+        error, without = document["tool_error"], document["without_offsets"]
+        if error["mean_mm"] > _WORTH * without["mean_mm"]:
+            return f"offsets alone buy little here: flexcal export mdh {self.robot}, or flexcal compensate {self.robot} TARGETS.csv"
         return f"add the offsets of {self.out} to the joint zeros of the controller{frames}"
 
     def tables(self, document: dict[str, Any]) -> list[Table]:

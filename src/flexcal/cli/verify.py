@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Literal
 
 from tyro.conf import arg
 
@@ -20,6 +20,12 @@ class Verify:
     robot: Robot
     poses: PoseFiles
     estimates: Estimates = None
+    refit: Annotated[
+        tuple[Literal["station", "point"], ...],
+        arg(metavar="{station,point}...", help_behavior_hint="(default: nothing)"),
+    ] = ()
+    """Place the instrument, or find the measured point, again from these poses, where it was moved or is another one since the
+    calibration; the geometry stays. Errors are then those of each pose left out of that."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html, results.json and points.csv; without it there is no report."""
     json: Json = False
@@ -33,14 +39,24 @@ class Verify:
         require_files(self.poses, "POSES")
         console = Console(self.json)
         found = verify_robot(
-            self.robot, self.poses, estimates=self.estimates, out=self.out, command=command_line()
+            self.robot,
+            self.poses,
+            estimates=self.estimates,
+            refit=tuple(dict.fromkeys(self.refit)),
+            out=self.out,
+            command=command_line(),
         )
         document = found.document()
         blocks = document["verification"]
         labels = {"measured": "calibrated"}
+        if document["refit"] is not None:
+            labels = {
+                "as_calibrated": "calibrated, nothing refitted",
+                "measured": f"calibrated, {' and '.join(document['refit']['what'])} refitted (leave-one-out)",
+            }
         if document["ambiguous_poses"]:
             labels["measured_unambiguous"] = "calibrated, flank certain"
-        rows = before_rows(document) | {label: blocks[key] for key, label in labels.items()}
+        rows = before_rows(document) | {label: blocks[key] for key, label in labels.items() if key in blocks}
         console.show(error_table("distance to the measured points", rows))
         rms = document["rms_mm"]
         noise = (

@@ -44,7 +44,8 @@ class DhChain:
     """The chain as `base` (4, 4) · Π Rz(theta) Tz(d) Tx(a) Rx(alpha) Ry(beta) · `tool` (4, 4); arrays (m,) in rad and m.
 
     Position q of a revolute joint adds to its theta, of a prismatic one to its d. `x` (m, 3): where the common normals point with the
-    joints at zero. The last joint has a = alpha = beta = 0.
+    joints at zero. The last joint has a = alpha = beta = 0, and d to the foot of the tool, or as the chain that this one is made like:
+    where the tool is along the last axis, and about it, is the tool's.
     """
 
     base: np.ndarray
@@ -103,7 +104,7 @@ def dh_chain(axes: Axes, *, hayati: bool, like: DhChain | None = None) -> DhChai
         alpha[k] = np.arctan2(-(following @ np.cross(z, x)), following @ z)
         normals[k] = x
         frame = frame @ joint_transform(theta[k], d[k]) @ link_transform(a[k], alpha[k], beta[k])
-    d[-1] = (axes.tool[:3, 3] - frame[:3, 3]) @ frame[:3, 2]
+    d[-1] = (axes.tool[:3, 3] - frame[:3, 3]) @ frame[:3, 2] if like is None else like.d[-1]
     normals[-1] = frame[:3, 0]
     frame = frame @ joint_transform(0.0, d[-1])
     return DhChain(base, theta, d, a, alpha, beta, np.linalg.solve(frame, axes.tool), normals)

@@ -143,6 +143,8 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "all stiffnesses are determined",
         "else": "the data do not determine every stiffness",
     },
+    "moved": {"else": "the instrument or the measured point is not where it was at the calibration"},
+    "calibrated_points": {"else": "the calibration did not measure every point"},
     "flanks": {
         "good": "backlash is taken up",
         "else": "the flank of the backlash is uncertain at many poses",

@@ -15,6 +15,7 @@ from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.measured_points import ArmPoses, MeasuredPoints
+from flexcal.report.moved_checks import check_known_points, check_moved
 from flexcal.report.notation import millimetres, sentences, statistics_cells
 from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Text, Verdict
 from flexcal.report.palette import ELASTIC, NOMINAL
@@ -102,13 +103,21 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
             "claimed_uncertainty", independent=True
         ),
         *flanks,
+        *(
+            (check_known_points(results["uncalibrated_points"]).named("calibrated_points"),)
+            if results.get("uncalibrated_points")
+            else ()
+        ),
+        *((check_moved(results["refit_proposed"]).named("moved"),) if results.get("refit_proposed") else ()),
     )
 
 
 def _errors_section(study: VerificationStudy) -> Section:
     result = study.verification
     series = [ErrorSeries("calibrated", ELASTIC, result.errors)]
-    rows = [*before_rows(study.points), ("calibrated", str(result.all.poses), *statistics_cells(result.all))]
+    refit = study.results.get("refit")
+    label = f"calibrated, {' and '.join(refit['what'])} refitted (leave-one-out)" if refit else "calibrated"
+    rows = [*before_rows(study.points), (label, str(result.all.poses), *statistics_cells(result.all))]
     if study.points.delivered is not None:
         series.insert(0, ErrorSeries("before, the robot's own", NOMINAL, study.points.delivered))
     if result.ambiguous.any():

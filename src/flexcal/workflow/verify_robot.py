@@ -3,14 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import ErrorsBefore, Verification, require_points, robot_before, verify
+from flexcal.calibration import (
+    ErrorsBefore,
+    Refit,
+    Refitted,
+    Verification,
+    refitted,
+    require_points,
+    robot_before,
+    verify,
+)
 from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance, sha256_of
@@ -24,6 +33,7 @@ from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot,
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.pose_remarks import unused_columns
+from flexcal.workflow.refit_remarks import proposed_refit, refit_document, refit_remarks
 from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import write_results
 
@@ -32,14 +42,20 @@ from flexcal.workflow.results import write_results
 class RobotVerification:
     """Errors of the calibrated robot `model` at `poses`, and `before` those of the uncalibrated one.
 
-    `fitted` are the files among them that the calibration was made from, `provenance` all files with their hashes, `command` the command
-    line, where there was one.
+    `refit` says what was fitted to these poses, None where nothing: then `result` has leave-one-out errors, and `as_calibrated` those
+    without. `better` has what would explain most of the errors placed again, None where nothing would. `uncalibrated` are points that
+    the calibration did not measure and that were not refitted. `fitted` are the files among them that the calibration was made from,
+    `provenance` all files with their hashes, `command` the command line, where there was one.
     """
 
     model: RobotModel
     poses: PoseSet
     result: Verification
     before: ErrorsBefore
+    refit: Refitted | None
+    as_calibrated: Verification | None
+    better: Refitted | None
+    uncalibrated: tuple[str, ...]
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
@@ -53,7 +69,15 @@ class RobotVerification:
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = list(unused_columns(self.poses))
+        remarks = [
+            *unused_columns(self.poses),
+            *refit_remarks(self.result, self.poses, self.refit, self.better),
+        ]
+        if self.uncalibrated:
+            remarks.append(
+                f"no calibration pose measured {' and '.join(self.uncalibrated)}: where it is on the tool is as robot.yaml declares it, "
+                "and an error of that is in these numbers; --refit point finds it from these poses"
+            )
         if self.fitted:
             which = " and ".join(self.fitted)
             remarks.append(
@@ -80,6 +104,8 @@ class RobotVerification:
         result = self.result
         measured = result.all.in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
+        if self.as_calibrated is not None:
+            blocks["as_calibrated"] = self.as_calibrated.all.in_millimetres()
         before = self.before.document()
         if before["registered"] is not None:
             blocks["nominal"] = before["registered"]
@@ -89,6 +115,9 @@ class RobotVerification:
             "backlash": list(self.model.backlash_joints),
             "before": before,
             "verification": blocks,
+            "refit": refit_document(self.refit, len(self.poses)),
+            "refit_proposed": refit_document(self.better, len(self.poses)),
+            "uncalibrated_points": list(self.uncalibrated),
             "rms_mm": {
                 "parameters": _rms(result.expected_rms()),
                 "expected": _rms(result.expected_rms(self.poses.sigma)) if self.poses.sigma_given else None,
@@ -107,23 +136,46 @@ def verify_robot(
     files: Sequence[Path],
     *,
     estimates: Path | None = None,
+    refit: Sequence[Refit] = (),
     out: Path | None = None,
     command: str = "",
 ) -> RobotVerification:
     """Predict the points of `files` with the calibrated robot and compare.
 
-    `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml; with `out`, results.json, points.csv,
-    arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no calibration, a station stands where no
-    calibration pose was measured, or a file does not fit.
+    `refit` names what is placed anew by these poses, the instrument (`station`), the measured points (`point`) or both; the geometry
+    stays, and errors are then leave-one-out. `estimates` is an estimates.yaml, or a folder with one, in place of that beside robot.yaml;
+    with `out`, results.json, points.csv, arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no
+    calibration, a station stands where no calibration pose was measured and is not refitted, or a file does not fit.
     """
     require_distinct(files)
     calibrated = calibrated_robot(robot, estimates, "verify")
-    model, bare, blocks = calibrated.model, calibrated.nominal, calibrated.blocks
-    poses = verification_poses(calibrated, files)
+    bare, blocks = calibrated.nominal, calibrated.blocks
+    poses = verification_poses(calibrated, files, placed_again="station" in refit)
+    unmeasured = tuple(name for name in poses.targets if name not in calibrated.measured)
+    model = calibrated.probable if unmeasured else calibrated.model
     before = robot_before(bare, poses).errors(poses)
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
     fitted = fitted_files(calibrated, files)
-    result = RobotVerification(model, poses, verify(model, poses), before, fitted, origin, command)
+    known = all(found_station(model, station) for station in poses.stations)
+    stands = verify(model, poses) if known else None
+    anew = refitted(model, poses, refit) if refit else None
+    if anew is not None:
+        model, poses = anew.model, replace(poses, sigma=anew.noise)
+    found = stands if anew is None else anew.result
+    assert found is not None
+    result = RobotVerification(
+        model=model,
+        poses=poses,
+        result=found,
+        before=before,
+        refit=anew,
+        as_calibrated=stands if refit else None,
+        better=proposed_refit(model, poses, found) if anew is None else None,
+        uncalibrated=() if "point" in refit else unmeasured,
+        fitted=fitted,
+        provenance=origin,
+        command=command,
+    )
     if out is not None:
         write_results(out, result.document())
         write_points(out, result.points)
@@ -132,15 +184,21 @@ def verify_robot(
     return result
 
 
-def verification_poses(calibrated: CalibratedRobot, files: Sequence[Path]) -> PoseSet:
-    """Measured points of the `files`, from stations that the calibration found; raises `FlexcalError` where they are not that."""
+def verification_poses(
+    calibrated: CalibratedRobot, files: Sequence[Path], *, placed_again: bool = False
+) -> PoseSet:
+    """Measured points of the `files`, from stations that the calibration found, or any with `placed_again`.
+
+    Raises `FlexcalError` where they are not that.
+    """
     model = calibrated.model
     poses = read_poses(list(files), model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
     for station in poses.stations:
-        if not found_station(model, station):
+        if not placed_again and not found_station(model, station):
             raise FlexcalError(
-                f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration."
+                f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration, "
+                "or find it from these poses: 'flexcal verify' with --refit station."
             )
     return poses
 

@@ -1,0 +1,128 @@
+"""Verification of a calibrated geometry before an instrument that was moved, or with another reflector: leave-one-out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.flanks import ambiguous_poses
+from flexcal.calibration.measured_points import require_points
+from flexcal.calibration.placement import best_placement, rigid_placement
+from flexcal.calibration.prediction import predict
+from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
+from flexcal.calibration.verification import Verification
+from flexcal.data import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model import RobotModel
+
+Refit = Literal["station", "point"]
+_RANK = 1e-9
+_FREE = 1e-6
+"""A pose whose own coordinates decide a refitted parameter but for this cannot be left out."""
+_STEPS = 10
+_SMALL = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Refitted:
+    """A verification with the place of the instrument (`station`), of the measured points (`point`), or both fitted to its own poses.
+
+    `result` has errors by leave-one-out: each pose against the placement that the other poses give, so that they are honest for all poses.
+    `noise` (N, 3) m is the 1σ that the instrument's noise makes of them; `parameters` how many were fitted; `model` is the robot with
+    the placement that all poses give.
+    """
+
+    what: tuple[Refit, ...]
+    model: RobotModel
+    parameters: int
+    result: Verification
+    noise: np.ndarray
+
+
+def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitted:
+    """Verify `model` at `poses` with stations or points placed anew and everything else as calibrated.
+
+    Linear least squares leaves one pose out by its hat matrix H: e_i = (I - H_ii)⁻¹ r_i. Raises `FlexcalError` where the poses are too
+    few for that.
+    """
+    require_points(poses)
+    placed = _placed(model, poses, what)
+    at = predict(placed, poses, jacobians=True)
+    columns = at.jacobian(_names(poses, what)).reshape(3 * len(poses), -1)
+    scale = np.linalg.norm(columns, axis=0)
+    left, sizes, _ = np.linalg.svd(columns / np.where(scale > 0, scale, 1.0), full_matrices=False)
+    basis = left[:, sizes > _RANK * sizes[0]]
+    blocks = basis.reshape(len(poses), 3, -1)
+    own = np.eye(3) - blocks @ np.swapaxes(blocks, 1, 2)
+    if np.linalg.eigvalsh(own).min() < _FREE:
+        raise FlexcalError(
+            f"{len(poses)} poses are too few to place {' and '.join(_WORDS[name] for name in what)} again and to verify with: "
+            f"{basis.shape[1]} of their {3 * len(poses)} coordinates go into that; measure {2 * basis.shape[1] // 3 + 4} or more."
+        )
+
+    def left_out(values: np.ndarray) -> np.ndarray:
+        """What leaving each pose out makes of errors (3 N, k)."""
+        rest = values - basis @ (basis.T @ values)
+        return np.linalg.solve(own, rest.reshape(len(poses), 3, -1))
+
+    errors = left_out((poses.position - at.position).reshape(-1, 1))[:, :, 0]
+    used = moving_parameters(placed)
+    roots = left_out((at.jacobian(used) @ covariance_root(placed, used)).reshape(3 * len(poses), -1))
+    rms = np.sqrt((roots**2).sum(axis=(1, 2)))
+    result = Verification(poses.position - errors, errors, rms, ambiguous_poses(placed, at))
+    return Refitted(tuple(what), placed, basis.shape[1], result, _noise(poses, basis, own))
+
+
+_WORDS = {"station": "the instrument", "point": "the measured point"}
+
+
+def _names(poses: PoseSet, what: Sequence[Refit]) -> list[str]:
+    names = []
+    if "station" in what:
+        names += [f"station.{s}.{key}" for s in poses.stations for key in ("x", "y", "z", "rx", "ry", "rz")]
+    if "point" in what:
+        names += [f"point.{target}.{key}" for target in poses.targets for key in "xyz"]
+    return names
+
+
+def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotModel:
+    """The robot with what is refitted placed by all poses."""
+    if "station" not in what:
+        return _points_found(model, poses)
+    base = predict(replace(model, station=np.zeros_like(model.station)), poses)
+    at, turned = base.position, base.kinematics.orientation
+    found = best_placement(poses, at, turned) if "point" in what else rigid_placement(poses, at)
+    return model.with_values(found.values(model))
+
+
+def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
+    """The robot with its points moved to where the measurements from known stations have them."""
+    names = _names(poses, ("point",))
+    found = model
+    for _ in range(_STEPS):
+        at = predict(found, poses, jacobians=True)
+        columns = at.jacobian(names).reshape(3 * len(poses), -1)
+        step = np.linalg.lstsq(columns, (poses.position - at.position).ravel(), rcond=_RANK)[0]
+        values = {name: found.value(name) + float(v) for name, v in zip(names, step, strict=True)}
+        found = found.with_values(values)
+        if np.abs(step).max() < _SMALL:
+            break
+    return found
+
+
+def _noise(poses: PoseSet, basis: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """1σ (N, 3) m of leave-one-out errors that the noise of all poses makes: own⁻¹ (I - H) Σ (I - H) own⁻¹."""
+    sigma = poses.sigma.reshape(-1)
+    inverse = np.linalg.inv(own)
+    blocks = basis.reshape(len(poses), 3, -1)
+    weighted = basis.T @ (basis * sigma[:, None] ** 2)
+    variance = np.zeros((len(poses), 3, 3))
+    for axis in range(3):
+        variance[:, axis, axis] = poses.sigma[:, axis] ** 2
+    across = blocks @ np.swapaxes(blocks * (poses.sigma**2)[:, :, None], 1, 2)
+    total = variance - across - np.swapaxes(across, 1, 2) + blocks @ weighted @ np.swapaxes(blocks, 1, 2)
+    found = inverse @ total @ inverse
+    return np.sqrt(np.clip(np.einsum("nii->ni", found), 0.0, None))
