@@ -20,7 +20,7 @@ import numpy as np
 
 from flexcal.atomic import atomic_paths
 from flexcal.errors import FlexcalError, InputError
-from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
+from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import to_plain, yaml_text
 
@@ -67,6 +67,7 @@ class StoredFit:
     iterations: int
     outliers: tuple[int, ...] = ()
     covariance_freedom: float | None = None
+    misfit: Misfit | None = None
 
 
 @dataclass(frozen=True)
@@ -259,6 +260,7 @@ def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.nd
         iterations=fit.iterations,
         outliers=fit.outliers,
         covariance_freedom=fit.covariance_freedom,
+        misfit=fit.misfit,
         provenance=dict(block.provenance),
     )
 
@@ -290,6 +292,7 @@ def _stored(estimate: Estimate, covariance: np.ndarray) -> StoredBlock:
             iterations=int(estimate.iterations),
             outliers=tuple(int(number) for number in estimate.outliers),
             covariance_freedom=estimate.covariance_freedom,
+            misfit=estimate.misfit,
         ),
         covariance_sha256=_sha256(covariance),
         provenance={str(key): str(value) for key, value in estimate.provenance.items()},

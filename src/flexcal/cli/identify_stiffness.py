@@ -83,6 +83,8 @@ class IdentifyStiffness:
             console.say(
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"
             )
+        for remark in found.remarks:
+            console.say(remark)
         console.say(found.trust.sentence)
         console.say(f"wrote {found.estimates}")
         if self.out is not None:

@@ -10,12 +10,13 @@ import numpy as np
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.fit import FINE, ResponseData, ResponseFit, final_fit, first_fit, fit_responses
 from flexcal.elasticity.held_joints import HeldJoints
+from flexcal.elasticity.misfit import misfit_of_fit, misfit_std
 from flexcal.elasticity.model_error import Tolerances
 from flexcal.elasticity.parameters import check_responses
 from flexcal.elasticity.profile import profile_stretch
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
-from flexcal.estimation import Estimate, Problem, solve
+from flexcal.estimation import Estimate, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -91,7 +92,7 @@ def identify_stiffness(
     if fit is None:
         fit = final_fit(model, data, first)
     progress("fitting", 0.8)
-    estimate = _widened(fit.problem, fit.estimate, data.tolerances.inflation(responses))
+    estimate = _widened(fit, data)
     progress("fitting", 1.0)
     predicted = fit.predicted()
     pairs = zip(fit.residual.poses, predicted, strict=True)
@@ -139,25 +140,30 @@ def _with_held_joints(
     return model, None
 
 
-def _widened(problem: Problem, fitted: Estimate, inflation: float) -> Estimate:
-    """The covariance for measurements whose variance is `inflation` times what weighs them.
+def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
+    """The estimate with the covariance for measurements whose variance is `Tolerances.inflation` f times what weighs them.
 
     That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L. Every standard deviation
-    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say, and by the profile likelihood's.
+    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say, by a misfit's where there is one, and
+    by the profile likelihood's.
     """
+    problem, fitted = fit.problem, fit.estimate
     posterior = fitted.covariance
     from_prior = problem.prior_rows() @ posterior
     from_data = posterior - from_prior.T @ from_prior
-    covariance = posterior + (inflation - 1.0) * from_data
+    covariance = posterior + (data.tolerances.inflation(data.responses) - 1.0) * from_data
     std = np.sqrt(np.diag(posterior))
     factor = np.full(
         std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0))
     )
+    misfit = misfit_of_fit(fit, data.responses)
+    wider = std
     if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
-        start = fitted.parameters.coordinates()[None]
-        robust = solve(problem, starts=start, covariance="sandwich", tolerance=FINE)
+        robust = solve(problem, starts=fit.x[None], covariance="sandwich", tolerance=FINE)
         wider = np.sqrt(np.diag(robust.covariance))
-        factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
+    if misfit is not None:
+        wider = np.maximum(wider, misfit_std(fit, misfit))
+    factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
     factor *= profile_stretch(problem, fitted)
     covariance = covariance * np.outer(factor, factor)
     sized = known_to_a_factor_of_two(fitted.parameters, covariance)
@@ -168,4 +174,4 @@ def _widened(problem: Problem, fitted: Estimate, inflation: float) -> Estimate:
     known = tuple(
         flag and small.get(name.replace(".damping", ".stiffness"), True) for name, flag in small.items()
     )
-    return replace(fitted, covariance=covariance, identifiable=known)
+    return replace(fitted, covariance=covariance, identifiable=known, misfit=misfit)

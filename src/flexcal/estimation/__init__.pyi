@@ -1,6 +1,7 @@
 from .estimate import Dropped, Estimate
 from .identifiability import Identifiability, analyse, name_direction
 from .loss import Cauchy, Huber, Loss, Squares
+from .misfit import Misfit
 from .parameter import Parameter, Parameters
 from .problem import Problem
 from .profile import profile_rise
@@ -14,6 +15,7 @@ __all__ = [
     "Huber",
     "Identifiability",
     "Loss",
+    "Misfit",
     "Parameter",
     "Parameters",
     "Problem",

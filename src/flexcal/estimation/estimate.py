@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from flexcal.estimation.misfit import Misfit
 from flexcal.estimation.parameter import Parameters
 from flexcal.estimation.student import student_quantile
 
@@ -40,7 +41,8 @@ class Estimate:
     whitened residual sum of squares, prior rows excluded and with robust weights where a robust loss is used;
     `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
     `outliers` are labels of groups, or row numbers where the problem has no groups. `covariance_freedom` are the degrees of freedom of a
-    covariance that the scatter of few batches gave; without it the noise level's stand for them.
+    covariance that the scatter of few batches gave; without it the noise level's stand for them. `misfit` says where a fit to frequency
+    responses does not explain them.
     """
 
     parameters: Parameters
@@ -56,6 +58,7 @@ class Estimate:
     iterations: int
     outliers: tuple[int, ...] = ()
     covariance_freedom: float | None = None
+    misfit: Misfit | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
 
     @property

@@ -18,6 +18,7 @@ from flexcal.report.measured_points import CALIBRATED, RIGID, ArmPoses, Measured
 from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
 from flexcal.report.page import Check, Page, Section, Table, Text, Verdict
 from flexcal.report.render import write_page
+from flexcal.report.responses_check import check_misfit, read_misfit
 from flexcal.report.sections.geometry import arm_figure, error_figure
 from flexcal.report.sections.identifiability import Determined, identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
@@ -135,7 +136,13 @@ def calibration_checks(
         check_drift(results["drift"]).named("drift"),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
         *check_bearings(results.get("bearings")),
+        *_stage_one_checks(results.get("stage1")),
     )
+
+
+def _stage_one_checks(stage_one: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """Whether the springs that the calibration began from explain the frequency responses that they came from."""
+    return () if stage_one is None else (check_misfit(read_misfit(stage_one["misfit"])),)
 
 
 def _accuracy_section(study: CalibrationStudy) -> Section:

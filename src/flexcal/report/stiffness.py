@@ -8,10 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.estimation import Estimate
-from flexcal.report.checks import check_residual, check_springs
+from flexcal.report.checks import check_springs
 from flexcal.report.fitted_response import FittedResponse
+from flexcal.report.notation import sentences
 from flexcal.report.page import Block, Check, Page, Section, Status, Text, Verdict
 from flexcal.report.render import write_page
+from flexcal.report.responses_check import check_responses
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.springs import spring_table, unseen_springs
 from flexcal.report.sections.stiffness import response_blocks
@@ -63,9 +65,7 @@ def stiffness_page(study: StiffnessStudy) -> Page:
 def stiffness_checks(estimate: Estimate) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     return (
-        check_residual("Does the measurement noise explain the residuals?", estimate).named(
-            "residual_stiffness"
-        ),
+        check_responses(estimate),
         check_springs(estimate, springs_of(estimate, "stiffness"), springs_of(estimate, "damping")).named(
             "springs"
         ),
@@ -84,9 +84,11 @@ def _blocks(study: StiffnessStudy) -> tuple[Block, ...]:
     estimate = study.estimate
     stiffness, damping = springs_of(estimate, "stiffness"), springs_of(estimate, "damping")
     unseen = unseen_springs(estimate, (*stiffness, *damping))
+    remarks = study.results.get("remarks", ())
     return (
         spring_table(estimate, stiffness, "stiffness", None, {}, ""),
         spring_table(estimate, damping, "damping", None, {}, ""),
+        *((Text((), "Remarks", sentences(remarks)),) if remarks else ()),
         *((Text((), "Not determined by these data", unseen),) if unseen else ()),
         *response_blocks(study.responses, estimate),
     )

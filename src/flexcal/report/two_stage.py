@@ -20,6 +20,7 @@ from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import millimetres, ratio
 from flexcal.report.page import Check, Page, Rung, Status, Verdict
 from flexcal.report.render import write_page
+from flexcal.report.responses_check import check_responses
 from flexcal.report.sections.comparison import comparison_section
 from flexcal.report.sections.geometry import geometry_section
 from flexcal.report.sections.parameters import coverage
@@ -106,9 +107,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         check_residual("Does the measurement noise explain the residuals of the geometry?", geometry).named(
             "residual"
         ),
-        check_residual("Does the measurement noise explain the residuals of the responses?", found).named(
-            "residual_stiffness"
-        ),
+        check_responses(found),
         check_drift(study.results["calibration_fit"]["drift"]).named("drift"),
         check_springs(found, stiffness, damping).named("springs"),
         check_rank(determined.parameters, determined.rank, determined.gap).named("rank"),

@@ -35,6 +35,7 @@ from flexcal.report.calibration import calibration_checks
 from flexcal.report.considered_terms import considered_document
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints, errors_before
+from flexcal.report.responses_check import misfit_document, misfit_sentences
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.bearing_remarks import bearing_remarks, bearings_block
@@ -61,7 +62,7 @@ class RobotCalibration:
 
     `before` are the errors of the uncalibrated robot; `rigid` is the fit without elasticity and further terms, `selected` the one that is
     stored in the file `estimates`; `selection` is None where the terms were given. `command` is the command line, where there was one.
-    `bearings` says which bearing axes the points prefer.
+    `bearings` says which bearing axes the points prefer; `stiffness` is what stage 1 left in the estimates, where it did.
     """
 
     before: ErrorsBefore
@@ -72,6 +73,7 @@ class RobotCalibration:
     estimates: Path
     command: str = ""
     bearings: BearingAxes | None = None
+    stiffness: Estimate | None = None
 
     @property
     def points(self) -> MeasuredPoints:
@@ -95,6 +97,7 @@ class RobotCalibration:
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
         found, drift = selected.identifiability, Drift.of(selected)
+        misfit = None if self.stiffness is None else self.stiffness.misfit
         return {
             "robot": selected.model.name,
             "joints": {joint.name: joint.kind for joint in selected.model.joints},
@@ -122,10 +125,16 @@ class RobotCalibration:
                 for o in outliers_of(selected)
             ],
             "bearings": bearings_block(self.bearings),
+            "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *calibration_remarks(selected),
                 *bearing_remarks(self.bearings, selected),
+                *(
+                    []
+                    if misfit is None
+                    else [f"the springs of stage 1 are in doubt: {misfit_sentences(misfit).rstrip('.')}"]
+                ),
             ],
             "parameters": quantities(self.estimate),
             "estimates": self.estimates,
@@ -205,7 +214,9 @@ def calibrate_robot(
     estimate = replace(selected.estimate, provenance=origin)
     target = source if out is None else out / ESTIMATES
     before = robot_before(model, poses).errors(poses)
-    result = RobotCalibration(before, rigid, selection, selected, estimate, target, command, bearings)
+    result = RobotCalibration(
+        before, rigid, selection, selected, estimate, target, command, bearings, blocks.get("stiffness")
+    )
     store_block(source, target, blocks, "calibration", estimate)
     if out is not None:
         progress("report", 0.0)

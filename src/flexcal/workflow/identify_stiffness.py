@@ -26,9 +26,11 @@ from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
+from flexcal.report.responses_check import misfit_document
 from flexcal.report.trust import Trust
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, springs_block, write_results
+from flexcal.workflow.stiffness_remarks import further_joints, stiffness_remarks
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 WeightingName = Literal["covariance", "paper", "uniform"]
@@ -48,12 +50,15 @@ _GEOMETRIC = (*GEOMETRY, "backlash")
 @dataclass(frozen=True, eq=False)
 class RobotStiffness:
     """The result of stage 1 of the robot of that name, whether it knew the reference motion, the numbers of the plan's poses without a
-    response, the file that its estimate was written to, and the command line."""
+    response, the joints that got a spring though robot.yaml holds them rigid, remarks, the file that its estimate was written to, and the
+    command line."""
 
     robot: str
     result: StiffnessResult
     reference_known: bool
     missing_poses: tuple[int, ...]
+    further_joints: tuple[str, ...]
+    remarks: tuple[str, ...]
     estimate: Estimate
     estimates: Path
     command: str = ""
@@ -74,11 +79,14 @@ class RobotStiffness:
                 "status": estimate.status,
                 "message": estimate.message,
                 "reduced_chi2": estimate.reduced_chi2,
+                "misfit": misfit_document(estimate.misfit),
                 "rank": estimate.rank,
                 "reference_motion_modelled": self.reference_known,
                 "missing_poses": list(self.missing_poses),
                 "dropped": dropped_parameters(estimate.dropped),
             },
+            "further_joints": list(self.further_joints),
+            "remarks": list(self.remarks),
             "parameters": quantities(estimate),
             "verdict": self.trust.document(),
             "robot": self.robot,
@@ -135,7 +143,17 @@ def identify_robot_stiffness(
     target = source if out is None else out / ESTIMATES
     seen = {response.pose for response in responses}
     missing = () if plan is None else tuple(k + 1 for k in range(len(plan.poses)) if k not in seen)
-    found = RobotStiffness(bare.name, result, plan is not None, missing, estimate, target, command)
+    found = RobotStiffness(
+        bare.name,
+        result,
+        plan is not None,
+        missing,
+        further_joints(estimate, bare),
+        stiffness_remarks(result, bare),
+        estimate,
+        target,
+        command,
+    )
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
         from flexcal.report.fitted_response import fitted_responses

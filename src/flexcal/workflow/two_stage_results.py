@@ -15,6 +15,7 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.export import Exported
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
+from flexcal.report.responses_check import misfit_document
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.results import (
     identifiability_block,
@@ -22,6 +23,7 @@ from flexcal.workflow.results import (
     quantities,
     springs_block,
 )
+from flexcal.workflow.stiffness_remarks import further_joints
 from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
 
 VERIFICATION = "verification.csv"
@@ -40,6 +42,10 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
         "dynamics": None if run.dynamics is None else {"parameters": quantities(run.dynamics, run.truth)},
         "cad_alone": None if run.cad_alone is None else _cad_alone(run, run.cad_alone),
         "stage1": stage_one
+        | {
+            "misfit": misfit_document(estimate.misfit),
+            "further_joints": list(further_joints(estimate, run.nominal)),
+        }
         | {"reduced_chi2": estimate.reduced_chi2, "status": estimate.status, "message": estimate.message},
         "identifiability": identifiability_block(found) | identifiability_spectrum(found),
         "before": run.before.document(),

@@ -1,0 +1,126 @@
+"""Whether the fitted robot explains the measured responses, and the covariance of its parameters where it does not."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.elasticity.fit import ResponseFit
+from flexcal.estimation import Misfit
+from flexcal.frequency import FrequencyResponse
+from flexcal.model import RobotModel
+from flexcal.model.declared import UNIDENTIFIED_STIFFNESS
+
+BAND_LINES = 8
+"""Neighbouring lines over which the residual is averaged."""
+
+NOTABLE, SEVERE = 2.0, 5.0
+"""Mean square of the whitened residual over a band, 1 where noise and model error explain it, from which a misfit is reported, and from
+which the springs are not to be relied on."""
+
+SEVERE_CHI2 = 2.0
+"""Reduced χ² of all lines from which the springs are not to be relied on."""
+
+FAR = 3.0
+"""Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""
+
+
+def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> Misfit | None:
+    """Where the residual of `fit` exceeds what noise and model error explain; None where it does not."""
+    powers = _line_powers(fit)
+    smooth = [_band_means(power) for power in powers]
+    worst = int(np.argmax([means.max() for means in smooth]))
+    means, response = smooth[worst], responses[worst]
+    at = int(np.argmax(means))
+    peak = float(means[at])
+    estimate = fit.estimate
+    if peak < NOTABLE and not estimate.unexplained:
+        return None
+    first, last = _around(means, at)
+    band = slice(first, min(last + BAND_LINES, len(powers[worst])))
+    error = np.abs(response.response - fit.predicted()[worst])[band] / response.std[band]
+    axis = response.joints[int(np.argmax(np.mean(error**2, axis=(0, 2))))]
+    far = far_springs(fit)
+    return Misfit(
+        reduced_chi2=float(estimate.reduced_chi2),
+        peak=peak,
+        pose=response.pose + 1,
+        low_hz=float(response.frequencies_hz[band][0]),
+        high_hz=float(response.frequencies_hz[band][-1]),
+        axis=axis,
+        far=far,
+        severe=peak > SEVERE or estimate.reduced_chi2 > SEVERE_CHI2 or bool(far),
+    )
+
+
+def far_springs(fit: ResponseFit) -> tuple[str, ...]:
+    """Names of the stiffnesses that ended more than a factor of `FAR` from the robot that the fit started with."""
+    robot = fit.residual.model.robot
+    return tuple(
+        name
+        for name, value in fit.estimate.values.items()
+        if name.endswith(".stiffness") and _moved(robot, name, value) > np.log(FAR)
+    )
+
+
+def _moved(robot: RobotModel, name: str, value: float) -> float:
+    """Distance of the logarithm of a stiffness from robot.yaml's; 0 for one that robot.yaml does not declare."""
+    if robot.joint_index(name.split(".")[0]) in robot.braked:
+        return 0.0
+    return abs(float(np.log(value / robot.value(name))))
+
+
+def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
+    """Standard deviations (p,), in estimation coordinates, that the size of a misfit supports.
+
+    The sandwich over clusters of one octave of one pose, in which errors of the model are coherent. Where the misfit is severe, a stiffness
+    is known no better than robot.yaml's, nor than its distance from that.
+    """
+    residual, jacobian = fit.problem.linearise(fit.x)
+    posterior = fit.estimate.covariance
+    clusters = _octaves(fit)
+    scores = np.stack([np.bincount(clusters, weights=residual * column) for column in jacobian.T], axis=1)
+    std = np.sqrt(np.diag(posterior @ (scores.T @ scores) @ posterior))
+    if misfit.severe:
+        robot = fit.residual.model.robot
+        for number, item in enumerate(fit.estimate.parameters):
+            if item.name.endswith(".stiffness"):
+                std[number] = max(std[number], UNIDENTIFIED_STIFFNESS, _moved(robot, item.name, item.value))
+    return std
+
+
+def _line_powers(fit: ResponseFit) -> list[np.ndarray]:
+    """Mean square (L,) of the whitened residual at every line of every pose."""
+    residual = fit.problem.linearise(fit.x)[0]
+    powers, start = [], 0
+    for pose in fit.residual.poses:
+        rows = 2 * pose.measured.size
+        powers.append(np.mean(residual[start : start + rows].reshape(len(pose.measured), -1) ** 2, axis=1))
+        start += rows
+    return powers
+
+
+def _band_means(power: np.ndarray) -> np.ndarray:
+    """Moving mean over `BAND_LINES` lines, by the first of them."""
+    width = min(BAND_LINES, len(power))
+    return np.convolve(power, np.full(width, 1 / width), "valid")
+
+
+def _around(means: np.ndarray, at: int) -> tuple[int, int]:
+    """First and last place around `at` of the values above half of that there."""
+    low = means < 0.5 * means[at]
+    before, after = np.flatnonzero(low[:at]), np.flatnonzero(low[at:])
+    return (int(before[-1]) + 1 if len(before) else 0), (
+        at + int(after[0]) - 1 if len(after) else len(means) - 1
+    )
+
+
+def _octaves(fit: ResponseFit) -> np.ndarray:
+    """Cluster number (m,) of every row: one octave of one pose."""
+    labels, first = [], 0
+    for pose, at in zip(fit.residual.poses, fit.residual.model.poses, strict=True):
+        octave = np.floor(np.log2(at.frequencies_hz / at.frequencies_hz[0])).astype(int)
+        labels.append(first + np.repeat(octave, 2 * pose.measured[0].size))
+        first += int(octave[-1]) + 1
+    return np.concatenate(labels)

@@ -1,0 +1,24 @@
+"""What a fit does not explain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Where the residual of a fit to frequency responses exceeds what the weights explain.
+
+    `reduced_chi2` of all data; `peak` is the largest mean square of the whitened residual over a band from `low_hz` to `high_hz` of one
+    pose (its number counts from 1), where 1 is expected; `axis` is the joint whose motor answers there with the largest error. `far` are
+    stiffnesses that ended more than a factor of 3 from their start. `severe`: parameters and their intervals are not to be relied on.
+    """
+
+    reduced_chi2: float
+    peak: float
+    pose: int
+    low_hz: float
+    high_hz: float
+    axis: str
+    far: tuple[str, ...] = ()
+    severe: bool = False

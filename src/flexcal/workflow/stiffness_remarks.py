@@ -1,0 +1,69 @@
+"""What a user should know of identified springs beside their numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.elasticity import StiffnessResult
+from flexcal.estimation import Estimate
+from flexcal.model import RobotModel
+from flexcal.report.responses_check import misfit_sentences
+
+_ONE_SIDED = 1.645
+
+
+def further_joints(estimate: Estimate, model: RobotModel) -> tuple[str, ...]:
+    """Joints that robot.yaml holds rigid and that got a drive spring because the responses ask for it."""
+    declared = {entry.joint for entry in model.config.elastic}
+    return tuple(
+        name
+        for name in model.joint_names
+        if name not in declared and f"{name}.drive.stiffness" in estimate.parameters
+    )
+
+
+def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...]:
+    """One sentence each, the most important last."""
+    estimate, joints = result.estimate, further_joints(result.estimate, model)
+    remarks: list[str] = []
+    if joints:
+        remarks.append(
+            f"robot.yaml holds {_listed(joints)} rigid, but the responses show that they give way: a drive spring was identified for each"
+        )
+    remarks += [
+        f"the drive of {joint} gives way too little to be measured well: its stiffness is at least "
+        f"{_lower_limit(estimate, f'{joint}.drive.stiffness'):.2g} N m/rad (95 %)"
+        for joint in joints
+        if estimate.interval(f"{joint}.drive.stiffness") is None
+    ]
+    moving = [joint for joint in joints if _moves(estimate, joint, model)]
+    if moving:
+        remarks.append(
+            f"the motor of {_listed(moving)} seems to have moved with the arm: it was held by its controller and not by a brake, whose "
+            "stiffness is then part of the spring that was found; apply the brakes and repeat, or read this spring with care"
+        )
+    if estimate.misfit is not None:
+        remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")
+    return tuple(remarks)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def _lower_limit(estimate: Estimate, name: str) -> float:
+    """Lower 95 % limit of a stiffness whose compliance is known to its standard deviation."""
+    number = estimate.parameters.index(name)
+    return estimate.values[name] / (1.0 + _ONE_SIDED * float(np.sqrt(estimate.covariance[number, number])))
+
+
+def _moves(estimate: Estimate, joint: str, model: RobotModel) -> bool:
+    """Whether more than half of the rotor's inertia moves with the arm, beyond three standard deviations."""
+    name = f"{joint}.held_inertia"
+    if name not in estimate.parameters:
+        return False
+    value, number = estimate.values[name], estimate.parameters.index(name)
+    std = float(np.sqrt(estimate.covariance[number, number]))
+    return value > 0.5 * float(model.rotor_inertia[model.joint_index(joint)]) and value > 3 * std
