@@ -100,10 +100,15 @@ def test_coverage_is_judged() -> None:
     assert [check_truth(k, 20).status for k in (19, 16, 10)] == ["good", "care", "bad"]
 
 
-def test_the_floor_counts_against_the_truth(study: TwoStageStudy) -> None:
-    noise = study.unpredicted_noise
-    draws = noise[0] * np.random.default_rng(3).normal(size=(20000, 3))
-    np.testing.assert_allclose(np.linalg.norm(draws, axis=1).mean(), study.errors("floor").mean, rtol=0.02)
+def test_fresh_poses_are_judged_as_the_tracker_reads_them(
+    study: TwoStageStudy, simulated: TwoStageRun
+) -> None:
+    """What a folder keeps are the measured errors, which hold the stated noise, and beside them those against the truth."""
+    np.testing.assert_allclose(study.fresh.calibrated, simulated.measured_verification.errors, atol=1e-12)
+    np.testing.assert_allclose(study.exact.calibrated, simulated.elastic_verification.errors, atol=1e-12)
+    np.testing.assert_allclose(study.noise, simulated.verification_poses.sigma, rtol=1e-12)
+    more = (study.fresh.calibrated**2).mean() - (study.exact.calibrated**2).mean()
+    assert abs(more / (study.noise**2).mean() - 1) < 0.2
 
 
 def test_chance_is_one_in_a_hundred(simulated: TwoStageRun, rng: np.random.Generator) -> None:

@@ -80,9 +80,9 @@ class Demo:
 _VERIFICATION = {
     "nominal": "fresh poses, before (best-fit registered)",
     "own": "fresh poses, before (the robot's own)",
-    "elastic": "fresh poses, against the truth",
+    "measured": "fresh poses, as the tracker reads them",
+    "elastic": "  against the noise-free truth",
     "elastic_unambiguous": "  of these, flank certain",
-    "measured": "  against the tracker",
     "rigid": "  calibrated as rigid",
     "floor": "  with every parameter known",
 }

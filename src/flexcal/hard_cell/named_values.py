@@ -9,11 +9,11 @@ from flexcal.hard_cell.drawn import HardRobot
 _SPRINGS = ("bearing_x", "bearing_y", "drive")
 
 
-def counterparts(robot: HardRobot, described: np.ndarray) -> dict[str, float]:
+def counterparts(robot: HardRobot) -> dict[str, float]:
     """True values, SI, of link masses and centres of mass, rotor inertias, springs, dampers and half gaps, by parameter name.
 
-    `described` (n, 3) are the declared stiffnesses: springs that the description lacks are left out. The rest of the robot, above all its
-    geometry, has other parameters than the model and can be judged by measured points alone.
+    Springs of the wrist are among them, which stage 1 may find. The rest of the robot, above all its geometry, has other parameters than
+    the model and can be judged by measured points alone.
     """
     arm, values = robot.arm, {}
     for j, k in enumerate(arm.joints):
@@ -21,7 +21,7 @@ def counterparts(robot: HardRobot, described: np.ndarray) -> dict[str, float]:
         values[f"{link.name}.mass"] = link.mass
         values |= {f"{link.name}.com_{axis}": float(x) for axis, x in zip("xyz", link.com, strict=True)}
         values[f"{link.joint}.rotor_inertia"] = float(arm.rotor_inertia[j])
-        for component in np.flatnonzero(np.isfinite(described[j])):
+        for component in np.flatnonzero(np.isfinite(arm.springs[j])):
             values[f"{link.joint}.{_SPRINGS[component]}.stiffness"] = float(arm.springs[j, component])
             values[f"{link.joint}.{_SPRINGS[component]}.damping"] = float(arm.dampers[j, component])
         if j in arm.gaps:

@@ -18,9 +18,6 @@ from flexcal.report.measured_points import ArmPoses, MeasuredPoints
 from flexcal.report.publication import Publication
 from flexcal.report.sections.identifiability import Determined
 
-MAXWELL_MEAN = 1.5958
-"""Mean distance over 1σ of a coordinate, for errors alike in three directions."""
-
 
 @dataclass(frozen=True)
 class RigidFit:
@@ -35,9 +32,9 @@ class RigidFit:
 class TwoStageStudy:
     """One simulated robot, both stages, and how they were checked.
 
-    `results` is the document of results.json, `estimates` the blocks of estimates.yaml;
-    `plan` and `responses` are those of stage 1, `points` and `arms` the measured poses of stage 2. `fresh` are poses that no fit
-    saw, with the errors of the robot as delivered, of the fairest rigid fit and of the calibrated robot, against the noise-free truth.
+    `results` is the document of results.json, `estimates` the blocks of estimates.yaml; `plan` and `responses` are those of stage 1,
+    `points` and `arms` the measured poses of stage 2. `fresh` are poses that no fit saw, as the tracker read them, with the errors of the
+    robot as delivered, of the fairest rigid fit and of the calibrated robot; `exact` the same against the noise-free truth.
     """
 
     results: Mapping[str, Any]
@@ -47,6 +44,7 @@ class TwoStageStudy:
     points: MeasuredPoints
     arms: ArmPoses
     fresh: MeasuredPoints
+    exact: MeasuredPoints
     paper: Publication | None = None
 
     @property
@@ -76,14 +74,16 @@ class TwoStageStudy:
 
     @property
     def verification(self) -> Verification:
-        """The calibrated robot at the fresh poses."""
+        """The calibrated robot at the fresh poses, as the tracker read them."""
         return self.fresh.verification
 
     @cached_property
     def rigid(self) -> tuple[RigidFit, ...]:
         """Fits of the same robot without elasticity, the fairest one first."""
         found = self.results["rigid_fits"]
-        return tuple(RigidFit(f["poses"], f["rank"], self.errors(f"rigid_{f['poses']}")) for f in found)
+        return tuple(
+            RigidFit(f["poses"], f["rank"], self.errors(f"measured_rigid_{f['poses']}")) for f in found
+        )
 
     def errors(self, model: str) -> ErrorStatistics:
         """At the fresh poses, of one of the models of results.json."""
@@ -99,8 +99,6 @@ class TwoStageStudy:
         return None if self.results["verification"]["floor"] is None else self.errors("floor")
 
     @property
-    def unpredicted_noise(self) -> np.ndarray | None:
-        """1σ (N, 3) m of what errors at the fresh poses hold beyond the parameters': the floor, where it is known."""
-        if self.floor is None:
-            return None
-        return np.full(self.fresh.poses.position.shape, self.floor.mean / MAXWELL_MEAN)
+    def noise(self) -> np.ndarray:
+        """1σ (N, 3) m of the measurement at the fresh poses, as the tracker states it."""
+        return self.fresh.poses.sigma

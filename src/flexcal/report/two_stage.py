@@ -88,7 +88,7 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
         sentence,
         three_facts(before, after, trust, "poses"),
         _rungs(study),
-        f"Error of the tool on {after.poses} poses that were not used for the fit, against the noise-free truth",
+        f"Error of the tool on {after.poses} poses that were not used for the fit, as the tracker reads them",
         (*checks, *truth_checks(study)),
     )
 
@@ -101,9 +101,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all).named(
             "fresh_poses", independent=True
         ),
-        check_claimed_uncertainty(fresh, study.unpredicted_noise).named(
-            "claimed_uncertainty", independent=True
-        ),
+        check_claimed_uncertainty(fresh, study.noise).named("claimed_uncertainty", independent=True),
         check_residual("Does the measurement noise explain the residuals of the geometry?", geometry).named(
             "residual"
         ),

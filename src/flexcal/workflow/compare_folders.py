@@ -88,7 +88,7 @@ def _left(folder: Path, name: str) -> Run:
         )
     if "plan" in results and (folder / VERIFICATION).is_file():
         found = common_origin(estimates)
-        fresh = read_verification(folder / VERIFICATION)
+        fresh, _ = read_verification(folder / VERIFICATION)
         return Run(
             name=name,
             kind="demo",

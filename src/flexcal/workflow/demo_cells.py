@@ -40,7 +40,7 @@ def open_cell(
                 "a hard cell's robot has no truth in the form of estimates.yaml; leave out --truth or --cell hard."
             )
         cell = HardCell.drawn(robot, seed)
-        write_truth(hidden, counterparts(cell.robot, cell.described.springs))
+        write_truth(hidden, counterparts(cell.robot))
         return cell
     config = read_yaml(robot.parent / "cell.yaml", CellConfig)
     rng = np.random.default_rng([seed, 0])

@@ -99,6 +99,7 @@ def calibration_study(folder: Path) -> CalibrationStudy:
 def two_stage_study(folder: Path) -> TwoStageStudy:
     """What `demo` left in a folder; raises `InputError` where a file is not there or cannot be read."""
     results = read_results(folder)
+    fresh, exact = read_verification(folder / VERIFICATION)
     return TwoStageStudy(
         results=results,
         estimates=read_estimates(folder / ESTIMATES),
@@ -106,7 +107,8 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
         responses=read_fitted(folder),
         points=read_points(folder, sigma=DEFAULT_SIGMA),
         arms=read_arm(folder),
-        fresh=read_verification(folder / VERIFICATION),
+        fresh=fresh,
+        exact=exact,
         paper=TX90L_PAPER if results["robot"] == "tx90l" else None,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from flexcal.atomic import atomic_path
-from flexcal.calibration import Drift, Verification
+from flexcal.calibration import Drift, ErrorStatistics, Verification
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
@@ -63,6 +63,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
             "own": run.own_verification.all.in_millimetres(),
             **_verified(run.elastic_verification),
             "rigid": run.rigid_verification[0].all.in_millimetres(),
+            **_measured(run),
             "measured": run.measured_verification.all.in_millimetres(),
             "floor": None if run.floor is None else run.floor.in_millimetres(),
         }
@@ -90,6 +91,15 @@ def _cad_alone(run: TwoStageRun, cad: CadAlone) -> dict[str, Any]:
         "stage1": {kind: _springs(run, cad.stiffness.estimate, kind) for kind in kinds},
         "calibration": cad.calibration.errors.in_millimetres(),
         "verification": _verified(cad.verification),
+    }
+
+
+def _measured(run: TwoStageRun) -> dict[str, Any]:
+    """Errors of the rigid calibrations as the tracker reads them."""
+    seen = run.measured_verification.position + run.measured_verification.errors
+    return {
+        f"measured_rigid_{len(fit.poses)}": ErrorStatistics.of(seen - found.position).in_millimetres()
+        for fit, found in zip(run.rigid, run.rigid_verification, strict=True)
     }
 
 
@@ -121,14 +131,18 @@ _COLUMNS = {NOMINAL: "nominal", OWN: "own", CALIBRATED: "elastic", RIGID: "rigid
 
 
 def write_verification(path: Path, run: TwoStageRun) -> None:
-    """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), where every model has the point, the distance
-    that the covariance of the elastic model's parameters predicts, and whether the flanks are certain."""
+    """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), where the tracker read the point, with 1σ, and
+    where every model has it, the distance that the covariance of the elastic model's parameters predicts, and whether the flanks are
+    certain."""
     poses, elastic = run.verification_poses, run.elastic_verification
     before = {NOMINAL: run.nominal_verification, OWN: run.own_verification}
     models = before | {CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
     columns: dict[str, np.ndarray] = {"pose": poses.pose}
     columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
     columns |= {axis: poses.position[:, k] for k, axis in enumerate("xyz")}
+    measured = run.measured_verification.position + run.measured_verification.errors
+    columns |= {f"measured_{axis}": measured[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"sigma_{axis}": poses.sigma[:, k] for k, axis in enumerate("xyz")}
     for model, verification in models.items():
         columns |= {f"{_COLUMNS[model]}_{axis}": verification.position[:, k] for k, axis in enumerate("xyz")}
     columns |= {"parameter_rms": elastic.parameter_rms, "unambiguous": ~elastic.ambiguous}
@@ -136,33 +150,34 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
         pl.DataFrame(columns).write_csv(temporary)
 
 
-def read_verification(path: Path) -> MeasuredPoints:
-    """What `write_verification` left; raises `InputError` where it cannot be read."""
+def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
+    """The fresh poses that `write_verification` left, as the tracker read them and in truth; raises `InputError` where it cannot."""
     try:
         table = pl.read_csv(path)
 
         def vectors(prefix: str) -> np.ndarray:
             return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()
 
-        truth, size = vectors(""), len(table)
-        poses = PoseSet(
-            q=table.select([name for name in table.columns if name[0] == "q"]).cast(pl.Float64).to_numpy(),
-            position=truth,
-            sigma=np.zeros((size, 3)),
-            torque=None,
-            payload=None,
-            target=np.full(size, ""),
-            station=np.full(size, ""),
-            temperature=None,
-            pose=table["pose"].to_numpy(),
-        )
-        errors = {
-            model: truth - vectors(f"{name}_")
-            for model, name in _COLUMNS.items()
-            if f"{name}_x" in table.columns
-        }
-        certain = table["unambiguous"].cast(pl.Boolean).to_numpy()
-        return MeasuredPoints(poses, errors, ~certain, table["parameter_rms"].cast(pl.Float64).to_numpy())
+        predicted = {m: vectors(f"{name}_") for m, name in _COLUMNS.items() if f"{name}_x" in table.columns}
+        size, certain = len(table), table["unambiguous"].cast(pl.Boolean).to_numpy()
+        q = table.select([name for name in table.columns if name[0] == "q"]).cast(pl.Float64).to_numpy()
+
+        def points(position: np.ndarray, sigma: np.ndarray) -> MeasuredPoints:
+            poses = PoseSet(
+                q=q,
+                position=position,
+                sigma=sigma,
+                torque=None,
+                payload=None,
+                target=np.full(size, ""),
+                station=np.full(size, ""),
+                temperature=None,
+                pose=table["pose"].to_numpy(),
+            )
+            errors = {model: position - where for model, where in predicted.items()}
+            return MeasuredPoints(poses, errors, ~certain, table["parameter_rms"].cast(pl.Float64).to_numpy())
+
+        return points(vectors("measured_"), vectors("sigma_")), points(vectors(""), np.zeros((size, 3)))
     except (pl.exceptions.PolarsError, TypeError, OSError) as problem:
         raise InputError(
             f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."

@@ -8,7 +8,7 @@ from flexcal.report.before import BEFORE
 from flexcal.report.figures.error_distribution import error_distribution
 from flexcal.report.figures.predicted_quantiles import predicted_quantiles
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
-from flexcal.report.measured_points import RIGID
+from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import millimetres, ratio, statistics_cells
 from flexcal.report.page import Block, FigureBlock, Section, Table, Text
 from flexcal.report.study import TwoStageStudy
@@ -36,7 +36,7 @@ def verification_section(study: TwoStageStudy) -> Section:
             "figure-13",
             f"Error at {elastic.all.poses} poses outside the fit",
             verification_errors(fresh.poses, series, elastic, paper.elastic if paper else None),
-            "Distance from the noise-free truth, on a logarithmic scale. Orange: the best fit of a rigid arm. Blue: with elasticity. "
+            "Distance from the measured point, on a logarithmic scale. Orange: the best fit of a rigid arm. Blue: with elasticity. "
             + (
                 f"Ringed: {unclear} poses where gravity hardly loads a joint with backlash, so its flank is uncertain."
                 if unclear
@@ -56,8 +56,9 @@ def verification_section(study: TwoStageStudy) -> Section:
         FigureBlock(
             "figure-predicted",
             "Observed against predicted errors",
-            predicted_quantiles(elastic, study.unpredicted_noise),
-            "The covariance of the parameters, with the floor, predicts how large errors should be. Points on the dashed line: the "
+            predicted_quantiles(elastic, study.noise),
+            "The covariance of the parameters and the stated noise of the tracker predict how large errors should be. Points on the dashed "
+            "line: the "
             "prediction was right. Above it: errors are larger than predicted. Below: smaller. Errors are correlated between poses, so "
             "all points may lie on one side by chance.",
             "Sorted observed errors against the quantiles predicted from the covariance of the parameters.",
@@ -69,7 +70,7 @@ def verification_section(study: TwoStageStudy) -> Section:
         "verification",
         "Verification on fresh poses",
         f"{elastic.all.poses} random poses anywhere in the working volume, none of them used before. Errors are distances between where "
-        "each model says the tool is and the noise-free truth.",
+        "each model says the tool is and where the tracker reads it.",
         tuple(blocks),
     )
 
@@ -77,7 +78,7 @@ def verification_section(study: TwoStageStudy) -> Section:
 def accuracy_table(study: TwoStageStudy) -> Table:
     """Mean, 90 % and worst error of every model on the verification poses."""
 
-    def row(label: str, s: ErrorStatistics, reference: str = "truth") -> tuple[str, ...]:
+    def row(label: str, s: ErrorStatistics, reference: str = "tracker") -> tuple[str, ...]:
         return (label, str(s.poses), *statistics_cells(s), reference)
 
     fresh = study.fresh
@@ -88,9 +89,9 @@ def accuracy_table(study: TwoStageStudy) -> Table:
     rows.append(row(f"elastic calibration, {len(study.points.poses)} poses", elastic.all))
     if elastic.ambiguous.any():
         rows.append(row("… where the backlash flank is certain", elastic.unambiguous))
-    rows.append(row("… as measured by the instrument", study.errors("measured"), "instrument"))
+    rows.append(row("… against the noise-free truth", study.exact.statistics(CALIBRATED), "truth"))
     if study.floor is not None:
-        rows.append(row("floor: all parameters known exactly", study.floor))
+        rows.append(row("floor: all parameters known exactly", study.floor, "truth"))
     return Table(
         "table-accuracy",
         "Accuracy on fresh poses",
@@ -102,12 +103,12 @@ def accuracy_table(study: TwoStageStudy) -> Table:
 
 
 def _floor_words(study: TwoStageStudy) -> tuple[str, ...]:
-    elastic, floor = study.verification.all, study.floor
+    elastic, floor = study.exact.statistics(CALIBRATED), study.floor
     std = study.verification.parameter_rms
     if floor is None:
         return (
             f"Uncertainty of the parameters alone predicts errors of {millimetres(float((std**2).mean() ** 0.5))} mm (root mean square); "
-            f"the calibrated robot is {millimetres(elastic.mean)} mm off on average.",
+            f"the calibrated robot is {millimetres(elastic.mean)} mm off on average, measurement noise left out.",
         )
     return (
         f"With every parameter known exactly, {millimetres(floor.p90)} mm would remain (P90), "
