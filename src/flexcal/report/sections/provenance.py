@@ -51,6 +51,11 @@ def provenance_section(
     return Section("provenance", "Provenance", "", tuple(blocks))
 
 
+def input_files(origin: Mapping[str, str]) -> dict[str, str]:
+    """Name and SHA-256 of every file that results were made from."""
+    return {name.removeprefix("input."): value for name, value in origin.items() if name.startswith("input.")}
+
+
 def common_origin(estimates: Mapping[Block, Estimate]) -> dict[str, str]:
     """What all blocks say of their origin; of the same key in several blocks with different values, each under the block's name."""
     found: dict[str, str] = {}
