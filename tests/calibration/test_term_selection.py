@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.calibration import predict, select_terms
+from flexcal.calibration import geometric_parameters, predict, select_terms
 from flexcal.calibration.folds import order_folds, workspace_folds
 from flexcal.data import PoseSet, read_poses
 from flexcal.model import RobotModel
@@ -86,6 +86,17 @@ def test_too_few_poses_are_not_divided(ur5: RobotModel, anywhere: PoseSet) -> No
     found = select_terms(ur5, anywhere.subset(slice(0, 19)))
     assert found.terms == ("kinematic",) and found.considered == ()
     assert "19 different poses" in found.remark and "measure 1 more" in found.remark
+
+
+def test_joints_that_gravity_hardly_loads_get_no_compliance(ur5: RobotModel, anywhere: PoseSet) -> None:
+    """The pan axis stands upright and the last wrist carries a flange: their compliances would be anything."""
+    names = geometric_parameters(ur5, anywhere, ["gravity_compliance"]).names
+    assert {"shoulder_lift_joint.gravity_compliance", "elbow_joint.gravity_compliance"} <= set(names)
+    assert not {f"{j}.gravity_compliance" for j in ("shoulder_pan_joint", "wrist_3_joint")} & set(names)
+    lateral = geometric_parameters(ur5, anywhere, ["lateral_compliance"]).names
+    assert {"shoulder_pan_joint.gravity_compliance_1", "shoulder_pan_joint.gravity_compliance_2"} <= set(
+        lateral
+    )
 
 
 def test_repeated_poses_count_once(ur5: RobotModel, anywhere: PoseSet) -> None:

@@ -85,6 +85,7 @@ def test_out_leaves_the_robots_folder_alone(run, ur5_folder: Path, some: Path, t
         "arm.npz",
         "estimates.npz",
         "estimates.yaml",
+        "gravity_loads.npz",
         "points.csv",
         "report.html",
         "results.json",

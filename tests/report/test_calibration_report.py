@@ -68,7 +68,12 @@ def test_calibration_report_is_complete(
     assert set(outline.figures()) == {
         "figure-10",
         "figure-11",
+        "figure-histogram",
         "figure-terms",
+        "figure-field",
+        "figure-torque",
+        "figure-parameters",
+        "figure-compliances",
         "figure-order",
         "figure-temperature",
         "figure-time",

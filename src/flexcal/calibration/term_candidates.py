@@ -7,15 +7,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.terms import PER_JOINT, free_joints, moving_joints
+from flexcal.calibration.terms import (
+    PER_JOINT,
+    free_joints,
+    geometric_parameters,
+    loaded_compliances,
+    moving_joints,
+)
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel, carried_mass, gravity_torque
 from flexcal.model.equilibrium import gravity_moments
 
 _CLEAR = 0.2
 """Share of its largest gravity torque that a joint must carry on both sides for a backlash to be considered."""
-_LOADED = 0.01
-"""Share of the most varied load of any joint by which that of a joint must vary for its compliance to be considered alone."""
 _LOAD = 1e-3
 """N m: a robot whose gravity loads are below that has none."""
 
@@ -39,25 +43,32 @@ def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
     joints = moving_joints(model, poses)
     masses = carried_mass(model, poses.payload, len(poses))
     torque = gravity_torque(model, poses.q, masses)
-    loads = {
-        "gravity_compliance": torque[:, :, None],
-        "lateral_compliance": gravity_moments(model, poses.q, masses),
-    }
+    most = max(
+        float(np.abs(load).max(initial=0.0)) for load in (torque, gravity_moments(model, poses.q, masses))
+    )
     kinds: list[str] = []
     single: dict[str, tuple[str, ...]] = {}
     excluded: list[tuple[str, str]] = []
-    most = max(float(np.abs(load[:, joints]).max(initial=0.0)) for load in loads.values())
-    varied = max(float(load[:, joints].std(axis=0).max(initial=0.0)) for load in loads.values())
+    loaded = loaded_compliances(model, poses)
     for kind in PER_JOINT:
         free = free_joints(model, kind, joints)
         if most < _LOAD:
             excluded.append((kind, _without_load(model)))
         elif not free:
             excluded.append((kind, "robot.yaml declares springs in their place for every joint"))
+        elif not geometric_parameters(model, poses, [kind]).names:
+            excluded.append(
+                (
+                    kind,
+                    "the gravity load on the joints without declared springs hardly varies over these poses",
+                )
+            )
         else:
             kinds.append(kind)
-            changing = [i for i in free if loads[kind][:, i].std(axis=0).max() > _LOADED * varied]
-            single[kind] = tuple(f"{model.joints[i].name}.{kind}" for i in changing)
+            names = [f"{model.joints[i].name}.{kind}" for i in free]
+            single[kind] = tuple(
+                n for n in names if loaded & set(geometric_parameters(model, poses, [n]).names)
+            )
     if not model.backlash_joints:
         wider = _with_backlash(model, torque, joints)
         if wider is None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -16,6 +17,12 @@ from flexcal.units import MILLIMETRE
 
 _WORSE = 1.02
 """Factor by which the largest error at a left-out pose may rise with a term."""
+
+
+_LEAST_GAIN = 1e-12
+"""m: gains of rounding are none."""
+
+_OUT = ("left out in measuring order", "left out in the workspace", "left out one by one")
 
 
 @dataclass(frozen=True)
@@ -42,6 +49,10 @@ def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> ConsideredTerm
     """The row of a term that cannot be considered."""
     nan = float("nan")
     return ConsideredTerm(term, (*chosen, term), nan, nan, nan, nan, nan, False, reason)
+
+
+def _change(old: LeftOut, new: LeftOut, kinds: Sequence[int]) -> str:
+    return f"{old.mean(kinds) / MILLIMETRE:.4f} to {new.mean(kinds) / MILLIMETRE:.4f} mm"
 
 
 class TermTrials:
@@ -77,16 +88,14 @@ class TermTrials:
         terms = (*chosen, term)
         old, new = self.fit(chosen), self.fit(terms)
         bic = self._criterion(old, new)
-        gains = [self._gain(old, new, k) for k in self.deciding]
-        errors = (
-            f"{old.mean(self.deciding) / MILLIMETRE:.4f} to {new.mean(self.deciding) / MILLIMETRE:.4f} mm"
-        )
+        gains = {k: self._gain(old, new, k) for k in self.deciding}
+        poorest = min(gains, key=lambda k: gains[k][0] / gains[k][1])
         most = [fit.largest(self.deciding) for fit in (old, new)]
         taken = False
-        if min(gain for gain, _ in gains) <= 0:
-            reason = f"the mean error at left-out poses does not fall ({errors})"
-        elif any(gain <= error for gain, error in gains):
-            reason = f"the mean error at left-out poses falls by less than its standard error ({errors})"
+        if gains[poorest][0] <= 0:
+            reason = f"the mean error at poses {_OUT[poorest]} does not fall ({_change(old, new, [poorest])})"
+        elif gains[poorest][0] <= gains[poorest][1]:
+            reason = f"the mean error at poses {_OUT[poorest]} falls by less than the standard error ({_change(old, new, [poorest])})"
         elif bic >= -extra:
             reason = (
                 f"the BIC rises by {bic:.0f}"
@@ -97,7 +106,8 @@ class TermTrials:
             reason = f"the largest error at a left-out pose would rise from {most[0] / MILLIMETRE:.4f} to {most[1] / MILLIMETRE:.4f} mm"
         else:
             taken = True
-            reason = f"lowers the mean error at left-out poses from {errors} and the BIC by {-bic:.0f}"
+            change = _change(old, new, self.deciding)
+            reason = f"lowers the mean error at left-out poses from {change} and the BIC by {-bic:.0f}"
         return self._row(term, terms, bic, taken=taken, reason=reason)
 
     def fit(self, terms: tuple[str, ...]) -> LeftOut:
@@ -129,7 +139,7 @@ class TermTrials:
         """Mean gain (m) over the folds of a kind, which are the independent units, and its standard error."""
         fold, gain = self.folds[kind], old.distances[kind] - new.distances[kind]
         gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])
-        return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains)))
+        return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
 
     @cached_property
     def _prediction(self) -> Prediction:

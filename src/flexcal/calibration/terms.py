@@ -8,7 +8,8 @@ import numpy as np
 
 from flexcal.data import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model import RobotModel
+from flexcal.model import RobotModel, carried_mass, gravity_torque
+from flexcal.model.equilibrium import gravity_moments
 from flexcal.model.names import GEOMETRY, LATERAL, unit_of
 
 TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6}
@@ -19,13 +20,20 @@ PER_JOINT = ("gravity_compliance", "lateral_compliance")
 """Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
 
 
+_LOADED = 0.01
+"""Share of the largest spread of any gravity load that a load must spread by for its compliance to be told from a constant."""
+_LEAST_LOAD = 1e-6
+"""N m: loads of rounding."""
+
+
 def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:
     """The geometric parameters of some terms, starting at the model's values (P1 §3).
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared
     with it. `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances
-    only where no spring is declared in their place; `<joint>.gravity_compliance` that of one joint.
+    only where no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary
+    most. `<joint>.gravity_compliance` is that of one joint.
     """
     joints = moving_joints(model, poses)
     names: list[str] = []
@@ -45,13 +53,16 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
             if i in joints
         ]
     further: dict[str, None] = {}
+    loaded = loaded_compliances(model, poses) if any(t.endswith(PER_JOINT) for t in terms) else frozenset()
     for term in terms:
         owner, _, kind = term.rpartition(".")
         if kind in ("kinematic", "backlash"):
             continue
         own = [model.joint_index(owner)] if owner else free_joints(model, kind, joints)
         for i in own:
-            further |= dict.fromkeys(f"{model.joints[i].name}.{key}" for key in _keys(kind))
+            every = [f"{model.joints[i].name}.{key}" for key in _keys(kind)]
+            seen = [name for name in every if name in loaded or kind not in PER_JOINT]
+            further |= dict.fromkeys(every if owner and not seen else seen)
     return Parameters([*items, *(_parameter(model, name) for name in further)])
 
 
@@ -60,6 +71,18 @@ def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int
     springs = {e.index: e.components for e in model.elastic}
     taken = {"gravity_compliance": 2, "lateral_compliance": 0}.get(kind)
     return [i for i in joints if model.joints[i].kind == "revolute" and taken not in springs.get(i, ())]
+
+
+def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
+    """Names of the compliances of all joints whose gravity load varies by more than 1 % of the load that varies most."""
+    masses = carried_mass(model, poses.payload, len(poses))
+    loads = np.concatenate(
+        [gravity_torque(model, poses.q, masses)[:, :, None], gravity_moments(model, poses.q, masses)], axis=2
+    )
+    spread = loads.std(axis=0)
+    clear = max(_LOADED * float(spread.max(initial=0.0)), _LEAST_LOAD)
+    keys = ("gravity_compliance", *LATERAL)
+    return frozenset(f"{model.joints[i].name}.{keys[k]}" for i, k in np.argwhere(spread > clear))
 
 
 def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:

@@ -183,7 +183,7 @@ STEPS = (
                 "Calibrate",
                 "measured positions to geometry; names the parameters that are not identifiable",
                 "flexcal calibrate robot.yaml poses.csv",
-                ("results.json", "points.csv", "arm.npz", "report.html"),
+                ("results.json", "points.csv", "arm.npz", "gravity_loads.npz", "report.html"),
             ),
         ),
     ),

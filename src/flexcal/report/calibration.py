@@ -14,14 +14,15 @@ from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
 from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
 from flexcal.report.considered_terms import considered_terms, left_out_errors
 from flexcal.report.first_screen import rung, three_facts
+from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, RIGID, ArmPoses, MeasuredPoints
 from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
 from flexcal.report.page import Check, Page, Section, Table, Text, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.responses_check import check_misfit, read_misfit
-from flexcal.report.sections.geometry import arm_figure, error_figure
+from flexcal.report.sections.geometry import arm_figure, error_figures
 from flexcal.report.sections.identifiability import Determined, identifiability_blocks
-from flexcal.report.sections.parameters import parameter_table
+from flexcal.report.sections.parameters import parameter_figures, parameter_table
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.terms import terms_section
@@ -41,6 +42,7 @@ class CalibrationStudy:
     estimate: Estimate
     points: MeasuredPoints
     arms: ArmPoses
+    loads: GravityLoads | None = None
 
 
 def determined(results: Mapping[str, Any]) -> Determined:
@@ -57,10 +59,13 @@ def calibration_page(study: CalibrationStudy) -> Page:
     """The page before it becomes HTML."""
     results, points = study.results, study.points
     sections, considered = [_accuracy_section(study)], considered_terms(results)
+    kept = tuple(results["identifiability"]["selected"]["kept"])
     if considered:
         sections.append(terms_section(considered, results["term_selection_by"]))
     sections += [
-        residuals_section(results["joints"], points.poses, points.calibrated, study.estimate.outliers),
+        residuals_section(
+            results["joints"], points.poses, points.calibrated, study.estimate.outliers, study.loads
+        ),
         Section(
             "geometry",
             "Parameters",
@@ -68,7 +73,8 @@ def calibration_page(study: CalibrationStudy) -> Page:
             "beside them.",
             (
                 *identifiability_blocks(determined(results), None),
-                parameter_table(study.estimate, tuple(results["identifiability"]["selected"]["kept"]), None),
+                *parameter_figures(study.estimate, kept),
+                parameter_table(study.estimate, kept, None),
             ),
         ),
         provenance_section(results["command"], None, {}, study.estimate.provenance),
@@ -171,7 +177,7 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
             table,
             *([Text((), "Remarks", sentences(remarks))] if remarks else []),
             arm_figure(study.arms, len(points.poses)),
-            *([] if before is None else [error_figure(points.poses, before, points.calibrated)]),
+            *(() if before is None else error_figures(points.poses, before, points.calibrated)),
         ),
     )
 

@@ -34,6 +34,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.calibration import calibration_checks
 from flexcal.report.considered_terms import considered_document
 from flexcal.report.figures.arm_poses import arms_at
+from flexcal.report.gravity_loads import gravity_loads
 from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints, errors_before
 from flexcal.report.responses_check import misfit_document, misfit_sentences
 from flexcal.report.trust import Trust
@@ -42,7 +43,7 @@ from flexcal.workflow.bearing_remarks import bearing_remarks, bearings_block
 from flexcal.workflow.calibrated_robot import TARGETS, TARGETS_BETWEEN
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.point_files import write_arm, write_points
+from flexcal.workflow.point_files import write_arm, write_loads, write_points
 from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import (
     identifiability_block,
@@ -158,8 +159,8 @@ def calibrate_robot(
 
     The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
     (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. Where the files give no sigma, the
-    scatter about the fit stands for it. With `out`, estimates, results.json, points.csv, arm.npz and report.html go to that folder, and
-    nothing beside robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
+    scatter about the fit stands for it. With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to
+    that folder, and nothing beside robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
     progress("reading", 0.0)
     require_distinct(files)
@@ -223,6 +224,10 @@ def calibrate_robot(
         write_results(out, result.document())
         write_points(out, result.points)
         write_arm(out, arms_at(selected.model, selected.poses, result.points.shown))
+        fits = {
+            name: result.points.errors[name] for name in (RIGID, CALIBRATED) if name in result.points.errors
+        }
+        write_loads(out, gravity_loads(selected, fits))
         report_folder(out)
         progress("report", 1.0)
     return result

@@ -11,9 +11,10 @@ import polars as pl
 from flexcal.atomic import atomic_path
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
+from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, ArmPoses, MeasuredPoints
 
-POINTS, ARM = "points.csv", "arm.npz"
+POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
 _TEXTS = ("target", "station")
 
@@ -103,6 +104,26 @@ def read_arm(folder: Path) -> ArmPoses:
             return ArmPoses(
                 file["corners"], file["surface"], file["triangles"], file["pose"], file["tip"], errors
             )
+    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def write_loads(folder: Path, loads: GravityLoads) -> None:
+    """Leave `loads` as gravity_loads.npz in `folder`, atomically."""
+    arrays = {"torque": loads.torque} | {f"along_{model}": along for model, along in loads.along.items()}
+    with atomic_path(folder / LOADS) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def read_loads(folder: Path) -> GravityLoads | None:
+    """What `write_loads` left, None without the file, as in folders of an older flexcal; raises `InputError` where it cannot be read."""
+    path = folder / LOADS
+    if not path.is_file():
+        return None
+    try:
+        with np.load(path) as file:
+            along = {model: file[f"along_{model}"] for model in _MODELS if f"along_{model}" in file}
+            return GravityLoads(file["torque"], along)
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         raise _unreadable(path, problem) from problem
 

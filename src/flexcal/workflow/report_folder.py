@@ -26,7 +26,7 @@ from flexcal.report.verification import VerificationStudy, write_verification_re
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.experiment_files import FREQUENCY_PLAN
 from flexcal.workflow.fitted_files import read_fitted
-from flexcal.workflow.point_files import read_arm, read_points
+from flexcal.workflow.point_files import read_arm, read_loads, read_points
 from flexcal.workflow.prediction_files import read_predictions
 from flexcal.workflow.results import RESULTS, read_results
 from flexcal.workflow.stored_block import ESTIMATES
@@ -93,7 +93,9 @@ def calibration_study(folder: Path) -> CalibrationStudy:
     """What `calibrate` left in a folder; raises `InputError` where a file is not there or cannot be read."""
     results = read_results(folder)
     points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
-    return CalibrationStudy(results, _block(folder, "calibration"), points, read_arm(folder))
+    return CalibrationStudy(
+        results, _block(folder, "calibration"), points, read_arm(folder), read_loads(folder)
+    )
 
 
 def two_stage_study(folder: Path) -> TwoStageStudy:

@@ -8,6 +8,7 @@ from flexcal.data import PoseSet
 from flexcal.report.figures.arm_poses import arm_poses
 from flexcal.report.figures.calibration_errors import calibration_errors
 from flexcal.report.figures.error_components import error_components
+from flexcal.report.figures.error_histogram import error_histogram
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, ArmPoses
 from flexcal.report.notation import millimetres
 from flexcal.report.page import FigureBlock, Section, Selector, Slider
@@ -79,6 +80,21 @@ def error_figure(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> Figur
         "Distance between measured and predicted point. The scale is logarithmic: one step of the grid is about a factor of two. These "
         "poses were used for the fit, so this is not yet the accuracy to expect elsewhere.",
         f"Error of each of {len(poses)} poses before (the robot's own), up to {was} mm, and calibrated, up to {now} mm.",
+    )
+
+
+def error_figures(poses: PoseSet, before: np.ndarray, after: np.ndarray) -> tuple[FigureBlock, FigureBlock]:
+    """Errors before and after by pose, and their histogram."""
+    was, now = (millimetres(float(np.median(np.linalg.norm(e, axis=1)))) for e in (before, after))
+    return (
+        error_figure(poses, before, after),
+        FigureBlock(
+            "figure-histogram",
+            "Histogram of the errors, before and after",
+            error_histogram({NOMINAL: before, CALIBRATED: after}),
+            "Share of the points in each range of distance; ranges are equally wide on the logarithmic scale. Dotted lines: medians.",
+            f"Two histograms of distances; the median is {was} mm before and {now} mm after.",
+        ),
     )
 
 

@@ -7,9 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flexcal.data import PoseSet
+from flexcal.report.figures.error_field import error_field
 from flexcal.report.figures.residual_joints import residual_joints
+from flexcal.report.figures.residual_torque import loaded_joints, residual_torque
 from flexcal.report.figures.residual_trend import residual_trend
 from flexcal.report.figures.residual_workspace import residual_workspace
+from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Block, FigureBlock, Section, Table
 
@@ -17,10 +20,16 @@ _MOST = 12
 
 
 def residuals_section(
-    joints: Mapping[str, str], poses: PoseSet, residuals: np.ndarray, outliers: Sequence[int]
+    joints: Mapping[str, str],
+    poses: PoseSet,
+    residuals: np.ndarray,
+    outliers: Sequence[int],
+    loads: GravityLoads | None = None,
 ) -> Section:
     """Residuals (N, 3) m of a fit, and the rows of its `outliers`; `joints` are kinds by name."""
     blocks = residual_blocks(joints, poses, residuals)
+    if loads is not None and loaded_joints(joints, loads):
+        blocks = (*blocks, _torque_figure(joints, loads))
     if outliers:
         blocks = (*blocks, _outlier_table(poses, residuals, outliers))
     return Section(
@@ -28,6 +37,17 @@ def residuals_section(
         "Residuals",
         "If the model is complete, residuals depend neither on time nor on the pose.",
         blocks,
+    )
+
+
+def _torque_figure(joints: Mapping[str, str], loads: GravityLoads) -> FigureBlock:
+    return FigureBlock(
+        "figure-torque",
+        "Residuals against the gravity torque of every joint",
+        residual_torque(joints, loads),
+        "The part of the residual along the motion of the point by a joint, against the gravity torque that its drive holds. A line that "
+        "slopes is a compliance that the model lacks; joints that gravity does not load are left out.",
+        f"Residuals against gravity torque in one panel for each of {len(loaded_joints(joints, loads))} joints, with fitted lines.",
     )
 
 
@@ -65,6 +85,14 @@ def residual_blocks(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
             "A periodic pattern over a joint indicates transmission errors; growth towards one end indicates deflection that the model "
             "lacks.",
             "Error against the position of each joint, with means in bins.",
+        ),
+        FigureBlock(
+            "figure-field",
+            "Components of the residual over the working volume",
+            error_field(poses.position, residuals),
+            "Each component of the error vector (rows) against each coordinate of the point (columns), in the instrument's frame. Where "
+            "the means leave zero, the error is systematic.",
+            f"Nine panels of residual components against coordinates of {len(poses)} points, with means in bins.",
         ),
         FigureBlock(
             "figure-workspace",
