@@ -87,3 +87,73 @@ def test_folder_console_and_verification_have_all_three(run, tmp_path: Path) -> 
     few = arm.write_poses(tmp_path / "few.csv", q[:6], arm.measured(q[:6], rng))
     before = run("verify", robot, few, "--estimates", tmp_path / "fit", "--json").document["before"]
     assert before["own"] is None and before["registered"]["poses"] == 6
+
+
+def test_the_found_point_is_said_and_written(run, tmp_path: Path) -> None:
+    arm = StrangerArm(seed=5)
+    robot, rng = arm.write(tmp_path, "# the end\n"), np.random.default_rng(6)
+    q = arm.postures(60, rng)
+    file = arm.write_poses(tmp_path / "poses.csv", q, arm.measured(q, rng))
+    text = robot.read_text()
+    done = run("calibrate", robot, file)
+    assert "the point smr was found at [0.05" in done.out and "--write-point writes it" in done.out
+    assert robot.read_text() == text
+    before = run("verify", robot, file, "--json").document["verification"]["measured"]
+    done = run("calibrate", robot, file, "--write-point", "--json")
+    found = json.loads(done.out)["points"]["smr"]
+    assert np.linalg.norm(np.subtract(found["found_xyz_m"], found["declared_xyz_m"])) < 1e-4
+    declared = np.array(found["declared_xyz_m"])
+    assert (
+        np.linalg.norm((declared - arm.true_xyz)[:2]) < 4e-4
+    )  # along the last axis nothing tells it from the flange
+    changed = robot.read_text()
+    assert (
+        "# the reflector, with a ruler" in changed
+        and "# by hand" in changed
+        and changed.endswith("# the end\n")
+    )
+    assert [a for a, b in zip(text.split("\n"), changed.split("\n"), strict=True) if a != b] == [
+        text.split("\n")[3]
+    ]
+    after = run("verify", robot, file, "--json").document["verification"]["measured"]
+    assert after["mean_mm"] == pytest.approx(before["mean_mm"], rel=0.01)
+
+
+def test_import_offers_the_place_of_the_point(run, tmp_path: Path) -> None:
+    arm = StrangerArm(seed=6)
+    robot, rng = arm.write(tmp_path), np.random.default_rng(6)
+    q = arm.postures(60, rng)
+    file = arm.write_poses(tmp_path / "poses.csv", q, arm.measured(q, rng), None)
+    done = run("import", robot, file, "--out", tmp_path / "in.csv", "--sigma", "0.02")
+    assert "--write-point writes this there" in done.out
+    done = run("import", robot, file, "--out", tmp_path / "in.csv", "--sigma", "0.02", "--write-point")
+    assert done.status == 0 and "wrote the xyz of smr" in done.out and "# by hand" in robot.read_text()
+    before = run("calibrate", robot, tmp_path / "in.csv", "--json").document["before"]
+    assert before["registered"]["mean_mm"] < 1.3 * before["own"]["mean_mm"]
+
+
+def test_points_in_blocks_and_in_quotes(tmp_path: Path) -> None:
+    from flexcal.errors import InputError
+    from flexcal.workflow.point_place import write_point_place
+
+    robot = StrangerArm().write(tmp_path)
+    robot.write_text(
+        'robot: arm.urdf\npoints:\n  a: {frame: tool0, xyz: [1, 2, 3]}  # a: xyz: [9, 9, 9]\n  "b":\n    frame: tool0  # xyz: [0, 0, 0]\n'
+        "    xyz: [0.1, 0.2,\n          0.3]\ngravity: [0, 0, -9.81]\n"
+    )
+    write_point_place(robot, "b", np.array([0.5, 0.25, -0.125]))
+    assert (
+        "xyz: [0.500000, 0.250000, -0.125000]\ngravity" in robot.read_text()
+        and "[1, 2, 3]" in robot.read_text()
+    )
+    write_point_place(robot, "a", np.array([0.5, 0.25, -0.125]))
+    assert (
+        "  a: {frame: tool0, xyz: [0.500000, 0.250000, -0.125000]}  # a: xyz: [9, 9, 9]" in robot.read_text()
+    )
+    robot.write_text(
+        "robot: arm.urdf\npoints:\n  a:\n    frame: tool0\n    xyz:\n      - 1\n      - 2\n      - 3\n"
+    )
+    text = robot.read_text()
+    with pytest.raises(InputError, match="by hand"):
+        write_point_place(robot, "a", np.zeros(3))
+    assert robot.read_text() == text

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from tyro.conf import arg
 
+from flexcal.atomic import write_text
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import with_estimates
@@ -19,6 +22,11 @@ from flexcal.cli.options import (
     require_files,
     require_robot,
 )
+from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.progress import Progress
+    from flexcal.workflow.calibrate_robot import RobotCalibration
 
 
 @dataclass(frozen=True)
@@ -44,13 +52,14 @@ class Calibrate:
     """How the uncertainty of stiffness and inertia enters; both give the same geometry to first order."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    write_point: bool = False
+    """Write where the measured points were found into robot.yaml, in place of where a ruler had them, and calibrate with that."""
     json: Json = False
 
     def run(self) -> None:
         """Calibrate, and print what was found."""
         from flexcal.cli.considered_terms import considered_lines
         from flexcal.cli.tables import before_rows, dropped_table, error_table, weak_table
-        from flexcal.workflow.calibrate_robot import calibrate_robot
         from flexcal.workflow.calibration_remarks import hardly_fits
 
         require_robot(self.robot, *self.poses)
@@ -58,17 +67,11 @@ class Calibrate:
         require_at_least(0, secant_scale=self.secant_scale)
         console = Console(self.json)
         with console.progress() as progress:
-            found = calibrate_robot(
-                self.robot,
-                self.poses,
-                terms=self.terms or None,
-                loss=self.loss,
-                secant_scale=self.secant_scale,
-                elasticity=self.elasticity,
-                out=self.out,
-                command=command_line(),
-                progress=progress,
-            )
+            found = self._calibrated(self.terms, progress)
+            write = self.write_point and not hardly_fits(found.selected)
+            if write:
+                told = point_lines(found.found_points)
+                found = self._with_points_written(found, progress)
         document = found.document()
         seen = document["identifiability"]
         if seen["dropped"]:
@@ -90,6 +93,12 @@ class Calibrate:
         console.show(error_table("distance to the measured points", rows))
         for remark in document["remarks"]:
             console.say(remark)
+        if write:
+            for line in told:
+                console.say(f"{line}: written to {self.robot}, and calibrated with that")
+        else:
+            for line in point_lines(document["points"]):
+                console.say(f"{line}; --write-point writes it to {self.robot}")
         console.say(found.trust.sentence)
         where = with_estimates(self.out)
         console.say(f"wrote {found.estimates}")
@@ -105,3 +114,51 @@ class Calibrate:
         if found.bearings is not None and found.bearings.contradicted:
             following = f"write `bearings: {found.bearings.preferred}` in {self.robot}, and calibrate again"
         console.finish(document, following)
+
+    def _calibrated(self, terms: Sequence[str], progress: Progress) -> RobotCalibration:
+        from flexcal.workflow.calibrate_robot import calibrate_robot
+
+        return calibrate_robot(
+            self.robot,
+            self.poses,
+            terms=terms or None,
+            loss=self.loss,
+            secant_scale=self.secant_scale,
+            elasticity=self.elasticity,
+            out=self.out,
+            command=command_line(),
+            progress=progress,
+        )
+
+    def _with_points_written(self, found: RobotCalibration, progress: Progress) -> RobotCalibration:
+        """The points written to robot.yaml, and the calibration anew: the estimates hold what points are off from there."""
+        from flexcal.workflow.point_place import write_point_place
+
+        text = self.robot.read_text(encoding="utf-8")
+        try:
+            for name, point in found.found_points.items():
+                write_point_place(self.robot, name, point["found_xyz_m"])
+            return self._calibrated(found.selected.terms, progress)
+        except BaseException:
+            write_text(self.robot, text)
+            raise
+
+
+_FOUND_BESIDE = 5e-4
+"""m: a point found nearer than this to where it was declared is not worth a word."""
+
+
+def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """A line for each point that was found elsewhere than it was declared; `points` as in the document."""
+    lines = []
+    for name, point in points.items():
+        off = math.dist(point["found_xyz_m"], point["declared_xyz_m"])
+        if off > _FOUND_BESIDE:
+            found, declared = (
+                ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")
+            )
+            lines.append(
+                f"the point {name} was found at [{found}] m in {point['frame']}, {off / MILLIMETRE:.2f} mm from [{declared}], where it was "
+                "declared"
+            )
+    return lines

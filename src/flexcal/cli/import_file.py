@@ -16,7 +16,7 @@ from flexcal.units import MILLIMETRE
 if TYPE_CHECKING:
     from flexcal.workflow.import_file import ImportedFile
 
-_MOVED = 0.02
+_MOVED = 0.002
 """A point that fits better so far (m) from where it was declared is worth a word."""
 
 
@@ -55,6 +55,8 @@ class Import:
     """Write although the nominal robot does not go with the points."""
     write_signals: bool = False
     """Also add the block 'signals:' to robot.yaml, at its end, so that files with these columns are read as they are."""
+    write_point: bool = False
+    """Also write to robot.yaml where the measured point fits the nominal robot best, in place of its `xyz`."""
     json: Json = False
 
     def run(self) -> None:
@@ -83,6 +85,8 @@ class Import:
         self._say_fit(console, found)
         if not found.trusted and not self.unchecked:
             raise InputError(self._doubt(found))
+        if self.write_point:
+            self._write_point(console, found)
         if self.write_signals:
             self._add_signals(console, found)
         if self.out is not None:
@@ -101,9 +105,25 @@ class Import:
         if not fit.doubtful and shift > _MOVED and fit.moved_rms < 0.5 * fit.rms:
             place = ", ".join(f"{value:.3f}" for value in fit.moved)
             console.say(
-                f"with the point at [{place}] in its frame only {fit.moved_rms / MILLIMETRE:.2f} mm: "
+                f"with the point {fit.point} at [{place}] in its frame only {fit.moved_rms / MILLIMETRE:.2f} mm: "
                 f"check its xyz under `points:` in {self.robot}"
+                + (
+                    ""
+                    if self.write_point
+                    else "; --write-point writes this there (calibrate finds it more exactly)"
+                )
             )
+
+    def _write_point(self, console: Console, found: ImportedFile) -> None:
+        from flexcal.workflow.point_place import write_point_place
+
+        fit = found.misfit
+        if fit is None or fit.doubtful:
+            raise InputError(
+                f"{self.file}: these points do not tell where the reflector is on the tool; leave --write-point out."
+            )
+        write_point_place(self.robot, fit.point, fit.moved)
+        console.say(f"wrote the xyz of {fit.point} to {self.robot}")
 
     def _doubt(self, found: ImportedFile) -> str:
         fit = found.misfit

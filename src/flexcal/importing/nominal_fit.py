@@ -36,7 +36,7 @@ _ALIKE = 1.5
 class Misfit:
     """By how much (rms, m) the registered nominal robot misses the points.
 
-    declared: where the point is in its frame (m); moved: where it would have to be to fit best, and `moved_rms` what that leaves.
+    point: its name; declared: where it is in its frame (m); moved: where it would have to be to fit best, and `moved_rms` what that leaves.
     proposal: what would explain a misfit, in words, and `options` to say so with --map; empty where nothing simple does, or none is needed.
     """
 
@@ -45,6 +45,7 @@ class Misfit:
     declared: np.ndarray
     moved: np.ndarray
     reach: float
+    point: str = ""
     proposal: str = ""
     options: tuple[str, ...] = ()
 
@@ -70,7 +71,7 @@ def check_nominal(
     rms, _ = tool.miss(q, xyz, 1)
     moved_rms, shift = tool.miss(q, xyz, _ROUNDS)
     declared = model.point(point).xyz
-    found = Misfit(rms, moved_rms, declared, declared + shift, model.reach)
+    found = Misfit(rms, moved_rms, declared, declared + shift, model.reach, model.point(point).name)
     if moved_rms < _ODD * model.reach:
         return found
     return _explained(model, tool, q, xyz, placed, found)

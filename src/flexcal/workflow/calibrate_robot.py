@@ -18,6 +18,7 @@ from flexcal.calibration import (
     TermSelection,
     calibrate,
     compare_bearings,
+    probable_robot,
     require_points,
     robot_before,
     select_terms,
@@ -29,6 +30,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
+from flexcal.model.placement import found_xyz
 from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.calibration import calibration_checks
@@ -95,6 +97,21 @@ class RobotCalibration:
         return {**self._numbers, "verdict": self.trust.document()}
 
     @cached_property
+    def found_points(self) -> dict[str, dict[str, Any]]:
+        """The measured points: their frames, and where they are in it, m, as declared and as found."""
+        fit = self.selected
+        targets = fit.poses.targets
+        found = probable_robot(fit.model, targets)
+        return {
+            name: {
+                "frame": fit.model.points[name].frame,
+                "declared_xyz_m": fit.model.points[name].xyz,
+                "found_xyz_m": found_xyz(found, name),
+            }
+            for name in targets
+        }
+
+    @cached_property
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
         found, drift = selected.identifiability, Drift.of(selected)
@@ -108,6 +125,7 @@ class RobotCalibration:
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
             "term_selection_by": chosen.by if chosen else None,
             "before": before,
+            "points": self.found_points,
             "calibration": {
                 "nominal": before["registered"],
                 "rigid": self.rigid.errors.in_millimetres(),

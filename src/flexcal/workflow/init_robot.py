@@ -100,7 +100,8 @@ robot: {_text(urdf)}
 {chr(10).join(rows)}
 {held if arm.locked else ""}
 # What the instrument sees: the centre of the reflector, m along the axes of a frame of the URDF. {_text(arm.frame)} was guessed
-# from its name{others}. Measure xyz with a ruler, to a centimetre or so: the calibration finds the rest.
+# from its name{others}. Measure xyz with a ruler, to a centimetre or so: the calibration finds the rest,
+# and 'flexcal import' and 'flexcal calibrate' write what they find here with --write-point.
 # Off the last joint's axis (by 0.1 m, say) it also shows how far that joint turns.
 points:
   smr: {{frame: {_text(arm.frame)}, xyz: [0.0, 0.0, 0.0]}}
