@@ -6,8 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from yielding_robot import PANDA_LIKE, TWO_ARMS, Body, YieldingRobot, write_robot
+from yielding_robot import PANDA_LIKE, REFLECTOR, TWO_ARMS, Body, YieldingRobot, write_robot
 
+from flexcal.calibration import probable_robot
+from flexcal.model.placement import found_xyz
 from flexcal.workflow.calibrate_robot import RobotCalibration, calibrate_robot
 from flexcal.workflow.verify_robot import verify_robot
 
@@ -63,6 +65,9 @@ def test_defaults_find_that_a_seven_axis_arm_yields(tmp_path: Path) -> None:
         "transmission_3",
     }
     assert all(row["reason"] for row in rows if row["term"])
+    # the reflector is 1 mm from where the ruler has it: axes that tilt do not hide which directions no point tells
+    placed = found_xyz(probable_robot(found.selected.model, ["smr"]), "smr")
+    assert np.linalg.norm(placed - REFLECTOR) < 4e-3
 
 
 @pytest.mark.slow

@@ -41,9 +41,10 @@ def probable_robot(model: RobotModel, targets: Sequence[str]) -> RobotModel:
 def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotModel, RobotModel]:
     """`model` with the directions of its geometry that do not move the measured points `targets` where they are most probable.
 
-    Weighted least squares of all geometric errors, subject to unchanged positions of the points as every calibrated station sees them, by
-    Gauss-Newton. The posterior follows: what was estimated is propagated, and the free directions have the tolerances as their
-    covariance. The second robot is the same with only these in its posterior: what the measured points leave open. Both are the
+    Weighted least squares of all geometric errors, subject to unchanged positions of the points, as every calibrated station sees them, by
+    Gauss-Newton, of the robot taken as stiff under gravity: tilting axes would show such directions faintly. The posterior follows: what
+    was estimated is propagated, and the free directions have the tolerances as their covariance. The second robot is the same with only
+    these in its posterior: what the measured points leave open. Both are the
     robot itself where nothing was calibrated.
     """
     stations = [name for name in model.stations if f"station.{name}.x" in model.posterior.parameters]
@@ -52,10 +53,15 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     names = _names(model, targets, stations)
     std = np.array([_std(model, name, targets) for name in names])
     poses = _random_poses(model, targets, stations)
-    wanted = predict(model, poses, elastic=False).position
+    stiff = replace(
+        model,
+        gravity_compliance=np.zeros_like(model.gravity_compliance),
+        lateral_compliance=np.zeros_like(model.lateral_compliance),
+    )
+    wanted = predict(stiff, poses, elastic=False).position
     scale = np.where(np.isfinite(std), std, 1.0)
     weight = np.where(np.isfinite(std), 1 / std, 0.0)
-    found, free = model, np.zeros((len(names), 0))
+    found, free = stiff, np.zeros((len(names), 0))
     for _ in range(_STEPS):
         at = predict(found, poses, elastic=False, jacobians=True)
         columns = at.jacobian(names).reshape(-1, len(names)) * scale
@@ -70,6 +76,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
         found = found.with_values(dict(zip(names, changed.tolist(), strict=True)))
         if np.abs(step).max() < _SMALL:
             break
+    found = model.with_values({name: found.value(name) for name in names})
     whole, unseen = _propagated(found, names, free, weight)
     return replace(found, posterior=whole), replace(found, posterior=unseen)
 
