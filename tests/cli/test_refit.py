@@ -79,6 +79,8 @@ def test_a_moved_tracker_is_said_and_refitted(run, robot: Path, arm: StrangerArm
     assert done.status == 0 and "after placing the station again 0.0" in done.out
     assert "--refit station verifies the geometry alone, at the price of 2 poses" in done.out
     assert "Trusted: no" in done.out
+    mapped = run("map", robot, "--verification", file, "--count", "50", "--out", tmp_path / "map.html")
+    assert mapped.status == 2 and "after placing the station again" in mapped.err
     plain = run("verify", robot, file, "--json").document
     assert plain["verification"]["measured"]["mean_mm"] > 100 and plain["refit"] is None
     assert plain["refit_proposed"]["what"] == ["station"]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flexcal.calibration import Verification
+from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
 from flexcal.report.checks import check_claimed_uncertainty, check_enough, check_flanks, check_unseen
 from flexcal.report.figures.error_distribution import error_distribution
@@ -84,12 +84,23 @@ def _verdict(study: VerificationStudy) -> Verdict:
         trust.status,
         _HEADLINES[trust.status],
         f"At {after.poses} {noun} errors of the calibrated model have a P90 of {millimetres(after.p90)} mm and a maximum of "
-        f"{millimetres(after.max)} mm. The instrument's noise is included.",
+        f"{millimetres(after.max)} mm. The instrument's noise is included.{_refitted(study.results)}",
         three_facts(before, after, trust, "points"),
         (*before_rungs(study.points), rung("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} {noun}, against the instrument",
         checks,
     )
+
+
+def _refitted(results: Mapping[str, Any]) -> str:
+    """What was fitted to the verification's own poses, in a sentence."""
+    refit = results.get("refit")
+    if not refit:
+        return ""
+    words = " and ".join(
+        {"station": "place of the instrument", "point": "measured point"}[w] for w in refit["what"]
+    )
+    return f" Fitted to these points: {words}; each point is left out of the fit that it is judged by, so this is of the geometry alone."
 
 
 def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
@@ -117,7 +128,11 @@ def _errors_section(study: VerificationStudy) -> Section:
     series = [ErrorSeries("calibrated", ELASTIC, result.errors)]
     refit = study.results.get("refit")
     label = f"calibrated, {' and '.join(refit['what'])} refitted (leave-one-out)" if refit else "calibrated"
-    rows = [*before_rows(study.points), (label, str(result.all.poses), *statistics_cells(result.all))]
+    rows = before_rows(study.points)
+    if refit and (block := study.results["verification"].get("as_calibrated")):
+        stands = ErrorStatistics.of_millimetres(block)
+        rows.append(("calibrated, nothing refitted", str(stands.poses), *statistics_cells(stands)))
+    rows.append((label, str(result.all.poses), *statistics_cells(result.all)))
     if study.points.delivered is not None:
         series.insert(0, ErrorSeries("before, the robot's own", NOMINAL, study.points.delivered))
     if result.ambiguous.any():

@@ -36,6 +36,7 @@ from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_choice import box_corners, working_file, working_volume
+from flexcal.workflow.refit_remarks import proposed_refit, refit_remarks
 from flexcal.workflow.verify_robot import fitted_files, verification_poses
 
 _WORST = 5
@@ -212,6 +213,12 @@ def _verified(
     poses = verification_poses(calibrated, files)
     found, roots = verify_jointly(calibrated.model, poses)
     noise = poses.sigma if poses.sigma_given else None
+    if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
+        (said,) = refit_remarks(found, poses, None, moved)
+        named = " and ".join(str(file) for file in files)
+        raise InputError(
+            f"{named} cannot say how large the map's errors are: {said}; give points measured as the calibration's."
+        )
     before = robot_before(calibrated.nominal, poses).errors(poses)
     return error_scale(found, roots, noise), before, (found, noise)
 
