@@ -52,3 +52,34 @@ def test_links_follow_the_joints(examples: Path, example: str, rng: np.random.Ge
     assert np.linalg.norm(placed - tip[:, None], axis=2).min(axis=1).max() < reach
     moved = np.ptp(placed, axis=0).max(axis=1)
     assert moved[surface.owner < 0].max() < 1e-12 < moved[surface.owner >= 1].min()
+
+
+def test_meshes_are_drawn_and_missing_ones_are_not(tmp_path: Path) -> None:
+    """A tetrahedron on a turning link; without its file the collision shape, a box, takes its place."""
+    corners = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    facets = "".join(
+        "facet normal 0 0 0\nouter loop\n"
+        + "".join("vertex {} {} {}\n".format(*corners[k]) for k in face)
+        + "endloop\nendfacet\n"
+        for face in ((0, 2, 1), (0, 1, 3), (0, 3, 2), (1, 2, 3))
+    )
+    (tmp_path / "arm.stl").write_text(f"solid arm\n{facets}endsolid arm\n")
+    (tmp_path / "arm.urdf").write_text(
+        '<robot name="arm"><link name="base"/><link name="tip">'
+        '<inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>'
+        '<visual><geometry><mesh filename="arm.stl"/></geometry></visual>'
+        '<collision><geometry><box size="2 2 2"/></geometry></collision></link>'
+        '<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><origin xyz="0 0 2"/><axis xyz="0 0 1"/>'
+        '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>'
+    )
+    (tmp_path / "robot.yaml").write_text(
+        "robot: arm.urdf\npoints:\n  smr: {frame: tip, xyz: [0, 0, 1]}\n"
+    )
+    model = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
+    surface = LinkSurface.of(model)
+    assert len(surface.triangles) == 4
+    placed = surface.at(model, np.array([[np.pi / 2]]))[0]
+    np.testing.assert_allclose(placed.min(axis=0), [-1, 0, 2], atol=1e-6)
+    np.testing.assert_allclose(placed.max(axis=0), [0, 1, 3], atol=1e-6)
+    (tmp_path / "arm.stl").unlink()
+    assert len(LinkSurface.of(model).triangles) == 12

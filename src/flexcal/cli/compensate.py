@@ -93,7 +93,7 @@ class Compensate:
             console.say(f"the targets are of {_point_words(name, point)}")
         before = document["error_before_mm"]
         console.say(
-            f"with nominal commands the tool would be {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"
+            f"position error with nominal commands: {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"
         )
         if document["ambiguous"]:
             console.say(

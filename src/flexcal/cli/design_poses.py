@@ -135,7 +135,7 @@ class DesignPoses:
         document = found.document()
         seen = document["identifiability"]
         console.say(
-            f"{seen['rank']} of {seen['parameters']} parameters can be told apart by position measurements"
+            f"{seen['rank']} of {seen['parameters']} parameters are identifiable from position measurements"
         )
         console.say(
             f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}); "
@@ -149,11 +149,7 @@ class DesignPoses:
         ways = ", ".join(f"{a} to {b}" for a, b in blocked)
         console.say(
             f"moving through them takes {document['moves_s']:.1f} s or more"
-            + (
-                f"; on the straight way of the joints something touches from {ways}: go round there"
-                if blocked
-                else ""
-            )
+            + (f"; collisions on the straight joint motion from {ways}: go round there" if blocked else "")
         )
         console.say(f"wrote {self.out}: {document['poses']} poses")
         console.finish(
@@ -173,7 +169,7 @@ class DesignPoses:
         )
         stop = document["stop_after"]
         aim = (
-            "more poses do little but average" if self.wanted is None else f"it is at most {self.wanted:g} mm"
+            "further poses only average noise" if self.wanted is None else f"it is at most {self.wanted:g} mm"
         )
         if stop == 0:
             console.say(f"stop here: {aim}; no plan was written")
@@ -197,10 +193,10 @@ class DesignPoses:
             unsure, hidden = len(document["flank_not_sure"]), len(document["not_seen"])
             if unsure:
                 console.say(
-                    f"{unsure} poses were left out, for gravity does not surely settle the flank of a backlash there"
+                    f"{unsure} poses were left out because the flank of a backlash is uncertain there"
                 )
             if hidden:
-                console.say(f"{hidden} poses were left out, for the instrument does not see them")
+                console.say(f"{hidden} poses were left out because the instrument does not see them")
         for joint, sides in document["flanks"].items():
             console.say(
                 f"{joint}: {sides['positive']} poses on one flank of its backlash, {sides['negative']} on the other"

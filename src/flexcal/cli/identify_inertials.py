@@ -46,7 +46,7 @@ class IdentifyInertials:
         console.show(quantity_table("links and drives", document["parameters"], units))
         error = document["error_percent"]
         console.say(
-            f"torques missed by {error['train']:.2f} % of their norm in the fit, by {error['nominal']:.2f} % with the values of robot.yaml"
+            f"relative torque error: {error['train']:.2f} % in the fit, {error['nominal']:.2f} % with the values of robot.yaml"
         )
         console.say(found.trust.sentence)
         console.say(f"wrote {found.estimates}")

@@ -75,7 +75,7 @@ class IdentifyPayload:
         for remark in document["remarks"]:
             console.say(remark)
         console.say(found.trust.sentence)
-        console.say(f"the same as a line of robot.yaml, if you want to keep it there: {found.declaration}")
+        console.say(f"as a line of robot.yaml: {found.declaration}")
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")

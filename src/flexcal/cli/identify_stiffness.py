@@ -74,7 +74,7 @@ class IdentifyStiffness:
             console.say(f"the fit has not converged ({fit['message']}); do not trust it")
         if not fit["reference_motion_modelled"]:
             console.say(
-                "there is no plan.yaml beside the responses: the reference motion is ignored, damping comes out too large"
+                "there is no plan.yaml beside the responses: the reference motion is ignored, which biases damping upwards"
             )
         if fit["missing_poses"]:
             numbers = ", ".join(map(str, fit["missing_poses"]))

@@ -94,8 +94,8 @@ def _mesh(shape: Any) -> tuple[np.ndarray, np.ndarray] | None:
         case coal.Sphere():
             return ellipsoid(np.full(3, shape.radius))
         case coal.BVHModelBase() if shape.num_tris:
-            triangles = [tuple(shape.tri_indices(k)) for k in range(shape.num_tris)]
-            return np.array(shape.vertices()), np.array(triangles)
+            corners = [shape.tri_indices(k) for k in range(shape.num_tris)]
+            return np.array(shape.vertices()), np.array([(t[0], t[1], t[2]) for t in corners])
     return None
 
 
