@@ -68,6 +68,23 @@ def test_round_trip_is_within_a_micrometre(
 
 
 @pytest.mark.parametrize("bearings", ["after", "before"])
+def test_axes_that_tilt_under_gravity_are_compensated(
+    tx90l: RobotModel, real: RobotModel, random_targets: Callable[[int], ToolTargets], bearings: Bearings
+) -> None:
+    """With payloads of 0 to 6 kg, whose moments tilt the wrist's axes."""
+    tilts = {f"joint_{k}.gravity_compliance_{axis}": 1e-5 for k in (4, 5) for axis in (1, 2)}
+    targets, tilting = random_targets(100), real.with_bearings(bearings).with_values(tilts)
+    found = compensate(tilting, tx90l, targets)
+    done = found.found & found.unambiguous
+    assert done.mean() > 0.8 and targets.q is not None and targets.payload is not None
+    wanted = point_kinematics(tx90l, targets.q).position[done]
+    at = seen_in_base(tilting, found.q[done], targets.payload[done])
+    assert np.abs(at - wanted).max() < MICROMETRE
+    stiff = seen_in_base(real.with_bearings(bearings), found.q[done], targets.payload[done])
+    assert np.linalg.norm(stiff - wanted, axis=1).max() > 50 * MICROMETRE
+
+
+@pytest.mark.parametrize("bearings", ["after", "before"])
 def test_another_engine_puts_the_tool_there(
     tx90l: RobotModel, real: RobotModel, random_targets: Callable[[int], ToolTargets], bearings: Bearings
 ) -> None:

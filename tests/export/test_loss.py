@@ -14,6 +14,7 @@ from flexcal.export.sdf import render_sdf, sdf_tool
 from flexcal.export.urdf import render_urdf, urdf_tool, write_urdf
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.model.config import BoxConfig
+from flexcal.model.equilibrium import gravity_moments
 
 
 def test_backlash_of_one_joint_is_its_lever_times_the_gap(tx90l: RobotModel) -> None:
@@ -59,6 +60,17 @@ def test_a_transmission_error_is_its_lever_times_the_wave(tx90l: RobotModel) -> 
     expected = wave * np.abs(np.sin(2 * q[:, 2])) * lever
     assert loss.error is not None and [term.name for term in loss.terms] == ["transmission error"]
     assert loss.error.mean == pytest.approx(expected.mean(), rel=1e-3)
+
+
+def test_lateral_compliance_is_named_with_what_it_costs(tx90l: RobotModel) -> None:
+    rigid = replace(tx90l, bearing_frames={})
+    model = rigid.with_values({"joint_1.gravity_compliance_1": 1e-6, "joint_1.gravity_compliance_2": 1e-6})
+    loss = measure_loss(model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST)
+    q, _ = random_poses(model, None, np.random.default_rng(0))
+    jacobian = point_kinematics(model, q).geometry_jacobian[:, :3, 1:3]
+    moved = np.matmul(jacobian, 1e-6 * gravity_moments(model, q)[:, 0, :, None])[:, :, 0]
+    assert loss.error is not None and [term.name for term in loss.terms] == ["lateral gravity compliance"]
+    assert loss.error.mean == pytest.approx(np.linalg.norm(moved, axis=1).mean(), rel=1e-3)
 
 
 @pytest.mark.parametrize("form", ["urdf", "mjcf", "sdf"])

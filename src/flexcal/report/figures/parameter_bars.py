@@ -24,8 +24,8 @@ def shown_parameters(estimate: Estimate, names: Sequence[str]) -> list[str]:
     ]
 
 
-def parameter_bars(estimate: Estimate, names: Sequence[str]) -> go.Figure:
-    """Estimates and 95 % intervals of `shown_parameters`, over 0.3 mm, 0.5 mrad or 1 µrad/(N m) by unit."""
+def parameter_bars(estimate: Estimate, names: Sequence[str], axis: str) -> go.Figure:
+    """Estimates and 95 % intervals of `shown_parameters`, over 0.3 mm, 0.5 mrad or 1 µrad/(N m) by unit; `axis` is the axis title."""
     chosen = shown_parameters(estimate, names)
     tolerance = np.array([TOLERANCE[estimate.parameters[name].unit] for name in chosen])
     value = np.array([estimate.values[name] for name in chosen]) / tolerance
@@ -41,12 +41,12 @@ def parameter_bars(estimate: Estimate, names: Sequence[str]) -> go.Figure:
                 "type": "data", "symmetric": False, "array": single(ends[:, 1] - value),
                 "arrayminus": single(value - ends[:, 0]), "color": INK, "thickness": 1.2, "width": 3,
             },
-            hovertemplate="%{y}: %{x:+.2f} tolerances<extra></extra>",
+            hovertemplate="%{y}: %{x:+.2f}<extra></extra>",
         )
     )  # fmt: skip
     for limit in (-1, 1):
         figure.add_vline(x=limit, line={"color": AXIS, "width": 1, "dash": "dot"})
     figure.update_layout(bargap=0.35)
-    figure.update_xaxes(title_text="estimate in units of tolerance")
+    figure.update_xaxes(title_text=axis)
     figure.update_yaxes(autorange="reversed", ticks="", tickfont={"size": 11}, dtick=1)
     return figure

@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from flexcal.calibration import ConsideredTerm
 from flexcal.report.figures.canvas import canvas, single
-from flexcal.report.palette import ELASTIC, NOMINAL, PAGE
+from flexcal.report.palette import ELASTIC, INK, NOMINAL, PAGE
 from flexcal.units import MILLIMETRE
 
 
@@ -28,8 +28,8 @@ def term_scores(rows: Sequence[ConsideredTerm], by: str = "folds") -> go.Figure:
         figure.add_trace(
             go.Bar(
                 x=single(np.array(values) / MILLIMETRE), y=labels, orientation="h", name=name, marker={"color": colour},
-                text=[f"{v / MILLIMETRE:.4f}" for v in values], textposition="inside", insidetextanchor="end", constraintext="none",
-                textfont={"size": 11, "color": PAGE}, hovertemplate="%{y}: %{x:.4f} mm",
+                text=[f"{v / MILLIMETRE:.4f}" for v in values], textposition="auto", insidetextanchor="end", textangle=0,
+                insidetextfont={"size": 11, "color": PAGE}, outsidetextfont={"size": 11, "color": INK}, hovertemplate="%{y}: %{x:.4f} mm",
             )
         )  # fmt: skip
     figure.update_layout(bargap=0.3, bargroupgap=0.08, barmode="group")

@@ -16,22 +16,29 @@ def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[Figur
     yielding = [name for name in shown if estimate.parameters[name].unit == "rad/(N m)"]
     rigid = [name for name in shown if name not in yielding]
     blocks = []
-    for part, identity, words, unit in (
+    for part, identity, words, axis, unit in (
         (
             rigid,
             "parameters",
             "Lengths and angles",
-            "what manufacture usually leaves, 0.3 mm and 0.5 mrad; dotted lines are one such unit",
+            "estimate in units of tolerance",
+            "In units of manufacturing tolerance, 0.3 mm and 0.5 mrad; dotted lines are one such unit.",
         ),
-        (yielding, "compliances", "Compliances under gravity", "µrad/(N m), equal to 1 / (MN m/rad)"),
+        (
+            yielding,
+            "compliances",
+            "Compliances under gravity",
+            "compliance / (µrad/(N m))",
+            "Turn of a joint per torque; 10 µrad/(N m) is a stiffness of 100 kN m/rad.",
+        ),
     ):
         if part:
             blocks.append(
                 FigureBlock(
                     f"figure-{identity}",
                     f"{words} with their 95 % intervals",
-                    parameter_bars(estimate, part),
-                    f"In units of {unit}. A parameter whose interval holds zero is not significant by itself.",
+                    parameter_bars(estimate, part, axis),
+                    f"{unit} A parameter whose interval holds zero is not significant by itself.",
                     f"Horizontal bars of {len(part)} parameters with intervals.",
                 )
             )
