@@ -40,6 +40,11 @@ HEADLINES: dict[Status, str] = {
 }
 """Headline of a calibration by its verdict."""
 
+_ROBOTS = {
+    "virtual": "simulated robot, its truth known",
+    "hard": "simulated robot that is not made from the identified model",
+}
+
 
 def write_two_stage_report(path: str | Path, study: TwoStageStudy) -> None:
     """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
@@ -51,8 +56,7 @@ def two_stage_page(study: TwoStageStudy) -> Page:
     before, results, points = stage_zero_section(study), study.results, study.points
     return Page(
         title=f"{results['robot']}: calibration report",
-        subtitle="Two-stage calibration with elastic drives and bearings · simulated robot, its truth known · seed "
-        f"{results['seed']}",
+        subtitle=f"Two-stage calibration with elastic drives and bearings · {_ROBOTS[results['cell']]} · seed {results['seed']}",
         verdict=two_stage_verdict(study),
         sections=(
             verification_section(study),

@@ -1,0 +1,47 @@
+"""What the benchmark over hard robots calls inside, and what confidently wrong."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.hard_cell import Judged, compared, table
+from flexcal.calibration import Verification
+
+
+def test_points_of_the_predicted_size_are_inside_in_95_percent(rng: np.random.Generator) -> None:
+    noise = np.full((20000, 3), 3e-5)
+    rms = np.full(20000, 4e-5)
+    errors = np.sqrt(rms**2 / 3 + noise[:, 0] ** 2)[:, None] * rng.normal(size=noise.shape)
+    verification = Verification(np.zeros_like(errors), errors, rms, np.zeros(20000, dtype=bool))
+    inside, ratio = compared(verification, noise)
+    assert abs(inside - 0.95) < 0.005 and abs(ratio - 1) < 0.01
+    inside, ratio = compared(replace(verification, errors=2 * errors), noise)
+    assert inside < 0.6 and abs(ratio - 2) < 0.02
+
+
+def test_only_a_trusted_robot_can_be_confidently_wrong() -> None:
+    errors = {"mean_mm": 0.1, "p90_mm": 0.2, "max_mm": 0.4}
+    good = Judged(
+        1,
+        "before",
+        1.0,
+        0.05,
+        0.95,
+        1.0,
+        True,
+        (),
+        errors,
+        errors,
+        0.1,
+        {"a.stiffness": 0.1},
+        1.0,
+        (1.0, 1.0),
+        60.0,
+    )
+    wrong, refused = replace(good, ratio=1.5, inside=0.8), replace(good, ratio=1.5, inside=0.8, trusted=False)
+    assert [r.confidently_wrong for r in (good, wrong, refused)] == [False, True, False]
+    page = table([good, wrong, refused])
+    assert "2 of 3: 93 to 97 % inside" in page and page.count("confidently wrong") == 1
+    assert "2 trusted, 1 of them with observed over predicted above 1.35" in page
