@@ -22,6 +22,9 @@ which the springs are not to be relied on."""
 SEVERE_CHI2 = 2.0
 """Reduced χ² of all lines from which the springs are not to be relied on."""
 
+DOUBTFUL_STIFFNESS = 0.1
+"""Relative 1σ of a stiffness at least where there is a misfit: drives that harden or slip differ so much between small motion and load."""
+
 FAR = 3.0
 """Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""
 
@@ -74,18 +77,19 @@ def _moved(robot: RobotModel, name: str, value: float) -> float:
 def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
     """Standard deviations (p,), in estimation coordinates, that the size of a misfit supports.
 
-    The sandwich over clusters of one octave of one pose, in which errors of the model are coherent. Where the misfit is severe, a stiffness
-    is known no better than robot.yaml's, nor than its distance from that.
+    The sandwich over clusters of one octave of one pose, in which errors of the model are coherent, and no stiffness better known than to
+    `DOUBTFUL_STIFFNESS`. Where the misfit is severe, a stiffness is known no better than robot.yaml's, nor than its distance from that.
     """
     residual, jacobian = fit.problem.linearise(fit.x)
     posterior = fit.estimate.covariance
     clusters = _octaves(fit)
     scores = np.stack([np.bincount(clusters, weights=residual * column) for column in jacobian.T], axis=1)
     std = np.sqrt(np.diag(posterior @ (scores.T @ scores) @ posterior))
-    if misfit.severe:
-        robot = fit.residual.model.robot
-        for number, item in enumerate(fit.estimate.parameters):
-            if item.name.endswith(".stiffness"):
+    robot = fit.residual.model.robot
+    for number, item in enumerate(fit.estimate.parameters):
+        if item.name.endswith(".stiffness"):
+            std[number] = max(std[number], DOUBTFUL_STIFFNESS)
+            if misfit.severe:
                 std[number] = max(std[number], UNIDENTIFIED_STIFFNESS, _moved(robot, item.name, item.value))
     return std
 
