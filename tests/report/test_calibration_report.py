@@ -82,7 +82,12 @@ def test_calibration_report_is_complete(
         "figure-rank",
     }
     assert millimetres(fit.selected.errors.p90) in outline.words
-    for words in ("+ gravity compliance", "left: transmission 1", "it does not gain", "one flank only"):
+    for words in (
+        "+ gravity compliance",
+        "taken: it gains",
+        "left: it does not gain",
+        "left: one flank only",
+    ):
         assert words in outline.words
     assert fit.estimate.provenance["input.some.csv"] in outline.words and COMMAND in outline.words
     assert "The files state no measurement noise" in outline.words

@@ -72,9 +72,7 @@ def test_meshes_are_drawn_and_missing_ones_are_not(tmp_path: Path) -> None:
         '<joint name="turn" type="revolute"><parent link="base"/><child link="tip"/><origin xyz="0 0 2"/><axis xyz="0 0 1"/>'
         '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint></robot>'
     )
-    (tmp_path / "robot.yaml").write_text(
-        "robot: arm.urdf\npoints:\n  smr: {frame: tip, xyz: [0, 0, 1]}\n"
-    )
+    (tmp_path / "robot.yaml").write_text("robot: arm.urdf\npoints:\n  smr: {frame: tip, xyz: [0, 0, 1]}\n")
     model = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
     surface = LinkSurface.of(model)
     assert len(surface.triangles) == 4

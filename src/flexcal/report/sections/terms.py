@@ -18,9 +18,11 @@ def terms_section(considered: Sequence[ConsideredTerm], by: str) -> Section:
     rows = []
     for row in considered:
         errors = (row.single,) if by == "poses" else (row.order, row.workspace)
-        bic = f"{row.bic:+.0f}" if row.term and np.isfinite(row.bic) else NOTHING
-        verdict = "" if row.term is None else "taken" if row.taken else "left"
-        rows.append((term_label(row), *(_millimetres(e) for e in errors), bic, verdict, row.reason))
+        bic = f"{row.bic:+.0f}".replace("-", "−") if row.term and np.isfinite(row.bic) else NOTHING
+        verdict = "" if row.term is None else f"{'taken' if row.taken else 'left'}: {row.reason}"
+        rows.append(
+            (term_label(row).removeprefix("left: "), *(_millimetres(e) for e in errors), bic, verdict)
+        )
     out = (
         ("left out one by one / mm",)
         if by == "poses"
@@ -43,10 +45,10 @@ def terms_section(considered: Sequence[ConsideredTerm], by: str) -> Section:
             Table(
                 "table-terms",
                 "Terms considered",
-                ("term", *out, "change of BIC", "verdict", "because"),
+                ("term", *out, "change of BIC", "verdict"),
                 tuple(rows),
                 "Terms that were left are compared with those chosen when they were tried last.",
-                text_columns=(2 + len(out), 3 + len(out)),
+                text_columns=(2 + len(out),),
             ),
             FigureBlock(
                 "figure-terms",
