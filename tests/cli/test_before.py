@@ -157,3 +157,32 @@ def test_points_in_blocks_and_in_quotes(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="by hand"):
         write_point_place(robot, "a", np.zeros(3))
     assert robot.read_text() == text
+
+
+def test_a_tool_that_never_turns_does_not_tell_where_its_point_is(run, tmp_path: Path) -> None:
+    from scipy.optimize import least_squares
+    from scipy.spatial.transform import Rotation
+
+    arm = StrangerArm(seed=1, axes=tuple(SIX))
+    robot, rng = arm.write(tmp_path), np.random.default_rng(51)
+    still, q = Rotation.from_euler("y", 2.2).as_matrix(), []
+    while len(q) < 30:
+        place = rng.uniform([0.4, -0.4, 0.3], [0.9, 0.4, 1.0])
+
+        def away(row: np.ndarray, place: np.ndarray = place) -> np.ndarray:
+            at = arm.tool(row, true=False)[0]
+            return np.r_[at[:3, 3] - place, Rotation.from_matrix(still.T @ at[:3, :3]).as_rotvec()]
+
+        found = least_squares(away, arm.postures(1, rng, 0.3)[0])
+        if found.cost < 1e-12 and np.abs(found.x).max() < 3:
+            q.append(found.x)
+    q = np.array(q)
+    file = arm.write_poses(tmp_path / "poses.csv", q, arm.measured(q, rng))
+    text = robot.read_text()
+    done = run("calibrate", robot, file, "--write-point")
+    assert done.status == 0 and robot.read_text() == text
+    # either it is said that the place is not told, or it was held near where it was declared
+    point = run("calibrate", robot, file, "--json").document["points"]["smr"]
+    moved = np.linalg.norm(np.subtract(point["found_xyz_m"], point["declared_xyz_m"]))
+    assert "was found at" not in done.out or moved < 0.015
+    assert (point["std_m"] > 0.002 and "do not tell where the point smr is" in done.out) or moved < 0.015

@@ -3,7 +3,7 @@ from .before import ErrorsBefore, RobotBefore, robot_before
 from .drift import Drift
 from .elastic_prior import ElasticPrior
 from .error_statistics import ErrorStatistics
-from .gauge import found_point, probable_robot, probable_robots
+from .gauge import POINT_KNOWN, found_point, point_uncertainty, probable_robot, probable_robots
 from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
 from .measured_points import require_points
@@ -24,6 +24,7 @@ from .verification import Verification, verify, verify_jointly
 
 __all__ = [
     "CYCLES",
+    "POINT_KNOWN",
     "VISITS_A_SET",
     "AccuracyMap",
     "BearingAxes",
@@ -58,6 +59,7 @@ __all__ = [
     "geometric_parameters",
     "moved_far",
     "noise_repeatability",
+    "point_uncertainty",
     "predict",
     "probable_robot",
     "probable_robots",

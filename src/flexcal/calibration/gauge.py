@@ -17,12 +17,15 @@ from flexcal.calibration.prediction import predict
 from flexcal.calibration.terms import TOLERANCE
 from flexcal.data import PoseSet
 from flexcal.estimation import Parameter, Parameters
+from flexcal.export.spread import posterior_spread
 from flexcal.model import RobotModel
 from flexcal.model.joint_space import joint_limits
 from flexcal.model.names import GEOMETRY, STATION, unit_of
 from flexcal.model.placement import found_xyz
 from flexcal.model.posterior import Posterior
 
+POINT_KNOWN = 0.002
+"""m, 1σ: a measured point that is known less well than this on the tool was not found at all."""
 POINT_STD = 0.010
 """m: how well a ruler has the place of a measured point, 1σ a coordinate."""
 _POSES = 60
@@ -88,6 +91,12 @@ def found_point(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) 
         moved = found_xyz(model, target) - nominal.points[target].xyz
         values |= {f"point.{target}.{axis}": float(v) for axis, v in zip("xyz", moved, strict=True)}
     return nominal.with_values(values)
+
+
+def point_uncertainty(model: RobotModel, target: str) -> float:
+    """1σ distance (m) to which the posterior of `model` has the place of a measured point in its frame."""
+    spread = posterior_spread(model, lambda changed: found_xyz(changed, target))
+    return float(np.linalg.norm(spread))
 
 
 def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[str]:

@@ -58,6 +58,7 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print what was found."""
+        from flexcal.calibration import POINT_KNOWN
         from flexcal.cli.considered_terms import considered_lines
         from flexcal.cli.tables import before_rows, dropped_table, error_table, weak_table
         from flexcal.workflow.calibration_remarks import hardly_fits
@@ -68,7 +69,8 @@ class Calibrate:
         console = Console(self.json)
         with console.progress() as progress:
             found = self._calibrated(self.terms, progress)
-            write = self.write_point and not hardly_fits(found.selected)
+            known = all(point["std_m"] <= POINT_KNOWN for point in found.found_points.values())
+            write = self.write_point and known and not hardly_fits(found.selected)
             if write:
                 told = point_lines(found.found_points)
                 found = self._with_points_written(found, progress)
@@ -97,8 +99,9 @@ class Calibrate:
             for line in told:
                 console.say(f"{line}: written to {self.robot}, and calibrated with that")
         else:
+            known = all(point["std_m"] <= POINT_KNOWN for point in document["points"].values())
             for line in point_lines(document["points"]):
-                console.say(f"{line}; --write-point writes it to {self.robot}")
+                console.say(f"{line}; --write-point writes it to {self.robot}" if known else line)
         console.say(found.trust.sentence)
         where = with_estimates(self.out)
         console.say(f"wrote {found.estimates}")
@@ -148,12 +151,24 @@ _FOUND_BESIDE = 5e-4
 """m: a point found nearer than this to where it was declared is not worth a word."""
 
 
+def unknown_place(name: str, std: float) -> str:
+    """A sentence on a measured point whose place on the tool the calibration did not find."""
+    return (
+        f"these poses do not tell where the point {name} is on the tool (± {std / MILLIMETRE:.2g} mm): they hardly turn it. "
+        "Only points at such orientations are calibrated; measure poses that turn the tool every way, and calibrate again"
+    )
+
+
 def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """A line for each point that was found elsewhere than it was declared; `points` as in the document."""
+    from flexcal.calibration import POINT_KNOWN
+
     lines = []
     for name, point in points.items():
         off = math.dist(point["found_xyz_m"], point["declared_xyz_m"])
-        if off > _FOUND_BESIDE:
+        if point["std_m"] > POINT_KNOWN:
+            lines.append(unknown_place(name, point["std_m"]))
+        elif off > _FOUND_BESIDE:
             found, declared = (
                 ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")
             )

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 
 from tyro.conf import Positional, arg
 
+from flexcal.cli.calibrate import unknown_place
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import Estimates, Json, MaybeText, Numbers, Robot, require_robot
@@ -89,6 +90,8 @@ class Compensate:
                 f"{len(document['from_other_postures'])} of them were found from another posture only, where the arm may stand in another "
                 "configuration: from_other_postures in --json"
             )
+        for name, std in document["points_not_found_m"].items():
+            console.say(unknown_place(name, std))
         for name, point in document["points"].items():
             console.say(f"the targets are of {_point_words(name, point)}")
         before = document["error_before_mm"]

@@ -18,6 +18,7 @@ from flexcal.calibration import (
     TermSelection,
     calibrate,
     compare_bearings,
+    point_uncertainty,
     probable_robot,
     require_points,
     robot_before,
@@ -98,7 +99,7 @@ class RobotCalibration:
 
     @cached_property
     def found_points(self) -> dict[str, dict[str, Any]]:
-        """The measured points: their frames, and where they are in it, m, as declared and as found."""
+        """The measured points: their frames, and where they are in it, m, as declared and as found, with the 1σ distance of the latter."""
         fit = self.selected
         targets = fit.poses.targets
         found = probable_robot(fit.model, targets)
@@ -107,6 +108,7 @@ class RobotCalibration:
                 "frame": fit.model.points[name].frame,
                 "declared_xyz_m": fit.model.points[name].xyz,
                 "found_xyz_m": found_xyz(found, name),
+                "std_m": point_uncertainty(found, name),
             }
             for name in targets
         }

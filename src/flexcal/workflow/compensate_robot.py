@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from flexcal.calibration import POINT_KNOWN, point_uncertainty
 from flexcal.compensation import Compensation, best_posture, compensate
 from flexcal.data import ToolTargets, read_targets, write_commands
 from flexcal.data.table import TableFile, open_table
@@ -62,9 +63,16 @@ class RobotCompensation:
                 "frame": self.model.points[name].frame,
                 "declared_xyz_m": self.model.points[name].xyz,
                 "found_xyz_m": found_xyz(self.model, name) if name in self.measured else None,
+                "std_m": point_uncertainty(self.model, name) if name in self.measured else None,
             }
             for name in named
         }
+
+    @property
+    def lost_points(self) -> dict[str, float]:
+        """1σ (m) of the measured points whose place on the tool the calibration did not find."""
+        every = {name: point_uncertainty(self.model, name) for name in self.measured}
+        return {name: std for name, std in every.items() if std > POINT_KNOWN}
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
@@ -74,6 +82,7 @@ class RobotCompensation:
         return {
             "targets": len(self.targets),
             "points": self.points,
+            "points_not_found_m": self.lost_points,
             "compensated": int(found.sum()),
             "ambiguous": int((found & ~result.unambiguous).sum()),
             "error_before_mm": {
