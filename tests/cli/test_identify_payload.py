@@ -55,7 +55,7 @@ def test_it_comes_with_the_robot_from_then_on(arm: Path, run: Run) -> None:
     assert document["parameters"]["payload.Iyy"] == {
         "estimate": 0.0, "std": None, "low": None, "high": None, "truth": None, "identifiable": False,
     }  # fmt: skip
-    assert any("do not tell payload.com_y" in remark for remark in document["remarks"])
+    assert any("do not determine payload.com_y" in remark for remark in document["remarks"])
     model = RobotModel.from_yaml(robot)
     held = model.payload
     assert held is not None and held.frame == "lower" and held.mass == mass["estimate"]
@@ -76,7 +76,7 @@ def test_the_printed_line_says_the_same(arm: Path, run: Run) -> None:
     robot = arm / "robot.yaml"
     out = arm / "out"
     outcome = run("identify", "payload", robot, arm / "loaded.csv", "--free", arm / "free.csv", "--out", out)
-    line = next(text for text in outcome.out.splitlines() if "the same as a line" in text)
+    line = next(text for text in outcome.out.splitlines() if "as a line of robot.yaml" in text)
     declare(arm, line.partition(": ")[2] + "\n")
     held = RobotModel.from_yaml(robot).payload
     stored = json.loads((out / "results.json").read_text())["parameters"]
@@ -126,7 +126,7 @@ def still(table: pl.DataFrame) -> pl.DataFrame:
 @pytest.mark.parametrize(
     ("options", "change", "message"),
     [
-        ([], None, "has no block 'dynamics', so the payload cannot be told from the robot; run 'flexcal identify"),
+        ([], None, "has no block 'dynamics', so the payload cannot be separated from the robot's own inertia; run 'flexcal identify"),
         (["--free", "loaded.csv"], None, "loaded.csv is given twice"),
         (["--free", "free.csv", "--frame", "hand"], None, "moves a frame 'hand'; name one of shoulder, upper"),
         (["--free", "free.csv", "--frame", "base"], None, "moves a frame 'base'; name one of"),

@@ -159,7 +159,7 @@ def saturated(log: pl.DataFrame) -> pl.DataFrame:
 
 
 BAD = {
-    "other sign": (scaled(-1.0), ["the fit misses", "signs, units and gear ratios"]),
+    "other sign": (scaled(-1.0), ["relative torque error of the fit", "signs, units and gear ratios"]),
     "no torque": (scaled(0.0), [LOG, "joint_1 is the same throughout"]),
     "one torque missing": (lambda f: f.drop("tau2"), ["'tau2' is missing"]),
     "saturated": (saturated, [LOG, "joint_2", "stays at its extreme"]),

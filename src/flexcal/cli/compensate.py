@@ -23,7 +23,7 @@ def _point_words(name: str, point: Mapping[str, Any]) -> str:
     if point["found_xyz_m"] is None:
         what = f"the frame {name}" if name == point["frame"] else f"the point '{name}' in {point['frame']}"
         return (
-            f"{what}, which was not measured: what the measured points do not tell of it "
+            f"{what}, which was not measured: what the measured points do not determine of it "
             "(how the flange is turned, where it is along and about the last axis) stays nominal"
         )
     found, declared = (point[key] for key in ("found_xyz_m", "declared_xyz_m"))

@@ -18,8 +18,8 @@ from flexcal.cli.options import Json, MaybePath, Robot, require_robot
 class IdentifyInertials:
     """Fit masses, centres of mass, rotor inertias and friction to the recordings of 'design trajectory', with CAD as the prior.
 
-    Writes estimates.yaml beside robot.yaml, for 'identify stiffness' and 'calibrate' to start from. What the torques do not tell stays as
-    uncertain as the `prior:` of robot.yaml says; springs and geometry are taken to be as uncertain as before they are identified.
+    Writes estimates.yaml beside robot.yaml, for 'identify stiffness' and 'calibrate' to start from. What the torques do not determine
+    stays as uncertain as the `prior:` of robot.yaml says; springs and geometry are taken to be as uncertain as before they are identified.
     """
 
     robot: Robot

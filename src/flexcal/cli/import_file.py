@@ -120,7 +120,7 @@ class Import:
         fit = found.misfit
         if fit is None or fit.doubtful:
             raise InputError(
-                f"{self.file}: these points do not tell where the reflector is on the tool; leave --write-point out."
+                f"{self.file}: these points do not determine the place of the reflector on the tool; leave --write-point out."
             )
         write_point_place(self.robot, fit.point, fit.moved)
         console.say(f"wrote the xyz of {fit.point} to {self.robot}")

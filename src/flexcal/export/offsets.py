@@ -94,7 +94,7 @@ def render_offsets(
             "Joint offsets: with the joints at q, the nominal robot at q + offset is nearest to the real one. "
             "Least squares over random poses; no other geometry is changed.",
             *frames,
-            "determined: no for an offset that the measured points do not tell, which is left at zero.",
+            "determined: no for an offset that the measured points do not determine, which is left at zero.",
             "std: what the uncertainty of the calibrated parameters leaves. motor_deg: at the motor, by drives: ratio of robot.yaml.",
         ),
         remarks=tuple(remarks),

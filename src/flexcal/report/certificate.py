@@ -14,6 +14,7 @@ from flexcal.atomic import write_text
 from flexcal.report.notation import NOTHING, document_millimetres, significant
 from flexcal.report.palette import LIGHT
 from flexcal.report.render import templates
+from flexcal.report.trust import verdict_answer
 from flexcal.units import MILLIMETRE
 
 _WIDTH, _ROW = 640.0, 34.0
@@ -47,6 +48,7 @@ def certificate_html(study: CertificateStudy) -> str:
             parts=limiting_parts(results),
             conditions=_conditions(results),
             judgement=_judgement(results),
+            trust=verdict_answer(results["verdict"]),
             strip=error_strip(study.before, study.after),
             colours=LIGHT,
             style=style,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -84,6 +85,12 @@ class Trust:
             f"{tally(self.checks)}; each is explained below.",
             self.status,
         )
+
+
+def verdict_answer(verdict: Mapping[str, Any]) -> str:
+    """Yes, no, or neither in words, from the block `verdict` of results.json."""
+    answers = {True: "Yes", False: "No", None: "Cannot be judged, or only with reservations"}
+    return answers[verdict["trusted"]]
 
 
 def _phrase(check: Check) -> str:

@@ -81,7 +81,8 @@ def identify_robot_inertials(
     error = trajectory_error(nominal.with_estimate(estimate), plan, recordings)
     if error > _SENSELESS:
         raise InputError(
-            f"{folder}: the fit misses {100 * error:.0f} % of the torques, so they are not those of this robot's joints in N m; check "
+            f"{folder}: the relative torque error of the fit is {100 * error:.0f} %, so the torques are not those of this robot's joints "
+            f"in N m; check "
             "signs, units and gear ratios under `signals:`."
         )
     origin = provenance([robot, nominal.urdf, folder / PLAN, *files], {})

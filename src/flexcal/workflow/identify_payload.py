@@ -149,7 +149,8 @@ def identify_robot_payload(
     blocks = read_estimates(source, without="payload") if source.exists() else {}
     if "dynamics" not in blocks and not free:
         raise InputError(
-            f"{source} has no block 'dynamics', so the payload cannot be told from the robot; run 'flexcal identify dynamics {robot} "
+            f"{source} has no block 'dynamics', so the payload cannot be separated from the robot's own inertia; run 'flexcal identify "
+            f"dynamics {robot} "
             "LOGS…' on recordings without payload first, or give such recordings with --free."
         )
     _require_news(every, blocks)
@@ -177,7 +178,8 @@ def identify_robot_payload(
         progress("payload", 1.0)
     if fit.error > _SENSELESS:
         raise InputError(
-            f"{every[0]}: the fit misses {100 * fit.error:.0f} % of the torques, so they are not those of this robot in N m; check "
+            f"{every[0]}: the relative torque error of the fit is {100 * fit.error:.0f} %, so the torques are not those of this robot in "
+            f"N m; check "
             "robot.yaml, and signs, units and gear ratios under `signals:`."
         )
     origin = provenance(

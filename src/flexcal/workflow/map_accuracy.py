@@ -73,7 +73,8 @@ class RobotMap:
         remarks = []
         if self.scale is None:
             remarks.append(
-                "nothing was verified, so this is what the calibration claims of itself; give --verification with poses that it never saw"
+                "nothing was verified, so the map rests on the covariance of the calibration alone; give --verification with poses "
+                "outside the fit"
             )
         elif not self.scale.noise_known:
             remarks.append(

@@ -20,16 +20,17 @@ def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block
     hidden = [name for name, seen in zip(found.parameters.names, found.identifiable, strict=True) if not seen]
     if hidden:
         held = "as robot.yaml declares them" if declared.payload is not None else "at zero"
-        yield f"these recordings do not tell {', '.join(hidden)}, which stay {held}"
+        yield f"these recordings do not determine {', '.join(hidden)}, which stay {held}"
     if fit.rise > BODILESS:
         yield (
-            f"no body has what these torques ask for: the nearest one raises the sum of squares by {fit.rise:.3g}; check the drive "
+            f"the payload is not physically consistent: the nearest consistent one raises the sum of squares by {fit.rise:.3g}; check "
+            f"the drive "
             "gains, that the robot's own dynamics are of this robot, and the frame"
         )
     if fit.error > UNLIKE * fit.own_error:
         yield (
-            f"the robot's own dynamics do not fit these recordings: {100 * fit.error:.2g} % of the torques are missed, where another robot "
-            f"of these links would miss {100 * fit.own_error:.2g} %; identify them again, or give --free recordings"
+            f"the robot's own dynamics do not fit these recordings: the relative torque error is {100 * fit.error:.2g} %, and "
+            f"{100 * fit.own_error:.2g} % with separate fits of every joint; identify them again, or give --free recordings"
         )
     low, high = _certain_mass(found)
     if declared.payload is not None and not low <= declared.payload.mass <= high:

@@ -81,7 +81,7 @@ class RobotVerification:
         if self.fitted:
             which = " and ".join(self.fitted)
             remarks.append(
-                f"the calibration was fitted to {which}, so this says little about other poses; verify on poses that it never saw"
+                f"the calibration was fitted to {which}, so this says little about other poses; verify on poses outside the fit"
             )
         return tuple(remarks)
 
