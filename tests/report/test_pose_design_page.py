@@ -7,6 +7,7 @@ import pytest
 
 from flexcal.design import joint_origins
 from flexcal.model import RobotModel, point_kinematics
+from flexcal.report.figures.arm_poses import links_at
 from flexcal.report.figures.joint_positions import joint_positions
 from flexcal.report.figures.plan_space import plan_space
 from flexcal.report.figures.pose_numbers import pose_numbers
@@ -57,7 +58,7 @@ def test_first_screen_and_figures(tx90l: RobotModel, rng: np.random.Generator) -
 def test_space_shows_the_targets_in_order_and_the_box(tx90l: RobotModel, rng: np.random.Generator) -> None:
     q = rng.uniform(-1, 1, (5, 6))
     box = np.array([[0.4, -0.3, 0.2], [0.9, 0.3, 0.8]])
-    figure = plan_space(joint_origins(tx90l, q), box, box, np.array([2.5, 0, 1]))
+    figure = plan_space(joint_origins(tx90l, q), links_at(tx90l, q[:1])[0], box, box, np.array([2.5, 0, 1]))
     traces = {trace.name: trace for trace in figure.data}
     target = traces["target"]
     there = point_kinematics(tx90l, q, jacobians=False).position

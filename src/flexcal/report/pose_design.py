@@ -11,6 +11,7 @@ import numpy as np
 
 from flexcal.design import joint_origins, station_position
 from flexcal.model import RobotModel
+from flexcal.report.figures.arm_poses import links_at
 from flexcal.report.figures.joint_positions import joint_positions
 from flexcal.report.figures.plan_space import plan_space
 from flexcal.report.figures.pose_numbers import pose_numbers
@@ -170,8 +171,15 @@ def _space(study: PoseStudy) -> Section:
     block = FigureBlock(
         "figure-space",
         "The poses in the robot's base frame",
-        plan_space(corners, study.working, study.box, station_position(study.model)),
-        "Skeletons of the arm; the blue line goes through the target's places in the order of the plan. Drag to turn.",
+        plan_space(
+            corners,
+            links_at(study.model, study.q[:1])[0],
+            study.working,
+            study.box,
+            station_position(study.model),
+        ),
+        "The links in the first pose, and the arm as lines in the others; the blue line goes through the target's places in the order of "
+        "the plan. Drag to rotate, Ctrl and the wheel to zoom.",
         f"The arm in {len(study.q)} poses, in three dimensions.",
     )
     return Section("space", "Where they are", "", (block,))

@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.design import TrajectoryDesign, joint_origins
 from flexcal.design.skeleton import link_frames
+from flexcal.report.figures.arm_poses import links_at
 from flexcal.report.figures.limit_shares import limit_shares
 from flexcal.report.figures.prior_gains import prior_gains
 from flexcal.report.figures.swept_paths import swept_paths
@@ -107,6 +108,8 @@ def _motions(design: TrajectoryDesign) -> Section:
     choice = (Selector("trajectory", "trajectory", tuple(labels)),) if len(plan) > 1 else ()
     shares = {label: design.shares(motion) for label, motion in zip(labels, motions, strict=True)}
     chains = {label: _corners(design, motion[0]) for label, motion in zip(labels, motions, strict=True)}
+    begins = np.array([motion[0][0] for motion in motions])
+    links = dict(zip(labels, links_at(design.model, begins), strict=True))
     return Section(
         "motions",
         "The motions",
@@ -115,9 +118,9 @@ def _motions(design: TrajectoryDesign) -> Section:
             FigureBlock(
                 "figure-paths",
                 "Path through space",
-                swept_paths(chains),
+                swept_paths(chains, links),
                 "Blue is the path of the target point, or of the last joint where robot.yaml declares no point; grey is the arm on its "
-                "way, black where a period begins.",
+                "way, and its links are drawn where a period begins.",
                 "Path of the end of the arm in three dimensions with the arm at some instants.",
                 choice,
             ),

@@ -148,6 +148,12 @@ def solid(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend
     )  # fmt: skip
 
 
+def links_at(model: RobotModel, q: np.ndarray) -> list[go.Mesh3d]:
+    """The links of a robot at joint positions `q` (P, n), one shaded trace a pose."""
+    surface = LinkSurface.of(model)
+    return [solid(vertices, surface.triangles, 1.0, legend=True) for vertices in surface.at(model, q)]
+
+
 def in_base(model: RobotModel, poses: PoseSet, vectors: np.ndarray) -> np.ndarray:
     """Vectors (N, 3) of the instrument's frame turned into the robot's base frame."""
     turned = np.empty_like(vectors)

@@ -15,12 +15,18 @@ _EDGES = np.array(
 
 
 def plan_space(
-    corners: np.ndarray, working: np.ndarray | None, box: np.ndarray | None, station: np.ndarray | None
+    corners: np.ndarray,
+    links: go.Mesh3d,
+    working: np.ndarray | None,
+    box: np.ndarray | None,
+    station: np.ndarray | None,
 ) -> go.Figure:
-    """Skeletons `corners` (N, K, 3), the target's way, `working` points (W, 3), their `box` (2, 3), the instrument (3,); all in m."""
+    """Skeletons `corners` (N, K, 3), the `links` in one pose, the target's path, `working` points (W, 3), their `box` (2, 3), the
+    instrument (3,); all in m."""
     figure = canvas(620)
     tips = corners[:, -1]
-    figure.add_trace(polyline(corners, "the arm", NOMINAL, 2.5, opacity=0.45))
+    figure.add_trace(links)
+    figure.add_trace(polyline(corners, "arm at other poses", NOMINAL, 2.5, opacity=0.45))
     figure.add_trace(polyline(tips[None], "order", ELASTIC, 3.0, opacity=0.6))
     labels = [f"pose {k}" for k in range(1, len(tips) + 1)]
     figure.add_trace(_points(tips, "target", ELASTIC, 4, labels))

@@ -9,17 +9,15 @@ import plotly.graph_objects as go
 
 from flexcal.design import joint_origins
 from flexcal.model import RobotModel
-from flexcal.report.figures.arm_poses import solid, space_axes
+from flexcal.report.figures.arm_poses import links_at, space_axes
 from flexcal.report.figures.canvas import canvas, single
-from flexcal.report.link_surface import LinkSurface
 from flexcal.report.palette import ELASTIC
 
 
 def planned_arm(model: RobotModel, q: np.ndarray) -> go.Figure:
     """The links in the first pose, and lines from the base through every joint to the measured point at each of `q` (P, n) rad."""
     figure, arms = canvas(520), joint_origins(model, q)
-    surface = LinkSurface.of(model)
-    figure.add_trace(solid(surface.at(model, q[:1])[0], surface.triangles, 1.0, legend=True))
+    figure.add_trace(links_at(model, q[:1])[0])
     for number, corners in enumerate(arms, start=1):
         figure.add_trace(
             go.Scatter3d(

@@ -9,13 +9,14 @@ import plotly.graph_objects as go
 
 from flexcal.report.figures.arm_poses import space_axes
 from flexcal.report.figures.canvas import canvas, single
-from flexcal.report.palette import ELASTIC, INK, NOMINAL
+from flexcal.report.palette import ELASTIC, NOMINAL
 
 _ARMS = 6
 
 
-def swept_paths(chains: Mapping[str, np.ndarray]) -> go.Figure:
-    """Of each motion the path of the arm's last corner, from corners (N, corners, 3), m, one motion shown at a time.
+def swept_paths(chains: Mapping[str, np.ndarray], links: Mapping[str, go.Mesh3d]) -> go.Figure:
+    """Of each motion the path of the arm's last corner, from corners (N, corners, 3), m, and the `links` at its beginning, one motion
+    shown at a time.
 
     Traces carry `meta = {"trajectory": label}`, by which the page chooses.
     """
@@ -25,10 +26,9 @@ def swept_paths(chains: Mapping[str, np.ndarray]) -> go.Figure:
         path = np.concatenate([corners[:, -1], corners[:1, -1]])
         arms = corners[:: max(1, len(corners) // _ARMS)]
         parted = np.concatenate([arms, np.full((len(arms), 1, 3), np.nan)], axis=1).reshape(-1, 3)
-        first = corners[0]
+        figure.add_trace(links[label].update(meta=shown["meta"], visible=shown["visible"]))
         for points, name, colour, width in (
-            (parted, "the arm on its way", NOMINAL, 3.0),
-            (first, "at the beginning", INK, 8.0),
+            (parted, "the arm on its path", NOMINAL, 3.0),
             (path, "path of the point", ELASTIC, 4.0),
         ):
             x, y, z = (single(points[:, axis]) for axis in range(3))
