@@ -68,7 +68,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     for _ in range(_STEPS):
         at = predict(found, poses, elastic=False, jacobians=True)
         columns = at.jacobian(names).reshape(-1, len(names)) * scale
-        left, sizes, right = np.linalg.svd(columns, full_matrices=True)
+        left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
         rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
         missing = left[:, :rank].T @ (wanted - at.position).ravel()
         step = scale * (right[:rank].T @ (missing / sizes[:rank]))
