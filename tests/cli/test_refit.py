@@ -146,3 +146,10 @@ def test_an_uncalibrated_point_is_never_silent(run, tmp_path: Path, arm: Strange
     ) or document["verdict"]["trusted"] is False
     found = run("verify", robot, file, "--refit", "point", "--json").document
     assert found["uncalibrated_points"] == [] and found["verification"]["measured"]["mean_mm"] < 0.1
+    lines = (tmp_path / "p.csv").read_text().splitlines()
+    (tmp_path / "n.csv").write_text(
+        "\n".join([lines[0] + ",target", *(line + ",nose" for line in lines[1:])]) + "\n"
+    )
+    assert run("calibrate", robot, tmp_path / "n.csv").status == 0
+    mapped = run("map", robot, "--count", "50", "--out", tmp_path / "map.html")
+    assert mapped.status == 0 and "no calibration pose measured smr" in mapped.out

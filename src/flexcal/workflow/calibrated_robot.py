@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -44,6 +44,17 @@ class CalibratedRobot:
     def found(self) -> RobotModel:
         """`nominal` with the measured points where the calibration found them on the tool."""
         return found_point(self.nominal, self.probable, self.measured)
+
+
+def unmeasured_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:
+    """A sentence on those of the `targets` that no calibration pose measured; none where there are none."""
+    named = [name for name in targets if name not in calibrated.measured]
+    if not named:
+        return ()
+    return (
+        f"no calibration pose measured {' and '.join(named)}: where it is on the tool is as declared, and an error of that is not in the "
+        "predicted uncertainty",
+    )
 
 
 def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tuple[str, ...]:

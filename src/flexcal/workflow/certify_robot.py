@@ -36,7 +36,7 @@ from flexcal.report.certificate import CertificateStudy, write_certificate
 from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot
+from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, unmeasured_remark
 from flexcal.workflow.verify_robot import fitted_files, verification_poses
 
 _FAR = 0.25
@@ -111,7 +111,7 @@ class RobotCertificate:
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = []
+        remarks = list(unmeasured_remark(self.robot, self.after.poses.targets))
         if self.uncompared:
             remarks.append(
                 f"targets that were measured only before or only after are not compared: {self.uncompared}"

@@ -33,7 +33,12 @@ from flexcal.report.accuracy_map import MapStudy, write_map_page
 from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
+from flexcal.workflow.calibrated_robot import (
+    CalibratedRobot,
+    calibrated_robot,
+    found_station,
+    unmeasured_remark,
+)
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.pose_choice import box_corners, working_file, working_volume
 from flexcal.workflow.refit_remarks import proposed_refit, refit_remarks
@@ -50,9 +55,9 @@ _SOURCE_POSES = 200
 class RobotMap:
     """The map as it is to be believed, its worst rows, where its errors come from, and what verification poses say.
 
-    `scale` is what they say of the map, `before` of the uncalibrated robot. `box` (2, 3) m, None for given poses or anywhere; `sources`
-    over all poses, `worst_sources` at each of the `worst` rows. `provenance` has all files with their hashes, `command` the command line,
-    where there was one.
+    `scale` is what they say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that the
+    calibration did not measure. `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the
+    `worst` rows. `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     reach: Propagation
@@ -63,6 +68,7 @@ class RobotMap:
     worst_sources: dict[str, np.ndarray]
     scale: ErrorScale | None
     before: ErrorsBefore | None
+    unmeasured: tuple[str, ...]
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
@@ -70,7 +76,7 @@ class RobotMap:
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = []
+        remarks = list(self.unmeasured)
         if self.scale is None:
             remarks.append(
                 "nothing was verified, so the map rests on the covariance of the calibration alone; give --verification with poses "
@@ -175,7 +181,10 @@ def map_accuracy(
         tuple(calibrated.blocks),
     )
     sources = error_sources(reach, q[worst])
-    result = RobotMap(reach, found, box, worst, shares, sources, scale, before, fitted, origin, command)
+    unmeasured = unmeasured_remark(calibrated, [reach.target])
+    result = RobotMap(
+        reach, found, box, worst, shares, sources, scale, before, unmeasured, fitted, origin, command
+    )
     page = MapStudy(model, found, box, result.document(), scale, study)
     if out != page_beside(out):
         _write_table(out, found)
