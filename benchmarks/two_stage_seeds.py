@@ -26,7 +26,7 @@ from flexcal.elasticity.experiment_effect import ExperimentEffect
 from flexcal.elasticity.model_error import ModelError
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.model import RobotModel
-from flexcal.model.names import unit_of
+from flexcal.model.names import spring_names, unit_of
 from flexcal.workflow.designed_frequency import PlanName, response_sensors
 from flexcal.workflow.two_stage import run_two_stage
 from flexcal.workflow.two_stage_run import TwoStageRun
@@ -75,7 +75,7 @@ def _springs(run: TwoStageRun) -> dict[str, dict[str, Any]]:
     """Relative error, and error over standard deviation in the logarithm, of every spring parameter."""
     estimate, truth = run.stiffness.estimate, run.truth
     found, bounds = {}, cramer_rao(run)
-    for name in run.stiffness.springs:
+    for name in spring_names(run.nominal):
         k = estimate.parameters.index(name)
         error = float(np.log(estimate.values[name] / truth[name]))
         found[name] = {

@@ -12,11 +12,12 @@ from flexcal.elasticity.fit import FINE, ResponseData, ResponseFit, final_fit, f
 from flexcal.elasticity.held_joints import HeldJoints
 from flexcal.elasticity.misfit import misfit_of_fit, misfit_std
 from flexcal.elasticity.model_error import Tolerances
+from flexcal.elasticity.naming import held_inertia_name
 from flexcal.elasticity.parameters import check_responses
 from flexcal.elasticity.profile import profile_stretch
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
-from flexcal.estimation import Estimate, solve
+from flexcal.estimation import Estimate, Parameters, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -115,29 +116,49 @@ def _with_held_joints(
     progress: Progress,
 ) -> tuple[RobotModel, ResponseFit | None]:
     """The robot with springs at those of the `held` joints for which the data ask, and its fit; the same robot and None for none."""
-
     values: dict[str, float] = {}
     while held.springs:
         wider = with_drive_springs(model, held.springs)
-        parameters, prior = data.parameters(wider)
+        parameters = data.parameters(wider)[0]
         if values:
             x = parameters.coordinates({name: values[name] for name in parameters.names})
+            fit = fit_responses(wider, data, x)
         else:
-            x = search.find(
-                wider,
-                data.responses,
-                parameters,
-                prior,
-                rng,
-                lambda _, share: progress("fitting", 0.3 + 0.3 * share),
-            )
-        fit = fit_responses(wider, data, x)
+            fit = _searched_fit(wider, data, search, rng, progress)
         needless = held.needless(wider, data, fit)
         if needless is None:
             return wider, fit
         held = held.only([i for i in held.springs if i != needless])
         values = fit.estimate.values
     return model, None
+
+
+def _searched_fit(
+    model: RobotModel, data: ResponseData, search: Search, rng: np.random.Generator, progress: Progress
+) -> ResponseFit:
+    """The fit of a robot with braked elastic joints: with rotors that stand still at the start and, where that leaves a misfit, with rotors
+    that move with the arm because position loops hold them; the better of both."""
+    parameters, prior = data.parameters(model)
+    rotors = {held_inertia_name(e.name): float(model.rotor_inertia[e.index]) for e in model.elastic}
+    moving = Parameters(
+        replace(item, value=rotors[item.name], prior_mean=item.value) if item.name in rotors else item
+        for item in parameters
+    )
+    fits: list[ResponseFit] = []
+    for start in (parameters, moving):
+        first = 0.3 + 0.2 * len(fits)
+        x = search.find(
+            model,
+            data.responses,
+            start,
+            prior,
+            rng,
+            lambda _, share, first=first: progress("fitting", first + 0.2 * share),
+        )
+        fits.append(fit_responses(model, data, x))
+        if misfit_of_fit(fits[-1], data.responses) is None:
+            break
+    return min(fits, key=lambda fit: fit.estimate.reduced_chi2)
 
 
 def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:

@@ -58,7 +58,11 @@ def spring_intervals(
                         x=[0],
                         y=[spring_label(name)],
                         mode="text",
-                        text=["not determined by these data"],
+                        text=[
+                            "not determined by these data"
+                            if estimate.interval(name) is None
+                            else f"no {word.removeprefix('the ')} to compare"
+                        ],
                         textfont={"color": QUIET, "size": 12},
                         hoverinfo="skip",
                     ),

@@ -42,12 +42,15 @@ def _gain_table(study: TwoStageStudy) -> Table:
     """Both stages from the same data, with the inertials of CAD and with those of stage 0."""
     both = (study.results["cad_alone"], study.results)
     springs = [_stiffnesses(results) for results in both]
-    errors = [np.array([abs(q["estimate"] / q["truth"] - 1) for q in found.values()]) for found in springs]
+    errors = [
+        np.array([abs(q["estimate"] / q["truth"] - 1) for q in found.values() if q["truth"] is not None])
+        for found in springs
+    ]
     rows: list[tuple[str, ...]] = [
         ("stage 1: largest stiffness error", *(_percent(float(e.max())) for e in errors)),
         ("stage 1: median stiffness error", *(_percent(float(np.median(e))) for e in errors)),
     ]
-    for name in study.springs("stiffness"):
+    for name in (name for name in study.springs("stiffness") if all(name in found for found in springs)):
         stds = (_relative_std(found[name]) for found in springs)
         rows.append((f"stage 1: std of {spring_label(name)}", *(_percent(std) for std in stds)))
     fresh = [results["verification"] for results in both]
