@@ -62,7 +62,7 @@ def test_declared_wrongly_it_is_said_and_not_trusted(run, tmp_path: Path, sigma:
     assert "the points fit bearing axes fixed to the parent link better (mean error 0.03" in said
     assert "write `bearings: before` in robot.yaml and calibrate again" in said
     assert "next: write `bearings: before`" in said
-    assert "Trusted: no" in said and "the points fit other bearing axes than the declared ones" in said
+    assert "Trusted: no" in said and "the data fit other bearing axes than the declared ones" in said
     assert "No: with bearing axes fixed to the parent link" in (tmp_path / "out" / "report.html").read_text()
     fresh = run("verify", robot, tmp_path / "fresh.csv", "--estimates", tmp_path / "out", "--json").document
     assert fresh["verification"]["measured"]["mean_mm"] > 0.2

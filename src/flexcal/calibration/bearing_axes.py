@@ -11,6 +11,7 @@ import numpy as np
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.geometric_calibration import Calibration
 from flexcal.errors import FlexcalError
+from flexcal.estimation.vuong import vuong_statistic
 from flexcal.model import RobotModel
 from flexcal.model.config import Bearings
 
@@ -41,14 +42,10 @@ class BearingAxes:
         """Two fits to the same poses; points that either takes for outliers do not count."""
         outliers = {*before.estimate.outliers, *after.estimate.outliers}
         inside = np.setdiff1d(np.arange(len(before.poses)), list(outliers))
-        squares = np.array([np.sum(f.residuals[inside] ** 2, axis=1) for f in (before, after)])
-        variance = np.maximum(squares.mean(axis=1, keepdims=True) / 3, np.finfo(float).tiny)
-        likelihood = -1.5 * np.log(variance) - squares / (2 * variance)
+        first, second = (f.residuals[inside].ravel() for f in (before, after))
         places = np.unique(before.poses.q[inside].round(6), axis=0, return_inverse=True)[1].ravel()
-        gain = np.bincount(places, likelihood[0] - likelihood[1])
-        spread = np.sqrt(len(gain)) * gain.std()
-        statistic = float(gain.sum() / spread) if spread > 0 else 0.0
-        better, worse = np.sqrt(np.sort(variance.ravel()))
+        statistic = vuong_statistic(first, second, np.repeat(places, 3))
+        better, worse = sorted(np.linalg.norm(rows) for rows in (first, second))
         clear = abs(statistic) > _CERTAIN and better < _RELEVANT * worse
         preferred: Bearings = "before" if statistic > 0 else "after"
         errors: dict[Bearings, ErrorStatistics] = {"before": before.errors, "after": after.errors}

@@ -4,6 +4,7 @@ from .parameters import stage_one_parameters
 from .periodic_response import reference_shift
 from .prediction import ResponseModel
 from .reference_motion import ReferenceMotion
+from .response_bearings import ResponseBearings
 from .search import MultiStart, PopulationSearch, Search
 from .weighting import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
 
@@ -13,6 +14,7 @@ __all__ = [
     "PaperWeighting",
     "PopulationSearch",
     "ReferenceMotion",
+    "ResponseBearings",
     "ResponseModel",
     "Search",
     "StiffnessResult",

@@ -15,6 +15,7 @@ from flexcal.elasticity.model_error import Tolerances
 from flexcal.elasticity.naming import held_inertia_name
 from flexcal.elasticity.parameters import check_responses
 from flexcal.elasticity.profile import profile_stretch
+from flexcal.elasticity.response_bearings import ResponseBearings, with_fitting_bearings
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
 from flexcal.estimation import Estimate, Parameters, solve
@@ -33,6 +34,7 @@ class StiffnessResult:
     `estimate` holds springs and nuisances; `springs` their names in the order of the paper's Table 1, stiffness first. Per pose:
     `predicted` (L, n, n) of the fitted model, the reference motion included; `errors` (L, n, n), the complex errors Δ of Eq. (27);
     `misfit` (poses, n, n), mean |error|² over the measured variance: above 1 where the model does not explain an element.
+    `bearings` says with which bearing axes the robot was fitted, and why; None for one without bearings.
     """
 
     estimate: Estimate
@@ -41,6 +43,13 @@ class StiffnessResult:
     errors: tuple[np.ndarray, ...]
     misfit: np.ndarray
     springs: tuple[str, ...]
+    bearings: ResponseBearings | None = None
+
+    def robot(self, model: RobotModel) -> RobotModel:
+        """`model` with what was found: its springs, and the bearing axes that they belong to."""
+        if self.bearings is not None:
+            model = model.with_bearings(self.bearings.taken)
+        return model.with_estimate(self.estimate)
 
     def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
         """One estimated quantity as every results file has it."""
@@ -69,7 +78,8 @@ def identify_stiffness(
 
     The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
     neighbouring lines, the first inflated by the reduced χ² where it exceeds 1; a badly known stiffness has the width of its profile
-    likelihood. The damping of a spring whose stiffness is not identifiable is not either. Raises `FlexcalError` where responses do
+    likelihood. The damping of a spring whose stiffness is not identifiable is not either. Bearing axes that robot.yaml does not declare
+    are those that the responses prefer. Raises `FlexcalError` where responses do
     not fit the robot.
     """
     data = ResponseData(
@@ -86,12 +96,15 @@ def identify_stiffness(
     progress("fitting", 0.0)
     first = first_fit(model, data, x)
     progress("fitting", 0.3)
-    held = HeldJoints.of(model, responses)
-    fit = None
-    if held.asked_for(model, data, first):
-        model, fit = _with_held_joints(model, held, data, search, rng, progress)
-    if fit is None:
-        fit = final_fit(model, data, first)
+
+    def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
+        held = HeldJoints.of(robot, responses)
+        fit = None
+        if held.asked_for(robot, data, begun):
+            robot, fit = _with_held_joints(robot, held, data, search, rng, progress)
+        return robot, final_fit(robot, data, begun) if fit is None else fit
+
+    model, fit, bearings = with_fitting_bearings(model, data, first, completed)
     progress("fitting", 0.8)
     estimate = _widened(fit, data)
     progress("fitting", 1.0)
@@ -104,7 +117,9 @@ def identify_stiffness(
             for r, g in zip(responses, predicted, strict=True)
         ]
     )
-    return StiffnessResult(estimate, tuple(responses), predicted, errors, misfit, spring_names(model))
+    return StiffnessResult(
+        estimate, tuple(responses), predicted, errors, misfit, spring_names(model), bearings
+    )
 
 
 def _with_held_joints(

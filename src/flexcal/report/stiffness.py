@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.estimation import Estimate
+from flexcal.report.bearings_check import check_response_bearings
 from flexcal.report.checks import check_springs
 from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.notation import sentences
@@ -62,18 +63,19 @@ def stiffness_page(study: StiffnessStudy) -> Page:
     )
 
 
-def stiffness_checks(estimate: Estimate) -> tuple[Check, ...]:
+def stiffness_checks(estimate: Estimate, bearings: Mapping[str, Any] | None = None) -> tuple[Check, ...]:
     """The checks behind the verdict."""
     return (
         check_responses(estimate),
         check_springs(estimate, springs_of(estimate, "stiffness"), springs_of(estimate, "damping")).named(
             "springs"
         ),
+        *check_response_bearings(bearings),
     )
 
 
 def _verdict(study: StiffnessStudy) -> Verdict:
-    checks = stiffness_checks(study.estimate)
+    checks = stiffness_checks(study.estimate, study.results.get("bearings"))
     trust = Trust(checks)
     facts = (trust.fact(),)
     sentence = "Stiffness and damping were identified from frequency responses; measured positions verify the accuracy of the tool."

@@ -143,7 +143,7 @@ PHRASES: dict[str, dict[str, str]] = {
     "drift": {"good": "no drift was detected", "else": "residuals drift with time"},
     "bearings": {
         "good": "the bearings tilt about the right axes",
-        "else": "the points fit other bearing axes than the declared ones",
+        "else": "the data fit other bearing axes than the declared ones",
     },
     "outliers": {"good": "there are no outliers", "else": "there are outliers"},
     "springs": {

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration import BearingAxes, Calibration
+from flexcal.elasticity import ResponseBearings
 from flexcal.units import MILLIMETRE
 
 _AXES = {"before": "fixed to the parent link", "after": "that turn with the child link"}
@@ -37,3 +38,27 @@ def bearings_block(axes: BearingAxes | None) -> dict[str, Any] | None:
         "statistic": axes.statistic,
         "errors": {bearings: errors.in_millimetres() for bearings, errors in axes.errors.items()},
     }
+
+
+def response_bearings_block(bearings: ResponseBearings | None) -> dict[str, Any] | None:
+    """As results.json of stage 1 has it."""
+    if bearings is None:
+        return None
+    return {
+        "declared": bearings.declared,
+        "preferred": bearings.preferred,
+        "statistic": bearings.statistic,
+        "reduced_chi2": dict(bearings.reduced_chi2),
+    }
+
+
+def response_bearings_remarks(bearings: ResponseBearings | None) -> tuple[str, ...]:
+    """A sentence where frequency responses decided on the bearing axes, or contradict the declared ones."""
+    if bearings is None or bearings.preferred is None or bearings.preferred == bearings.declared:
+        return ()
+    better, other = bearings.preferred, "after" if bearings.preferred == "before" else "before"
+    chi2 = bearings.reduced_chi2
+    found = f"the responses fit bearing axes {_AXES[better]} better (reduced chi-square {chi2[better]:.2f}, else {chi2[other]:.2f})"
+    if bearings.contradicted:
+        return (f"{found}: write `bearings: {better}` in robot.yaml and identify again",)
+    return (f"{found}: these were taken; `bearings: {better}` in robot.yaml declares them",)

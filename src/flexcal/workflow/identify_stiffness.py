@@ -28,6 +28,7 @@ from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.responses_check import misfit_document
 from flexcal.report.trust import Trust
+from flexcal.workflow.bearing_remarks import response_bearings_block
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, springs_block, write_results
 from flexcal.workflow.stiffness_remarks import further_joints, stiffness_remarks
@@ -68,7 +69,7 @@ class RobotStiffness:
         """The verdict, from the same checks as on the page."""
         from flexcal.report.stiffness import stiffness_checks
 
-        return Trust(stiffness_checks(self.estimate))
+        return Trust(stiffness_checks(self.estimate, response_bearings_block(self.result.bearings)))
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
@@ -85,6 +86,7 @@ class RobotStiffness:
                 "missing_poses": list(self.missing_poses),
                 "dropped": dropped_parameters(estimate.dropped),
             },
+            "bearings": response_bearings_block(self.result.bearings),
             "further_joints": list(self.further_joints),
             "remarks": list(self.remarks),
             "parameters": quantities(estimate),
@@ -135,7 +137,10 @@ def identify_robot_stiffness(
         search=_SEARCHES[search],
         progress=progress,
     )
+    if result.bearings is not None:
+        model = model.with_bearings(result.bearings.taken)
     options = {"inertias_known": inertias_known, "weighting": weighting, "search": search, "seed": seed}
+    options |= {"bearings": model.bearings} if model.has_bearings else {}
     origin = provenance(
         [robot, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
     )

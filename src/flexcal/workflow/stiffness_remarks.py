@@ -10,6 +10,7 @@ from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.report.responses_check import misfit_sentences
+from flexcal.workflow.bearing_remarks import response_bearings_remarks
 
 _ONE_SIDED = 1.645
 
@@ -46,7 +47,7 @@ def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, 
         )
     if estimate.misfit is not None:
         remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")
-    return tuple(remarks)
+    return (*remarks, *response_bearings_remarks(result.bearings))
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -123,7 +123,7 @@ def run_two_stage(
             )
 
         stiffness = stage_one(believed, "stage1")
-        elastic = believed.with_estimate(stiffness.estimate)
+        elastic = stiffness.robot(believed)
         progress("stage1", 1.0)
     with watch.stage("poses"):
         progress("poses", 0.0)
@@ -147,6 +147,7 @@ def run_two_stage(
         progress("stage2", 1.0)
     write_poses(out / "calibration_poses.csv", measured)
     options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
+    options |= {"bearings": elastic.bearings} if elastic.has_bearings else {}
     stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, calibration.estimate)
     calibration = replace(calibration, estimate=stored)
     exported = write_urdf(calibration.model, out / "calibrated.urdf")
@@ -188,7 +189,7 @@ def run_two_stage(
     if dynamics is not None:
         with watch.stage("cad_alone"):
             springs = stage_one(nominal, "cad_alone")
-            fitted = calibrate(nominal.with_estimate(springs.estimate), measured)
+            fitted = calibrate(springs.robot(nominal), measured)
             run = replace(run, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact)))
             progress("cad_alone", 1.0)
     run = replace(run, results=two_stage_document(run, exported))

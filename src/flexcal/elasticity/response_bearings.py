@@ -1,0 +1,92 @@
+"""Whether frequency responses prefer bearings fixed to the parent link, or bearings that turn with the child."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from flexcal.elasticity.fit import ResponseData, ResponseFit, first_fit
+from flexcal.errors import FlexcalError
+from flexcal.estimation.vuong import vuong_statistic
+from flexcal.model import RobotModel
+from flexcal.model.config import Bearings
+
+CERTAIN = 3.0
+"""Vuong's statistic from which a preference is no chance."""
+
+
+@dataclass(frozen=True)
+class ResponseBearings:
+    """What frequency responses say of bearings that tilt `before` and `after` the joint's rotation, from a fit with each.
+
+    `declared` are those of robot.yaml, None where it has none. `statistic` is Vuong's over clusters of neighbouring lines, positive where
+    `before` fits better; `preferred` the clearly better ones, None where both fit about as well.
+    """
+
+    declared: Bearings | None
+    reduced_chi2: Mapping[Bearings, float]
+    statistic: float
+
+    @classmethod
+    def compare(
+        cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, weighing: ResponseFit
+    ) -> ResponseBearings:
+        """Two fits to the same responses, both weighed as that of the third (one of the two)."""
+        first, second = (weighing.whiten(fit.residual.residual(fit.x)) for fit in (before, after))
+        groups = weighing.problem.groups
+        assert groups is not None
+        chi2: dict[Bearings, float] = {
+            "before": before.estimate.reduced_chi2,
+            "after": after.estimate.reduced_chi2,
+        }
+        return cls(declared, chi2, vuong_statistic(first, second, groups))
+
+    @property
+    def preferred(self) -> Bearings | None:
+        """The bearings that the responses clearly fit better."""
+        if abs(self.statistic) < CERTAIN:
+            return None
+        return "before" if self.statistic > 0 else "after"
+
+    @property
+    def taken(self) -> Bearings:
+        """The declared ones; without a declaration the preferred, or as Eq. (1) has them."""
+        return self.declared or self.preferred or "after"
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the responses clearly prefer other bearings than the declared ones."""
+        return self.preferred not in (None, self.taken)
+
+
+def with_fitting_bearings(
+    model: RobotModel,
+    data: ResponseData,
+    first: ResponseFit,
+    complete: Callable[[RobotModel, ResponseFit], tuple[RobotModel, ResponseFit]],
+) -> tuple[RobotModel, ResponseFit, ResponseBearings | None]:
+    """What `complete` makes of a robot's `first` fit, or of a first fit with the other bearings where these are taken; and why.
+
+    Where completing the better one adds springs, bearings were not all that was missing: both are then completed before they are
+    compared. The last is None for a robot without bearings, or where one with the others has no fit.
+    """
+    if not model.has_bearings:
+        return *complete(model, first), None
+    other = model.with_bearings("before" if model.bearings == "after" else "after")
+
+    def compared(own: ResponseFit, others: ResponseFit) -> ResponseBearings:
+        before, after = (own, others) if model.bearings == "before" else (others, own)
+        return ResponseBearings.compare(model.config.bearings, before, after, own)
+
+    try:
+        begun = {model.bearings: (model, first), other.bearings: (other, first_fit(other, data, first.x))}
+    except FlexcalError:
+        return *complete(model, first), None
+    found = compared(first, begun[other.bearings][1])
+    better = found.preferred or model.bearings
+    ended = {better: complete(*begun[better])}
+    if ended[better][0] is not begun[better][0]:
+        ended = {bearings: ended.get(bearings) or complete(*begun[bearings]) for bearings in begun}
+        found = compared(ended[model.bearings][1], ended[other.bearings][1])
+    robot, fit = ended.get(found.taken) or complete(*begun[found.taken])
+    return robot, fit, found

@@ -1,0 +1,51 @@
+"""Bearing axes from frequency responses alone: found where robot.yaml says nothing, contradicted where it is wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from flexcal.elasticity import Tolerances, identify_stiffness
+from flexcal.model import RobotModel
+from flexcal.model.config import Bearings
+from flexcal.model.names import spring_names
+
+
+@pytest.mark.parametrize("true", ["before", "after"])
+def test_undeclared_axes_are_those_of_the_robot(
+    stiff: RobotModel,
+    poses: dict[str, np.ndarray],
+    synthesise: Callable,
+    drawn: Callable,
+    rng: np.random.Generator,
+    true: Bearings,
+) -> None:
+    """And with them every stiffness is met."""
+    truth = drawn(stiff, rng, inertias=False).with_bearings(true)
+    responses = synthesise(truth, poses["default"][:4], noise=0.01, rng=rng, step=16)
+    found = identify_stiffness(stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none())
+    assert found.bearings is not None and found.bearings.taken == true
+    assert found.robot(stiff).bearings == true
+    names = [name for name in spring_names(stiff) if name.endswith("stiffness")]
+    errors = [abs(np.log(found.estimate.values[name] / truth.value(name))) for name in names]
+    assert max(errors) < 0.1
+
+
+@pytest.mark.slow
+def test_axes_declared_wrongly_are_contradicted(
+    stiff: RobotModel,
+    poses: dict[str, np.ndarray],
+    synthesise: Callable,
+    drawn: Callable,
+    rng: np.random.Generator,
+) -> None:
+    """A stiffness is then off by half and more."""
+    truth = drawn(stiff, rng, inertias=True).with_bearings("before")
+    responses = synthesise(truth, poses["default"], noise=0.05, rng=rng, step=8)
+    found = identify_stiffness(stiff.with_bearings("after"), responses, rng=rng)
+    assert found.bearings is not None and found.bearings.contradicted and found.bearings.taken == "after"
+    names = [name for name in spring_names(stiff) if name.endswith("stiffness")]
+    errors = [abs(np.log(found.estimate.values[name] / truth.value(name))) for name in names]
+    assert max(errors) > 0.4
