@@ -228,6 +228,7 @@ def test_ways_of_the_paper(run, recorded: Path, tmp_path: Path, monkeypatch: pyt
     options = {key: value for key, value in origin.items() if key.startswith("option.")}
     assert options == {
         "option.inertias_known": "False",
+        "option.bearings": "after",
         "option.weighting": "uniform",
         "option.search": "population",
         "option.seed": "0",
