@@ -78,6 +78,7 @@ class StoredBlock:
     dropped: tuple[StoredDropped, ...] = ()
     fit: StoredFit | None = None
     covariance_sha256: str | None = None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
     provenance: dict[str, str] = field(default_factory=dict)
 
 
@@ -262,6 +263,7 @@ def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.nd
         covariance_freedom=fit.covariance_freedom,
         misfit=fit.misfit,
         provenance=dict(block.provenance),
+        ranges=dict(block.ranges),
     )
 
 
@@ -295,6 +297,7 @@ def _stored(estimate: Estimate, covariance: np.ndarray) -> StoredBlock:
             misfit=estimate.misfit,
         ),
         covariance_sha256=_sha256(covariance),
+        ranges={str(key): (float(low), float(high)) for key, (low, high) in estimate.ranges.items()},
         provenance={str(key): str(value) for key, value in estimate.provenance.items()},
     )
 

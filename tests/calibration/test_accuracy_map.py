@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.calibration import (
+    ErrorCovariance,
     ErrorScale,
     Verification,
     accuracy_map,
@@ -166,8 +167,12 @@ def test_a_robot_of_which_nothing_was_estimated_has_no_map(tx90l: RobotModel) ->
 def scale(
     errors: np.ndarray, roots: np.ndarray, ambiguous: np.ndarray, noise: np.ndarray | None
 ) -> ErrorScale:
+    """Compare `errors` with roots and independent `noise` (N, 3), 1σ of a coordinate."""
     rms = np.sqrt((roots**2).sum(axis=(1, 2)))
-    return error_scale(Verification(np.zeros_like(errors), errors, rms, ambiguous), roots, noise)
+    none = np.zeros(len(errors))
+    independent = None if noise is None else noise[:, :, None] ** 2 * np.eye(3)
+    verification = Verification(np.zeros_like(errors), errors, rms, none, ambiguous)
+    return error_scale(verification, ErrorCovariance(roots, 0, independent))
 
 
 @pytest.mark.parametrize("factor", [0.4, 1.0, 2.5])
@@ -175,14 +180,18 @@ def test_the_interval_of_the_scale_covers_it(factor: float, rng: np.random.Gener
     """Errors that share few parameters, drawn with a known scale: counting poses as independent would cover far less."""
     mixing = rng.standard_normal((40, 3, 12)) * np.linspace(1.5, 0.5, 12)
     noise = np.full((40, 3), 0.8)
-    inside, verdicts, naive = 0, [], 0
+    inside, verdicts, naive, whole = 0, [], 0, 0
+    predicted = (mixing**2).sum() + (noise**2).sum()
+    ratio = np.sqrt((factor**2 * (mixing**2).sum() + (noise**2).sum()) / predicted)
     for _ in range(300):
         errors = factor * mixing @ rng.standard_normal(12) + noise * rng.standard_normal((40, 3))
         found = scale(errors, mixing, np.zeros(40, dtype=bool), noise)
         inside += found.low <= factor <= found.high
+        whole += found.ratio_low <= ratio <= found.ratio_high
         naive += abs(found.factor / factor - 1) < 1.96 / np.sqrt(2 * 120)
         verdicts.append(found.verdict)
     assert 0.92 * 300 <= inside <= 0.99 * 300
+    assert whole >= {0.4: 0.98, 1.0: 0.92, 2.5: 0.86}[factor] * 300
     assert naive < 0.7 * 300
     usual = {0.4: "cautious", 1.0: "right", 2.5: "optimistic"}[factor]
     assert verdicts.count(usual) > {0.4: 0.6, 1.0: 0.92, 2.5: 0.9}[factor] * 300

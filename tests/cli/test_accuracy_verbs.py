@@ -69,12 +69,14 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     assert [item["p95_mm"] for item in document["worst"]] == sorted(
         (item["p95_mm"] for item in document["worst"]), reverse=True
     )
-    assert set(document["sources"]) == {"geometry", "instrument's place"}
+    assert set(document["sources"]) == {"geometry", "instrument's place", "repeatability", "model error"}
     check = document["verification"]
-    assert document["verdict"]["trusted"] is None and "claimed_uncertainty" in document["verdict"]["reasons"]
-    # the files state no sigma: the tracker's noise and what no rigid model can follow count as the robot's
-    assert check["verdict"] == "unknown" and check["low"] > 1 and check["applied"] == check["factor"]
-    assert any("no sigma" in remark for remark in document["remarks"])
+    # the files state no sigma: what instrument, robot and model error scatter was found from the points of the calibration
+    assert document["verdict"]["trusted"] is True and "claimed_uncertainty" in document["verdict"]["reasons"]
+    assert (
+        check["verdict"] == "right" and check["ratio_low"] < 1 < check["ratio_high"] and check["applied"] == 1
+    )
+    assert not any("no sigma" in remark for remark in document["remarks"])
     page = (ur5 / "map.html").read_text(encoding="utf-8")
     assert "accuracy map" in page and "figure-predicted" in page and "predictions are not reduced" in page
     seen = run("map", ur5 / "robot.yaml", *arguments, "--verification", ur5 / "some.csv", "--json")
@@ -83,7 +85,7 @@ def test_map_of_a_box_and_its_table(run, ur5: Path) -> None:
     assert "it was fitted to some.csv" in (ur5 / "map.html").read_text(encoding="utf-8")
     bare = run("map", ur5 / "robot.yaml", *arguments, "--json").document
     ratio = document["predicted"]["p95"]["worst_mm"] / bare["predicted"]["p95"]["worst_mm"]
-    assert ratio == pytest.approx(check["factor"], rel=1e-9) and bare["verification"] is None
+    assert ratio == pytest.approx(check["applied"], rel=1e-9) and bare["verification"] is None
     assert run("map", ur5 / "robot.yaml", *arguments).status == 0
 
 
@@ -262,11 +264,13 @@ def test_certificate_needs_two_measurements_of_four_targets(run, ur5: Path) -> N
     assert odd.status == 2 and "page.pdf must end in .html" in odd.err
 
 
-def test_a_certificate_without_sigma_and_visits_judges_nothing(run, ur5: Path) -> None:
+def test_a_certificate_without_sigma_and_visits_is_judged_by_the_scatter_of_the_calibration(
+    run, ur5: Path
+) -> None:
     once = pl.read_csv(ur5 / "after.csv").unique("pose", maintain_order=True)
     wander = pl.Series(5e-4 * np.random.default_rng(3).standard_normal(len(once)))
     once.with_columns(pl.col("x") + wander).drop("^sigma.*$").write_csv(ur5 / "after.csv")
     done = certify(run, ur5, "--json")
-    assert done.document["prediction"]["verdict"] == "unknown"
-    assert "flexcal import --sigma" in " ".join(done.document["remarks"])
-    assert "It cannot be judged" in (ur5 / "certificate.html").read_text(encoding="utf-8")
+    assert done.document["prediction"]["verdict"] == "optimistic"
+    assert "flexcal import --sigma" not in " ".join(done.document["remarks"])
+    assert "too small" in (ur5 / "certificate.html").read_text(encoding="utf-8")

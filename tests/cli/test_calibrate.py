@@ -97,8 +97,11 @@ def test_out_leaves_the_robots_folder_alone(run, ur5_folder: Path, some: Path, t
     )
     assert checked.document["verification"]["measured"]["mean_mm"] < 0.2
     assert json.loads((out / "check" / "results.json").read_text()) == checked.document
-    assert checked.document["verdict"] == {"trusted": None, "reasons": ["claimed_uncertainty"]}
-    assert "Trusted: cannot be judged — because " in checked.err
+    assert checked.document["verdict"] == {
+        "trusted": True,
+        "reasons": ["unseen_poses", "claimed_uncertainty"],
+    }
+    assert "Trusted: yes — because " in checked.err
 
 
 def test_provenance_names_inputs_and_options(run, ur5_folder: Path, some: Path) -> None:
@@ -153,13 +156,17 @@ def test_intervals_follow_the_scatter_where_no_sigma_is_given(run, ur5_folder: P
     header, rows = read_csv(some)
     robot = ur5_folder / "robot.yaml"
     scatter = run("calibrate", robot, some, "--terms", "kinematic", "--json").document
-    assert not scatter["fit"]["sigma_given"] and scatter["fit"]["reduced_chi2"] == pytest.approx(1, abs=0.05)
-    sigma = np.full((len(rows), 1), scatter["fit"]["sigma_mm"] * 1e-3)
+    assert not scatter["fit"]["sigma_given"]
+    # errors that neighbouring points share are fitted in part, so that less than all of their variance is left
+    assert 0.8 < scatter["fit"]["reduced_chi2"] < 1.05
+    assert scatter["variances"]["instrument_mm"] is None and scatter["variances"]["robot_mm"] > 0.03
+    sigma = np.full((len(rows), 1), scatter["variances"]["robot_mm"] * 1e-3)
     given = write_csv(ur5_folder / "given.csv", [*header, "sigma"], np.hstack([rows, sigma]))
     stated = run("calibrate", robot, given, "--terms", "kinematic", "--json").document
     assert stated["fit"]["sigma_given"]
+    assert stated["variances"]["robot_mm"] < 0.5 * stated["variances"]["instrument_mm"]
     name = "elbow_joint.length_x"
-    assert stated["parameters"][name]["std"] == pytest.approx(scatter["parameters"][name]["std"], rel=1e-3)
+    assert stated["parameters"][name]["std"] == pytest.approx(scatter["parameters"][name]["std"], rel=0.2)
 
 
 def test_terms_of_robot_yaml_are_kept(run, ur5_folder: Path, some: Path) -> None:
@@ -187,14 +194,15 @@ def test_verifying_on_the_calibration_file_is_remarked(run, ur5_folder: Path, so
     copied.write_bytes(some.read_bytes())
     assert "fitted to renamed.csv" in " ".join(run("verify", robot, copied, "--json").document["remarks"])
     fresh = run("verify", robot, ur5_folder / "random.csv", "--json").document
-    assert fresh["remarks"] == [] and fresh["rms_mm"]["expected"] is None
+    assert fresh["remarks"] == [] and fresh["rms_mm"]["expected"] > fresh["rms_mm"]["parameters"]
     assert fresh["rms_mm"]["parameters"] < fresh["rms_mm"]["measured"] < 0.2
 
 
 def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: Path) -> None:
     """The fit may look perfect; an axis that turned round does not."""
     robot, arguments = ur5_folder / "robot.yaml", ("--terms", "kinematic", "--json")
-    assert len(run("calibrate", robot, some, *arguments).document["remarks"]) == 1  # that there is no sigma
+    right = run("calibrate", robot, some, *arguments).document
+    assert not right["fit"]["hardly_fits"] and "look for a column" not in " ".join(right["remarks"])
     header, rows = read_csv(some)
     rows[:, header.index("q4")] *= -1
     write_csv(some, header, rows)
@@ -215,7 +223,7 @@ def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some:
     assert "too much to be noise" in page.out and page.out.count("look for a column") == 1
     write_csv(some, [*header, "sigma"], np.hstack([rows, np.full((len(rows), 1), 5e-5)]))
     page = run(*arguments)
-    assert "times what sigma explains" in page.out and page.out.count("look for a column") == 1
+    assert "beside the stated sigma of 0.05 mm" in page.out and page.out.count("look for a column") == 1
 
 
 @pytest.fixture

@@ -5,13 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
-from flexcal.calibration import Calibration, Drift, predict
+from flexcal.calibration import Calibration, Drift, predict, prediction_document
+from flexcal.calibration.propagated_covariance import moving_parameters
 from flexcal.report import TwoStageStudy
 from flexcal.report.checks import (
     CHANCE,
     check_claimed_uncertainty,
     check_drift,
+    check_error_budget,
     check_flanks,
     check_fresh_poses,
     check_rank,
@@ -29,21 +32,50 @@ def test_a_good_study_passes_every_check(study: TwoStageStudy) -> None:
 
 
 def test_errors_larger_than_predicted_are_bad(study: TwoStageStudy) -> None:
-    worse = replace(study.verification, errors=4.0 * study.verification.errors)
+    worse = study.results["prediction"] | {"ratio": 4.0, "ratio_low": 3.2, "ratio_high": 5.0}
     assert check_claimed_uncertainty(worse).status == "bad"
-    fresh = replace(study.fresh, errors={**study.fresh.errors, CALIBRATED: worse.errors})
-    assert two_stage_verdict(replace(study, fresh=fresh)).status == "bad"
+    assert two_stage_verdict(replace(study, results=study.results | {"prediction": worse})).status == "bad"
 
 
 def test_noise_of_the_instrument_counts_where_points_are_measured(simulated: TwoStageRun) -> None:
-    measured, sigma = simulated.measured_verification, simulated.verification_poses.sigma
-    assert check_claimed_uncertainty(measured).status != "good"
-    assert check_claimed_uncertainty(measured, sigma).status == "good"
+    measured, covariance = simulated.measured_verification, simulated.measured_covariance
+    assert check_claimed_uncertainty(prediction_document(measured, covariance)).status == "good"
+    without = replace(covariance, independent=np.zeros((len(measured.errors), 3, 3)))
+    assert check_claimed_uncertainty(prediction_document(measured, without)).status != "good"
+    unknown = replace(covariance, independent=None)
+    assert check_claimed_uncertainty(prediction_document(measured, unknown)).status == "unknown"
 
 
-def test_without_noise_nothing_is_claimed(study: TwoStageStudy) -> None:
-    checked = check_claimed_uncertainty(study.verification, noise_given=False)
-    assert checked.status == "unknown"
+@pytest.mark.parametrize(
+    ("ratio", "low", "high", "freedom", "status"),
+    [
+        (1.0, 0.8, 1.3, 30, "good"),
+        (0.5, 0.4, 0.7, 30, "good"),
+        (1.3, 1.1, 1.5, 60, "care"),
+        (1.4, 0.9, 1.9, 10, "care"),
+        (2.5, 2.0, 3.0, 30, "bad"),
+        (2.5, 0.9, 5.0, 3, "care"),
+        (1.0, 0.5, 2.9, 3, "unknown"),
+    ],
+)
+def test_the_ratio_decides_with_its_interval(
+    ratio: float, low: float, high: float, freedom: float, status: str
+) -> None:
+    found = {"poses": 50, "inside_95_percent": 0.95, "verdict": "right", "freedom": freedom}
+    found |= {"ratio": ratio, "ratio_low": low, "ratio_high": high}
+    assert check_claimed_uncertainty(found).status == status
+    assert check_claimed_uncertainty(None).status == "unknown"
+
+
+def test_the_error_budget_is_judged(study: TwoStageStudy) -> None:
+    good = {"instrument_mm": 0.02, "robot_mm": 0.03, "model_mm": 0.01, "stated_mm": 0.02}
+
+    def judged(changes: dict[str, float | None], *, hardly_fits: bool = False) -> str:
+        return check_error_budget(study.geometry, good | changes, hardly_fits=hardly_fits).status
+
+    assert judged({}) == "good" and judged({"instrument_mm": None, "stated_mm": None}) == "good"
+    assert judged({"model_mm": 0.05}) == "care" and judged({"stated_mm": 0.2}) == "care"
+    assert judged({}, hardly_fits=True) == "bad"
 
 
 def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None:
@@ -52,6 +84,7 @@ def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None
         v,
         errors=v.errors[:9],
         parameter_rms=v.parameter_rms[:9],
+        scatter_rms=v.scatter_rms[:9],
         ambiguous=v.ambiguous[:9],
         position=v.position[:9],
     )
@@ -75,13 +108,12 @@ def test_a_drift_is_flagged(simulated: TwoStageRun) -> None:
     fit = simulated.calibration
 
     def judged(calibration: Calibration) -> str:
-        drift = Drift.of(calibration)
-        return check_drift(drift.document()).status
+        return check_drift(Drift.of(calibration).document()).status
 
     assert judged(fit) == "good"
     share = np.linspace(-0.5, 0.5, len(fit.poses))
-    wandered = fit.residuals + share[:, None] * np.array([1e-4, 0.0, 0.0])
-    assert judged(replace(fit, residuals=wandered)) == "care"
+    wandered = fit.linear.residual + share[:, None] * np.array([1e-4, 0.0, 0.0])
+    assert judged(replace(fit, linear=replace(fit.linear, residual=wandered))) == "care"
 
 
 def test_a_blurred_gap_is_flagged(study: TwoStageStudy) -> None:
@@ -106,15 +138,15 @@ def test_fresh_poses_are_judged_as_the_tracker_reads_them(
     """What a folder keeps are the measured errors, which hold the stated noise, and beside them those against the truth."""
     np.testing.assert_allclose(study.fresh.calibrated, simulated.measured_verification.errors, atol=1e-12)
     np.testing.assert_allclose(study.exact.calibrated, simulated.elastic_verification.errors, atol=1e-12)
-    np.testing.assert_allclose(study.noise, simulated.verification_poses.sigma, rtol=1e-12)
+    np.testing.assert_allclose(study.fresh.poses.sigma, simulated.verification_poses.sigma, rtol=1e-12)
     more = (study.fresh.calibrated**2).mean() - (study.exact.calibrated**2).mean()
-    assert abs(more / (study.noise**2).mean() - 1) < 0.2
+    assert abs(more / (study.fresh.poses.sigma**2).mean() - 1) < 0.2
 
 
 def test_chance_is_one_in_a_hundred(simulated: TwoStageRun, rng: np.random.Generator) -> None:
     model = simulated.calibration.model
     posterior = model.posterior
-    names = [n for n in posterior.parameters.names if not n.endswith(".damping")]
+    names = moving_parameters(model)
     numbers = [posterior.parameters.index(n) for n in names]
     parameters = posterior.parameters.subset(names)
     slopes = parameters.natural_slope(parameters.coordinates())

@@ -55,7 +55,7 @@ def test_demo_is_judged_without_its_truth(study: TwoStageStudy) -> None:
 
 
 def scale(factor: float, low: float, high: float, poses: int = 40, *, noise_known: bool = True) -> ErrorScale:
-    return ErrorScale(factor, low, high, 20.0, np.linspace(0.01, 0.99, poses), noise_known)
+    return ErrorScale(factor, low, high, factor, low, high, 20.0, np.linspace(0.01, 0.99, poses), noise_known)
 
 
 def test_map_and_certificate_are_judged_by_measured_poses() -> None:

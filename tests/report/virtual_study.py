@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify
+from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify, verify_jointly
 from flexcal.data import MultisinePlan, PoseSet, write_plan
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimates_file import Block, write_estimates
@@ -176,6 +176,7 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
     exact = measured(robot, q_verify, None)
     noisy = measured(robot, q_verify, rng)
     took = time.perf_counter() - started
+    seen, covariance = verify_jointly(calibrated.model, noisy)
     floor = 2.0e-5 * rng.normal(size=exact.position.shape)
     placed = robot_before(nominal, calibrated.poses)
     assert placed.registered is not None and placed.own is not None
@@ -189,11 +190,12 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
         rigid=rigid,
         before=placed.errors(calibrated.poses),
         verification_poses=exact,
-        nominal_verification=verify(placed.registered, exact, elastic=False),
-        own_verification=verify(placed.own, exact, elastic=False),
-        elastic_verification=verify(calibrated.model, exact),
-        rigid_verification=tuple(verify(fit.model, exact, elastic=False) for fit in rigid),
-        measured_verification=verify(calibrated.model, noisy),
+        nominal_verification=verify(placed.registered, exact, elastic=False, noise_free=True),
+        own_verification=verify(placed.own, exact, elastic=False, noise_free=True),
+        elastic_verification=verify(calibrated.model, exact, noise_free=True),
+        rigid_verification=tuple(verify(fit.model, exact, elastic=False, noise_free=True) for fit in rigid),
+        measured_verification=seen,
+        measured_covariance=covariance,
         floor=ErrorStatistics.of(floor),
         truth=truth,
         seconds={

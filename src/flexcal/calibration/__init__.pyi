@@ -8,19 +8,20 @@ from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
 from .measured_points import require_points
 from .placement import Placement, best_placement, enough_for_points, registrable, rigid_placement
-from .plausibility import Moved, moved_far
+from .plausibility import Moved, hardly_fits, moved_far, scattered
 from .pose_drift import VISITS_A_SET, PoseDrift, common_way, drift_of_poses
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
 from .prediction import Prediction, predict
 from .propagated_covariance import Propagation, propagation
 from .refit import Refit, Refitted, refitted
 from .registration import register, rigid_motion
-from .scaled_errors import ErrorScale, error_scale
+from .scaled_errors import ErrorScale, error_scale, prediction_document
+from .scatter import Scatter
 from .sources import error_sources
 from .term_selection import TermSelection, select_terms
 from .term_trials import ConsideredTerm
 from .terms import geometric_parameters
-from .verification import Verification, verify, verify_jointly
+from .verification import ErrorCovariance, Verification, verify, verify_jointly
 
 __all__ = [
     "CYCLES",
@@ -32,6 +33,7 @@ __all__ = [
     "ConsideredTerm",
     "Drift",
     "ElasticPrior",
+    "ErrorCovariance",
     "ErrorScale",
     "ErrorStatistics",
     "ErrorsBefore",
@@ -44,6 +46,7 @@ __all__ = [
     "Refit",
     "Refitted",
     "RobotBefore",
+    "Scatter",
     "TermSelection",
     "Verification",
     "accuracy_map",
@@ -57,10 +60,12 @@ __all__ = [
     "error_sources",
     "found_point",
     "geometric_parameters",
+    "hardly_fits",
     "moved_far",
     "noise_repeatability",
     "point_uncertainty",
     "predict",
+    "prediction_document",
     "probable_robot",
     "probable_robots",
     "propagation",
@@ -73,6 +78,7 @@ __all__ = [
     "rigid_motion",
     "rigid_placement",
     "robot_before",
+    "scattered",
     "select_terms",
     "verify",
     "verify_jointly",

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.calibration.geometric_calibration import Calibration
-from flexcal.calibration.geometry_fit import columns_of
-from flexcal.calibration.prediction import predict
 from flexcal.units import MILLIMETRE
 
 _CHANCE = 0.0027
@@ -17,10 +15,14 @@ _CHANCE = 0.0027
 
 @dataclass(frozen=True, eq=False)
 class Drift:
-    """Way (3,) m that the points went in the first station's frame while they were measured, at an even pace; `covariance` (3, 3)."""
+    """Way (3,) m that the points went in the first station's frame while they were measured, at an even pace; `covariance` (3, 3).
+
+    `freedom` are the degrees of freedom of the scatter in that covariance.
+    """
 
     travel: np.ndarray
     covariance: np.ndarray
+    freedom: int
 
     @property
     def distance(self) -> float:
@@ -29,39 +31,39 @@ class Drift:
 
     @property
     def probability(self) -> float:
-        """How often points that do not drift show so large a statistic: the p-value."""
-        from scipy.stats import chi2
+        """How often points that stay show as long a way, p of the F test."""
+        from scipy.stats import f
 
-        statistic = self.travel @ np.linalg.solve(self.covariance, self.travel)
-        return float(chi2.sf(statistic, len(self.travel)))
+        size = len(self.travel)
+        statistic = self.travel @ np.linalg.solve(self.covariance, self.travel) / size
+        return float(f.sf(statistic, size, max(self.freedom, 1)))
 
     @property
     def certain(self) -> bool:
-        """Whether the p-value is below 0.27 %."""
+        """Whether chance explains it in less than 0.27 % of all sessions without a drift."""
         return self.probability < _CHANCE
 
     def document(self) -> dict[str, float | bool]:
-        """The block `drift` of results.json."""
-        return {"distance_mm": self.distance / MILLIMETRE, "certain": self.certain, "p": self.probability}
+        """For JSON documents."""
+        return {
+            "distance_mm": self.distance / MILLIMETRE,
+            "p": self.probability,
+            "certain": self.certain,
+        }
 
     @classmethod
     def of(cls, fit: Calibration) -> Drift:
         """From the residuals of a fit, by Rao's score test: what a drift of three coordinates more would estimate, to first order.
 
-        The information on the drift is what the parameters of the fit cannot take up, S = Dᵀ (I - J Σ Jᵀ) D, with D its whitened
-        columns and Σ the posterior; the chi-square that is left, where it exceeds one, widens it. Rows are in measuring order; outliers do
-        not count.
+        The covariance of the errors is that of the fit without what stretches of the measuring order share, scaled by the chi-square
+        that is left. Rows are in measuring order; outliers do not count.
         """
-        poses, estimate = fit.poses, fit.estimate
-        at = predict(fit.model, poses, flank=fit.flank, elastic=len(fit.prior.parameters) > 0, jacobians=True)
-        slope = estimate.parameters.natural_slope(estimate.parameters.coordinates())
-        weight = np.where(np.isin(np.arange(len(poses)), estimate.outliers), 0.0, 1.0)[:, None] / poses.sigma
-        by_parameters = columns_of(at, estimate.parameters.names) * slope * weight.ravel()[:, None]
+        poses = fit.poses
         share = np.linspace(-0.5, 0.5, len(poses))
-        columns = np.kron(share[:, None], np.eye(3)) * weight.ravel()[:, None]
-        raised = by_parameters.T @ columns
-        covariance = np.linalg.inv(columns.T @ columns - raised.T @ estimate.covariance @ raised)
-        score = columns.T @ (fit.residuals * weight).ravel()
-        explained = score @ covariance @ score
-        left = (estimate.chi2 - explained) / max(1, estimate.degrees_of_freedom - len(score))
-        return cls(covariance @ score, covariance * max(1.0, left))
+        kept = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
+        ramp = share[kept][:, None, None] * np.eye(3)
+        residual, columns = fit.linear.projected(replace(fit.scatter, order=0.0), ramp)
+        travel, left = np.linalg.lstsq(columns, residual, rcond=None)[:2]
+        freedom = fit.linear.residual.size - fit.linear.free.shape[2] - len(travel)
+        scale = float(left[0]) / max(freedom, 1) if left.size else 0.0
+        return cls(travel, np.linalg.inv(columns.T @ columns) * max(1.0, scale), freedom)

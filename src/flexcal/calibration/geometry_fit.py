@@ -10,18 +10,21 @@ import numpy as np
 
 from flexcal.calibration.elastic_prior import ElasticPrior
 from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.scatter import whitened
 from flexcal.data import PoseSet
 from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
 from flexcal.model import RobotModel
 
-LossName = Literal["squares", "huber", "cauchy"]
+PlainLoss = Literal["squares", "huber", "cauchy"]
+LossName = Literal["auto", "squares", "huber", "cauchy"]
 
 
 @dataclass(frozen=True, eq=False)
 class GeometryFit:
     """Geometric parameters `kept` of the robot `start` to be fitted to `poses` that rest on `flank` (N, n).
 
-    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all.
+    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (N, 3, 3) in
+    1/m weighs the points: WᵀW is the inverse covariance of each.
     """
 
     start: RobotModel
@@ -30,11 +33,7 @@ class GeometryFit:
     prior: ElasticPrior
     flank: np.ndarray
     elastic: bool
-
-    @property
-    def sigma(self) -> np.ndarray:
-        """1σ of every measured coordinate (3 N,), m."""
-        return self.poses.sigma.ravel()
+    whitening: np.ndarray
 
     def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> Prediction:
         """Where the robot with some named values should be seen, on the flanks of this fit."""
@@ -42,33 +41,31 @@ class GeometryFit:
         return predict(robot, self.poses, flank=self.flank, elastic=self.elastic, jacobians=jacobians)
 
     def residual(self, at: Prediction) -> np.ndarray:
-        """Measured minus predicted coordinates (3 N,), m: Eq. (28)."""
-        return (self.poses.position - at.position).ravel()
+        """Whitened measured minus predicted coordinates (3 N,), Eq. (28)."""
+        return whitened(self.whitening, self.poses.position - at.position)
+
+    def columns(self, at: Prediction, names: tuple[str, ...]) -> np.ndarray:
+        """Whitened Jacobian of all coordinates (3 N, p) by some parameters, natural units."""
+        return whitened(self.whitening, at.jacobian(names))
 
     def reestimated(
-        self, *, loss: Loss | LossName, progress: Callable[[int, float], None] | None
+        self, *, loss: Loss | PlainLoss, progress: Callable[[int, float], None] | None
     ) -> Estimate:
         """Levenberg-Marquardt (29) on geometry, stiffness and inertia together; the latter keep their prior."""
-        parameters, sigma = self.kept + self.prior.parameters, self.sigma
+        parameters = self.kept + self.prior.parameters
 
         def values(x: np.ndarray) -> dict[str, float]:
             return dict(zip(parameters.names, parameters.natural(x), strict=True))
 
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = self.predicted(values(x), jacobians=True)
-            columns = columns_of(at, parameters.names) * parameters.natural_slope(x)
-            return self.residual(at) / sigma, -columns / sigma[:, None]
+            return self.residual(at), -self.columns(at, parameters.names) * parameters.natural_slope(x)
 
         def residual(x: np.ndarray) -> np.ndarray:
-            return self.residual(self.predicted(values(x))) / sigma
+            return self.residual(self.predicted(values(x)))
 
-        covariance = np.diag(np.full(len(parameters), np.inf))
+        covariance = np.diag(parameters.prior_std() ** 2)
         covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
         groups = np.repeat(np.arange(len(self.poses)), 3)
         problem = Problem(parameters, linearise, residual, covariance, groups)
         return solve(problem, loss=loss, progress=progress)
-
-
-def columns_of(at: Prediction, names: tuple[str, ...]) -> np.ndarray:
-    """Jacobian of all coordinates (3 N, p) by some parameters, natural units."""
-    return at.jacobian(names).reshape(-1, len(names))

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.geometry_fit import GeometryFit, columns_of
+from flexcal.calibration.geometry_fit import GeometryFit
 from flexcal.estimation import Estimate, Parameters, Problem, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 
@@ -28,7 +28,7 @@ def marginalised(fit: GeometryFit, *, progress: Callable[[int, float], None] | N
         about = _Marginal.about(fit, kept, elastic)
         estimate = solve(about.geometry_alone(), progress=progress)
         kept = estimate.parameters
-        rest = about.whitened(fit.residual(fit.predicted(_values(kept + elastic))) + about.shift)
+        rest = about.shrunk(about.residual(_values(kept + elastic)))
         found = elastic.prior_mean() + about.spread.T @ rest
         step = (found - elastic.coordinates()) / np.sqrt(np.diag(fit.prior.covariance))
         elastic = elastic.with_coordinates(found)
@@ -39,10 +39,10 @@ def marginalised(fit: GeometryFit, *, progress: Callable[[int, float], None] | N
 
 @dataclass(frozen=True, eq=False)
 class _Marginal:
-    """S about some values of geometry and elasticity, as W with WᵀW = S⁻¹.
+    """S about some values of geometry and elasticity, as W with WᵀW = S⁻¹, rows whitened by R⁻¹ᐟ² beforehand.
 
-    With R⁻¹ᐟ² J Σ¹ᐟ² = Q s Pᵀ, W = (1 - Q diag(1 - (1 + s²)⁻¹ᐟ²) Qᵀ) R⁻¹ᐟ². `slopes` (3 N, t) is J, `spread` (3 N, t) is W J Σ, so that
-    Σ Jᵀ S⁻¹ = spreadᵀ W; `shift` (3 N,) m is how far the elasticity's step from its prior has already moved the points.
+    With R⁻¹ᐟ² J Σ¹ᐟ² = Q s Pᵀ, W = 1 - Q diag(1 - (1 + s²)⁻¹ᐟ²) Qᵀ. `slopes` (3 N, t) is R⁻¹ᐟ² J, `spread` (3 N, t) is W R⁻¹ᐟ² J Σ, so that
+    Σ Jᵀ S⁻¹ = spreadᵀ W; `shift` (3 N,) is how far the elasticity's step from its prior has already moved the points.
     """
 
     fit: GeometryFit
@@ -56,21 +56,24 @@ class _Marginal:
     @classmethod
     def about(cls, fit: GeometryFit, kept: Parameters, elastic: Parameters) -> _Marginal:
         at = fit.predicted(_values(kept + elastic), jacobians=True)
-        slopes = columns_of(at, elastic.names) * elastic.natural_slope(elastic.coordinates())
+        slopes = fit.columns(at, elastic.names) * elastic.natural_slope(elastic.coordinates())
         values, vectors = np.linalg.eigh(fit.prior.covariance)
         root = vectors * np.sqrt(np.maximum(values, 0.0))
-        basis, sizes, _ = np.linalg.svd(slopes @ root / fit.sigma[:, None], full_matrices=False)
+        basis, sizes, _ = np.linalg.svd(slopes @ root, full_matrices=False)
         shift = slopes @ (elastic.coordinates() - elastic.prior_mean())
         return cls(fit, kept, elastic, slopes, shift, basis, 1 - 1 / np.sqrt(1 + sizes**2))
 
-    def whitened(self, rows: np.ndarray) -> np.ndarray:
-        """W times rows (3 N,) or (3 N, k)."""
-        scaled = (rows.T / self.fit.sigma).T
-        return scaled - self.basis @ ((self.basis.T @ scaled).T * self.lost).T
+    def shrunk(self, rows: np.ndarray) -> np.ndarray:
+        """W times whitened rows (3 N,) or (3 N, k)."""
+        return rows - self.basis @ ((self.basis.T @ rows).T * self.lost).T
+
+    def residual(self, values: dict[str, float]) -> np.ndarray:
+        """Whitened residual (3 N,) with the elasticity at its prior."""
+        return self.fit.residual(self.fit.predicted(values)) + self.shift
 
     @property
     def spread(self) -> np.ndarray:
-        return self.whitened(self.slopes @ self.fit.prior.covariance)
+        return self.shrunk(self.slopes @ self.fit.prior.covariance)
 
     def geometry_alone(self) -> Problem:
         """The least-squares problem of the geometry, with θ where it is and S as the covariance."""
@@ -81,11 +84,11 @@ class _Marginal:
 
         def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             at = fit.predicted(values(x), jacobians=True)
-            columns = columns_of(at, kept.names)
-            return self.whitened(fit.residual(at) + self.shift), -self.whitened(columns)
+            columns = fit.columns(at, kept.names) * kept.natural_slope(x)
+            return self.shrunk(fit.residual(at) + self.shift), -self.shrunk(columns)
 
         def residual(x: np.ndarray) -> np.ndarray:
-            return self.whitened(fit.residual(fit.predicted(values(x))) + self.shift)
+            return self.shrunk(self.residual(values(x)))
 
         return Problem(kept, linearise, residual)
 
@@ -97,12 +100,12 @@ def _joint(at: _Marginal, geometry: Estimate) -> Estimate:
     """
     fit, parameters, spread = at.fit, at.kept + at.elastic, at.spread
     predicted = fit.predicted(_values(parameters), jacobians=True)
-    by_geometry = columns_of(predicted, at.kept.names)
-    absorbed = spread.T @ at.whitened(by_geometry)
+    by_geometry = fit.columns(predicted, at.kept.names)
+    absorbed = spread.T @ at.shrunk(by_geometry)
     across = absorbed @ geometry.covariance
     own = fit.prior.covariance - spread.T @ spread + across @ absorbed.T
     covariance = np.block([[geometry.covariance, -across.T], [-across, own]])
-    rows = np.hstack([by_geometry, at.slopes]) / fit.sigma[:, None]
+    rows = np.hstack([by_geometry, at.slopes])
     effective = float(np.sum((rows @ covariance) * rows))
     return replace(
         geometry,
@@ -110,7 +113,7 @@ def _joint(at: _Marginal, geometry: Estimate) -> Estimate:
         covariance=covariance,
         rank=geometry.rank + len(at.elastic),
         identifiable=geometry.identifiable + known_to_a_factor_of_two(at.elastic, own),
-        chi2=float(np.sum((fit.residual(predicted) / fit.sigma) ** 2)),
+        chi2=float(np.sum(fit.residual(predicted) ** 2)),
         degrees_of_freedom=max(0, round(len(rows) - effective)),
     )
 

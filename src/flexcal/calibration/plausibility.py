@@ -12,8 +12,14 @@ from flexcal.calibration.terms import tolerances
 FAR = 50.0
 """Tolerances by which no geometric parameter should be off: 15 mm, 25 mrad."""
 
+FAR_POINT = 0.05
+"""m: a reflector's place on the tool, which is often guessed, should not be farther off than this."""
+
 FAR_FROM_PRIOR = 5.0
 """Standard deviations of its prior by which no stiffness, mass or centre of mass should be off."""
+
+SCATTERED = 0.01
+"""Errors after the fit over the extent of the points (root mean square both) from which data and robot hardly belong together."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,19 @@ class Moved:
     times: float
 
 
+def hardly_fits(found: Calibration) -> bool:
+    """Whether data and robot can hardly belong together, so that nothing should be built on the fit."""
+    return bool(moved_far(found)) or scattered(found)
+
+
+def scattered(found: Calibration) -> bool:
+    """Whether the errors after the fit, outliers apart, are more than any robot that belongs to the data could leave."""
+    rows = ~np.isin(np.arange(len(found.poses)), found.estimate.outliers)
+    position = found.poses.position[rows]
+    extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
+    return bool(np.sqrt(np.mean(found.residuals[rows] ** 2)) > SCATTERED * extent)
+
+
 def moved_far(found: Calibration) -> tuple[Moved, ...]:
     """The parameters that a fit moved implausibly far, the farthest first."""
     estimate, prior = found.estimate.parameters, found.prior
@@ -34,11 +53,17 @@ def moved_far(found: Calibration) -> tuple[Moved, ...]:
     named = [*kept, *prior.parameters.names]
     end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
     size = np.concatenate([tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))])
-    limit = np.concatenate([np.full(len(kept), FAR), np.full(len(prior.parameters), FAR_FROM_PRIOR)])
+    limit = np.concatenate([_limits(kept, size), np.full(len(prior.parameters), FAR_FROM_PRIOR)])
     times = np.abs(end - start) / size
     far = [k for k in np.argsort(-times / limit) if times[k] > limit[k]]
     items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
     return tuple(Moved(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
+
+
+def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
+    """How many tolerances each geometric parameter may be off."""
+    points = [name.startswith(("tool.length", "point.")) for name in kept]
+    return np.where(points, FAR_POINT / size[: len(kept)], FAR)
 
 
 def _has_size(name: str) -> bool:

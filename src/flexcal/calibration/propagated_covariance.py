@@ -47,9 +47,11 @@ class Propagation:
     rows: np.ndarray
 
     def roots(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Points (N, 3) m at `q` (N, n), and roots A (N, 3, p) m: A Aᵀ is the covariance of what an instrument at the station finds wrong.
+        """Points (N, 3) m at `q` (N, n), and roots A (N, 3, k) m: A Aᵀ is the covariance of the point's error.
 
-        Both in the base frame. Derivatives are those of the undeflected arm: they differ by its deflection angles, some 1e-3 of them.
+        Columns are those of the parameters, then those of the scatter, where there is any: repeatability at every joint, repeatability and
+        model error of the coordinates. Both in the base frame, as an instrument at the station finds them, without its own noise.
+        Derivatives are those of the undeflected arm: they differ by its deflection angles, some 1e-3 of them.
         """
         model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
         loads, regressor, coupling = spring_loads(model, q, self.payload)
@@ -69,7 +71,21 @@ class Propagation:
         )
         stacked = np.concatenate(columns, axis=2)
         roots = stacked.reshape(-1, stacked.shape[2]) @ self.rows
-        return at.position, roots.reshape(len(q), 3, -1)
+        return at.position, np.concatenate(
+            [roots.reshape(len(q), 3, -1), *self._scatter(by_geometry)], axis=2
+        )
+
+    def _scatter(self, by_geometry: np.ndarray) -> list[np.ndarray]:
+        """Columns (N, 3, k) m of what is no parameter's: repeatability and model error."""
+        model, columns = self.model, []
+        angular = model.value("scatter.angular")
+        if angular > 0:
+            revolute = [6 * i for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+            columns.append(angular * by_geometry[:, :, revolute])
+        size = np.hypot(model.value("scatter.robot"), model.value("scatter.model"))
+        if size > 0:
+            columns.append(np.broadcast_to(size * np.eye(3), (len(by_geometry), 3, 3)))
+        return columns
 
     def _twist(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
         """How far joints turn (N, T) with the twisting parameters, springs being loaded by `loads` (N, d)."""

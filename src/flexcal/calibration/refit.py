@@ -8,12 +8,10 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.placement import best_placement, rigid_placement
 from flexcal.calibration.prediction import predict
-from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
-from flexcal.calibration.verification import Verification
+from flexcal.calibration.verification import ErrorCovariance, Verification, verify_jointly
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
@@ -31,7 +29,7 @@ class Refitted:
     """A verification with the place of the instrument (`station`), of the measured points (`point`), or both fitted to its own poses.
 
     `result` has errors by leave-one-out: each pose against the placement that the other poses give, so that they are honest for all poses.
-    `noise` (N, 3) m is the 1σ that the instrument's noise makes of them; `parameters` how many were fitted; `model` is the robot with
+    `covariance` is that of these errors; `parameters` how many were fitted; `model` is the robot with
     the placement that all poses give.
     """
 
@@ -39,7 +37,7 @@ class Refitted:
     model: RobotModel
     parameters: int
     result: Verification
-    noise: np.ndarray
+    covariance: ErrorCovariance
 
 
 def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitted:
@@ -69,11 +67,24 @@ def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitt
         return np.linalg.solve(own, rest.reshape(len(poses), 3, -1))
 
     errors = left_out((poses.position - at.position).reshape(-1, 1))[:, :, 0]
-    used = moving_parameters(placed)
-    roots = left_out((at.jacobian(used) @ covariance_root(placed, used)).reshape(3 * len(poses), -1))
-    rms = np.sqrt((roots**2).sum(axis=(1, 2)))
-    result = Verification(poses.position - errors, errors, rms, ambiguous_poses(placed, at))
-    return Refitted(tuple(what), placed, basis.shape[1], result, _noise(poses, basis, own))
+    standing, covariance = verify_jointly(placed, poses)
+    roots = left_out(covariance.roots.reshape(3 * len(poses), -1))
+    independent = (
+        None if covariance.independent is None else _left_out_noise(covariance.independent, blocks, own)
+    )
+    count = covariance.roots.shape[2] - covariance.shared
+    scatter = (roots[:, :, count:] ** 2).sum(axis=(1, 2))
+    if independent is not None:
+        scatter = scatter + np.trace(independent, axis1=1, axis2=2)
+    result = Verification(
+        position=poses.position - errors,
+        errors=errors,
+        parameter_rms=np.sqrt((roots[:, :, :count] ** 2).sum(axis=(1, 2))),
+        scatter_rms=np.sqrt(scatter),
+        ambiguous=standing.ambiguous,
+    )
+    found = replace(covariance, roots=roots, independent=independent)
+    return Refitted(tuple(what), placed, basis.shape[1], result, found)
 
 
 _WORDS = {"station": "the instrument", "point": "the measured point"}
@@ -113,16 +124,10 @@ def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
     return found
 
 
-def _noise(poses: PoseSet, basis: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """1σ (N, 3) m of leave-one-out errors that the noise of all poses makes: own⁻¹ (I - H) Σ (I - H) own⁻¹."""
-    sigma = poses.sigma.reshape(-1)
+def _left_out_noise(independent: np.ndarray, blocks: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Covariance (N, 3, 3) m² that `independent` errors of all poses give leave-one-out errors: own⁻¹ (I - H) Σ (I - H) own⁻¹."""
+    across = blocks @ np.matmul(np.swapaxes(blocks, 1, 2), independent)
+    weighted = np.einsum("nik,nij,njl->kl", blocks, independent, blocks, optimize=True)
+    total = independent - across - np.swapaxes(across, 1, 2) + blocks @ weighted @ np.swapaxes(blocks, 1, 2)
     inverse = np.linalg.inv(own)
-    blocks = basis.reshape(len(poses), 3, -1)
-    weighted = basis.T @ (basis * sigma[:, None] ** 2)
-    variance = np.zeros((len(poses), 3, 3))
-    for axis in range(3):
-        variance[:, axis, axis] = poses.sigma[:, axis] ** 2
-    across = blocks @ np.swapaxes(blocks * (poses.sigma**2)[:, :, None], 1, 2)
-    total = variance - across - np.swapaxes(across, 1, 2) + blocks @ weighted @ np.swapaxes(blocks, 1, 2)
-    found = inverse @ total @ inverse
-    return np.sqrt(np.clip(np.einsum("nii->ni", found), 0.0, None))
+    return inverse @ total @ inverse

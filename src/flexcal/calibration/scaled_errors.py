@@ -1,4 +1,4 @@
-"""How large the errors at verification poses are, against what the parameters' covariance predicts."""
+"""How large the errors at verification poses are, against what parameters and scatter predict."""
 
 from __future__ import annotations
 
@@ -7,23 +7,27 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.verification import Verification
+from flexcal.calibration.verification import ErrorCovariance, Verification
 from flexcal.errors import FlexcalError
 from flexcal.estimation.gaussian_distance import distance_probability, principal_variances
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorScale:
-    """`factor` by which the predicted errors must be multiplied to be as large as the observed ones, with its 95 % interval.
+    """Observed over predicted size of the errors, with 95 % intervals.
 
-    `freedom`: so many independent numbers the errors at all poses are worth, for they share one set of parameters. `probability` (N,): of
-    an error no larger than the observed one, as predicted; uniform where the prediction is right. The instrument's noise is taken off
-    where it is known, `noise_known`.
+    `ratio`, between `ratio_low` and `ratio_high`, is of the whole root mean square. `factor`, between `low` and `high`, is by how much
+    the errors of parameters and model must be larger for that, independent noise being as it is. `freedom`: so many independent numbers the
+    errors at all poses are worth, for they share one set of parameters. `probability` (N,): of an error no larger than the observed one, as
+    predicted; uniform where the prediction is right. `noise_known`: whether instrument and repeatability are among what is predicted.
     """
 
     factor: float
     low: float
     high: float
+    ratio: float
+    ratio_low: float
+    ratio_high: float
     freedom: float
     probability: np.ndarray
     noise_known: bool
@@ -33,12 +37,17 @@ class ErrorScale:
         """Share of the poses that lie within the bound predicted for 95 % of them."""
         return float((self.probability <= 0.95).mean())
 
-    def document(self) -> dict[str, float | str]:
+    def document(self) -> dict[str, float | str | int]:
         """For JSON documents."""
         return {
+            "poses": len(self.probability),
+            "ratio": self.ratio,
+            "ratio_low": self.ratio_low,
+            "ratio_high": self.ratio_high,
             "factor": self.factor,
             "low": self.low,
             "high": self.high,
+            "freedom": self.freedom,
             "inside_95_percent": self.inside,
             "verdict": self.verdict,
         }
@@ -53,46 +62,65 @@ class ErrorScale:
         return "cautious" if self.high < 1 else "right"
 
 
-def error_scale(verification: Verification, roots: np.ndarray, noise: np.ndarray | None) -> ErrorScale:
-    """Compare the errors of a verification with their prediction: `roots` (N, 3, p) m as `verify_jointly` gives them.
+def error_scale(verification: Verification, covariance: ErrorCovariance) -> ErrorScale:
+    """Compare the errors of a verification with their prediction, as `verify_jointly` gives both.
 
-    `noise` (N, 3) m is 1σ of the instrument, None where unknown.
-
-    With the errors' covariance f² A Aᵀ + S, A the roots of all poses together and S the noise's, their squared size has the mean
+    With the errors' covariance f² A Aᵀ + S, A the roots of all poses together and S what is independent, their squared size has the mean
     f² tr A Aᵀ + tr S, which gives f, and is taken as χ² distributed with ν = (tr V)² / tr V² degrees of freedom (Satterthwaite, 1946),
-    which gives its interval. Poses with an uncertain flank are left out: the covariance knows nothing of a wrong flank. Raises
-    `FlexcalError` with fewer than two others.
+    which gives the intervals. Poses with an uncertain flank are left out: the covariance knows nothing of a wrong flank. Raises
+    `FlexcalError` with fewer than two others, and where nothing was predicted.
     """
+    from scipy.special import fdtri
+
     clear = ~verification.ambiguous
     if clear.sum() < 2:
         raise FlexcalError(
             f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; measure two or more that have."
         )
-    roots, errors = roots[clear], verification.errors[clear]
-    sigma = np.zeros(errors.shape) if noise is None else noise[clear]
-    stacked, spread = roots.reshape(-1, roots.shape[2]), sigma.ravel() ** 2
+    roots, errors = covariance.roots[clear], verification.errors[clear]
+    known = covariance.independent is not None
+    independent = covariance.independent[clear] if known else np.zeros((len(errors), 3, 3))  # pyright: ignore[reportOptionalSubscript]
+    stacked = roots.reshape(-1, roots.shape[2])
     gram = stacked.T @ stacked
-    from_parameters, from_noise = float(np.trace(gram)), float(spread.sum())
-    mixed = float(((stacked**2).sum(axis=1) * spread).sum())
+    from_parameters = float(np.trace(gram))
+    from_noise = float(np.trace(independent, axis1=1, axis2=2).sum())
+    if from_parameters + from_noise <= 0:
+        raise FlexcalError("nothing was estimated that predicts an error; calibrate the robot first.")
+    mixed = float(np.sum(roots * np.matmul(independent, roots)))
     total = float((errors**2).sum())
 
     def mean_and_freedom(square: float) -> tuple[float, float]:
         mean = square * from_parameters + from_noise
-        return mean, mean**2 / (
-            square**2 * float((gram**2).sum()) + 2 * square * mixed + float((spread**2).sum())
-        )
+        spread = square**2 * float((gram**2).sum()) + 2 * square * mixed + float((independent**2).sum())
+        return mean, mean**2 / spread
 
-    factor = np.sqrt(max(total - from_noise, 0.0) / from_parameters)
-    covariance = roots @ np.swapaxes(roots, 1, 2) + sigma[:, :, None] ** 2 * np.eye(3)
-    distance = np.linalg.norm(errors, axis=1)
+    factor = np.sqrt(max(total - from_noise, 0.0) / max(from_parameters, 1e-30))
+    predicted, freedom = mean_and_freedom(1.0)
+    size = np.linalg.norm(errors, axis=1)
+    whole = roots @ np.swapaxes(roots, 1, 2) + independent
+    # both sizes have their chance: observed over predicted mean squares are F distributed
+    low, high = (float(fdtri(freedom, min(covariance.freedom, 1e9), share)) for share in (0.975, 0.025))
     return ErrorScale(
         factor=float(factor),
         low=_bound(total, mean_and_freedom, 0.975),
         high=_bound(total, mean_and_freedom, 0.025),
+        ratio=float(np.sqrt(total / predicted)),
+        ratio_low=float(np.sqrt(total / predicted / low)),
+        ratio_high=float(np.sqrt(total / predicted / high)),
         freedom=mean_and_freedom(max(factor**2, 1e-12))[1],
-        probability=distance_probability(distance, principal_variances(covariance)),
-        noise_known=noise is not None,
+        probability=distance_probability(size, principal_variances(whole)),
+        noise_known=known,
     )
+
+
+def prediction_document(
+    verification: Verification, covariance: ErrorCovariance
+) -> dict[str, float | str | int] | None:
+    """`error_scale` for JSON documents; None where errors and prediction cannot be compared."""
+    try:
+        return error_scale(verification, covariance).document()
+    except FlexcalError:
+        return None
 
 
 def _bound(total: float, mean_and_freedom: Callable[[float], tuple[float, float]], share: float) -> float:
@@ -109,4 +137,6 @@ def _bound(total: float, mean_and_freedom: Callable[[float], tuple[float, float]
     most = 1.0
     while excess(most) < 0:
         most *= 2
+        if most > 1e6:
+            return float("inf")
     return brentq(excess, 1e-6, most)  # pyright: ignore[reportReturnType]

@@ -6,13 +6,16 @@ import numpy as np
 
 from flexcal.calibration.prediction import predict
 from flexcal.calibration.propagated_covariance import Propagation, covariance_root, moving_parameters
+from flexcal.calibration.scatter import joint_turns
 from flexcal.data import PoseSet
 
-SOURCES = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")
+PARAMETERS = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")
+REPEATABILITY, MODEL_ERROR = "repeatability", "model error"
+SOURCES = (*PARAMETERS, REPEATABILITY, MODEL_ERROR)
 
 
 def source_of(name: str) -> str:
-    """The kind of a parameter that moves a point, one of `SOURCES`."""
+    """The kind of a parameter that moves a point, one of `PARAMETERS`."""
     owner, _, key = name.rpartition(".")
     if owner.startswith("station."):
         return "instrument's place"
@@ -45,16 +48,22 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
         temperature=None,
         pose=np.arange(size),
     )
-    roots = predict(model, poses, jacobians=True).jacobian(names) @ root
-    variance = (roots**2).sum(axis=(1, 2))
+    at = predict(model, poses, jacobians=True)
+    roots = at.jacobian(names) @ root
+    turned = (joint_turns(at) ** 2).sum(axis=(1, 2))
+    scatter = {
+        REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + model.value("scatter.angular") ** 2 * turned,
+        MODEL_ERROR: np.full(size, 3 * model.value("scatter.model") ** 2),
+    }
+    variance = (roots**2).sum(axis=(1, 2)) + sum(scatter.values())
     kinds = np.array([source_of(name) for name in names])
     shares = {}
-    for kind in SOURCES:
+    for kind in PARAMETERS:
         if (kinds == kind).any():
             # what knowing the kind takes away: the part of the root's columns that its rows span
             basis = np.linalg.svd(root[kinds == kind] / _sizes(root[kinds == kind]), full_matrices=False)[2]
             shares[kind] = ((roots @ basis.T) ** 2).sum(axis=(1, 2)) / variance
-    return shares
+    return shares | {kind: own / variance for kind, own in scatter.items() if own.any()}
 
 
 def _sizes(rows: np.ndarray) -> np.ndarray:

@@ -9,8 +9,9 @@ import numpy as np
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
-from flexcal.calibration.prediction import predict
+from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
+from flexcal.calibration.scatter import block_columns, error_cells, joint_turns, known_scatter
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 
@@ -19,21 +20,21 @@ from flexcal.model import RobotModel
 class Verification:
     """Predicted and measured points of a set of poses.
 
-    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted; `parameter_rms` (N,) m, the root mean square distance
-    error that the parameters' covariance alone predicts: noise of instrument and encoders comes on top; `ambiguous` (N,) poses at which
+    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted. Root mean square distance errors (N,) m that are predicted:
+    `parameter_rms` from the parameters' covariance, `scatter_rms` from instrument, robot and model error. `ambiguous` (N,) poses at which
     the flank of a backlash is not certain.
     """
 
     position: np.ndarray
     errors: np.ndarray
     parameter_rms: np.ndarray
+    scatter_rms: np.ndarray
     ambiguous: np.ndarray
 
-    def expected_rms(self, noise: np.ndarray | None = None) -> np.ndarray:
-        """Root mean square distance error (N,) m that is predicted, with 1σ `noise` (N, 3) m of the measured coordinates where given."""
-        return (
-            self.parameter_rms if noise is None else np.sqrt(self.parameter_rms**2 + (noise**2).sum(axis=1))
-        )
+    @property
+    def expected_rms(self) -> np.ndarray:
+        """Root mean square distance error (N,) m that is predicted in all."""
+        return np.hypot(self.parameter_rms, self.scatter_rms)
 
     @property
     def all(self) -> ErrorStatistics:
@@ -46,25 +47,85 @@ class Verification:
         return ErrorStatistics.of(self.errors[~self.ambiguous])
 
 
-def verify(model: RobotModel, poses: PoseSet, *, elastic: bool = True) -> Verification:
+@dataclass(frozen=True, eq=False)
+class ErrorCovariance:
+    """Covariance of the errors at N poses: between poses i and j `roots`_i `roots`_jᵀ (N, 3, k), m; `independent` (N, 3, 3) m² beside it.
+
+    The roots are of the parameters and, the last `shared` of them, of the model error that neighbouring poses have in common; independent
+    are instrument and repeatability, None where neither was estimated nor stated.
+    `freedom` are the degrees of freedom of the predicted mean square, inf where scatter is known.
+    """
+
+    roots: np.ndarray
+    shared: int
+    independent: np.ndarray | None
+    freedom: float = np.inf
+
+
+def verify(
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
+) -> Verification:
     """Compare a calibrated robot with points; `poses` should be none of those it was fitted to.
 
-    The instrument must stand where it stood during calibration: `model` holds its place. Raises `FlexcalError` for measured lengths and
-    orientations, and as `predict` does.
+    The instrument must stand where it stood during calibration: `model` holds its place. `noise_free` points are those of the true robot,
+    without instrument and repeatability. Raises `FlexcalError` for measured lengths and orientations, and as `predict` does.
     """
-    return verify_jointly(model, poses, elastic=elastic)[0]
+    return verify_jointly(model, poses, elastic=elastic, noise_free=noise_free)[0]
 
 
 def verify_jointly(
-    model: RobotModel, poses: PoseSet, *, elastic: bool = True
-) -> tuple[Verification, np.ndarray]:
-    """As `verify`, and A (N, 3, p) m, with p independent errors of one size behind all poses.
-
-    A_i A_jᵀ is what the covariance of a calibrated robot's parameters says of the errors at the poses i and j.
-    """
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
+) -> tuple[Verification, ErrorCovariance]:
+    """As `verify`, and what a calibrated robot's parameters and scatter say of the errors at all poses together."""
     require_points(poses)
     at = predict(model, poses, elastic=elastic, jacobians=True)
     used = moving_parameters(model, elastic=elastic)
     roots = at.jacobian(used) @ covariance_root(model, used)
-    rms = np.sqrt((roots**2).sum(axis=(1, 2)))
-    return Verification(at.position, poses.position - at.position, rms, ambiguous_poses(model, at)), roots
+    shared = _shared_errors(model, poses)
+    independent = None if noise_free else _independent(model, at, poses)
+    squares = (shared**2).sum(axis=(1, 2))
+    if independent is not None:
+        squares = squares + np.trace(independent, axis1=1, axis2=2)
+    found = Verification(
+        position=at.position,
+        errors=poses.position - at.position,
+        parameter_rms=np.sqrt((roots**2).sum(axis=(1, 2))),
+        scatter_rms=np.sqrt(squares),
+        ambiguous=ambiguous_poses(model, at),
+    )
+    freedom = np.inf if noise_free else _freedom(model, at, float(np.sum(found.expected_rms**2)))
+    return found, ErrorCovariance(
+        np.concatenate([roots, shared], axis=2), shared.shape[2], independent, freedom
+    )
+
+
+def _freedom(model: RobotModel, at: Prediction, predicted: float) -> float:
+    """Degrees of freedom of the `predicted` sum of squares, m², from the standard deviations of the scatter (Satterthwaite, 1946)."""
+    known, rows = model.posterior, 3 * len(at.position)
+    weights = {
+        "scatter.robot": rows,
+        "scatter.model": rows,
+        "scatter.angular": float(np.sum(joint_turns(at) ** 2)),
+    }
+    seen = [name for name in weights if known.determines(name)]
+    spread = [2 * model.value(n) * weights[n] * float(np.sqrt(known.marginal([n])[0, 0])) for n in seen]
+    variance = float(np.sum(np.square(spread)))
+    return 2 * predicted**2 / variance if variance > 0 else np.inf
+
+
+def _shared_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Columns (N, 3, k) m of the model error, common to the poses of a cell of the workspace."""
+    cells = error_cells(poses)[0]
+    labels = np.arange(len(poses)) if cells is None else cells
+    return model.value("scatter.model") * block_columns(labels)
+
+
+def _independent(model: RobotModel, at: Prediction, poses: PoseSet) -> np.ndarray | None:
+    """Covariance (N, 3, 3) m² of instrument and repeatability; None where neither is known."""
+    scatter = known_scatter(model, stated=poses.sigma_given)
+    if scatter is None:
+        return None
+    sigma = (
+        poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))
+    )
+    return scatter.independent(sigma, joint_turns(at))

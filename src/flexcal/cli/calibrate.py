@@ -44,8 +44,8 @@ class Calibrate:
     ] = ()
     """auto, or names out of: kinematic, backlash, gravity_compliance, lateral_compliance, transmission; JOINT.gravity_compliance is that of
     one joint."""
-    loss: Literal["squares", "huber", "cauchy"] = "squares"
-    """cauchy finds outliers and lists them."""
+    loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
+    """cauchy finds outliers and lists them; auto takes it where single points stand out."""
     secant_scale: Annotated[float, arg(metavar="STD")] = 0.0
     """Relative 1σ by which a drive may be stiffer or softer under gravity than in its frequency response; 0.1 is usual."""
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
@@ -58,10 +58,9 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print what was found."""
-        from flexcal.calibration import POINT_KNOWN
+        from flexcal.calibration import POINT_KNOWN, hardly_fits
         from flexcal.cli.considered_terms import considered_lines
         from flexcal.cli.tables import before_rows, dropped_table, error_table, weak_table
-        from flexcal.workflow.calibration_remarks import hardly_fits
 
         require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")

@@ -59,13 +59,13 @@ class Verify:
         rows = before_rows(document) | {label: blocks[key] for key, label in labels.items() if key in blocks}
         console.show(error_table("distance to the measured points", rows))
         rms = document["rms_mm"]
-        noise = (
-            ", without the instrument's noise, which the files do not state"
+        whole = (
+            ", without noise of instrument and robot, which nothing states"
             if rms["expected"] is None
-            else f", {rms['expected']:.3f} mm with the instrument's sigma"
+            else f", {rms['expected']:.3f} mm with instrument, robot and model error"
         )
         console.say(
-            f"root mean square: {rms['measured']:.3f} mm; the parameters' uncertainty predicts {rms['parameters']:.3f} mm{noise}"
+            f"root mean square: {rms['measured']:.3f} mm; the parameters' uncertainty predicts {rms['parameters']:.3f} mm{whole}"
         )
         for remark in document["remarks"]:
             console.say(remark)

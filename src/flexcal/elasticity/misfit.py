@@ -10,7 +10,6 @@ from flexcal.elasticity.fit import ResponseFit
 from flexcal.estimation import Misfit
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.declared import UNIDENTIFIED_STIFFNESS
 
 BAND_LINES = 8
 """Neighbouring lines over which the residual is averaged."""
@@ -90,7 +89,7 @@ def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
         if item.name.endswith(".stiffness"):
             std[number] = max(std[number], DOUBTFUL_STIFFNESS)
             if misfit.severe:
-                std[number] = max(std[number], UNIDENTIFIED_STIFFNESS, _moved(robot, item.name, item.value))
+                std[number] = max(std[number], robot.prior.stiffness, _moved(robot, item.name, item.value))
     return std
 
 

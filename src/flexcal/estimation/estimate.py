@@ -42,7 +42,8 @@ class Estimate:
     `degrees_of_freedom` its expectation, the (weighted) number of rows less the effective number of parameters, rounded.
     `outliers` are labels of groups, or row numbers where the problem has no groups. `covariance_freedom` are the degrees of freedom of a
     covariance that the scatter of few batches gave; without it the noise level's stand for them. `misfit` says where a fit to frequency
-    responses does not explain them.
+    responses does not explain them. `ranges` are those of the conditions, by name, that the data cover: the estimate says little outside
+    them.
     """
 
     parameters: Parameters
@@ -60,6 +61,7 @@ class Estimate:
     covariance_freedom: float | None = None
     misfit: Misfit | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def values(self) -> dict[str, float]:

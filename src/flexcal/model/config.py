@@ -56,17 +56,28 @@ class PayloadConfig:
 
 @dataclass(frozen=True)
 class PriorConfig:
-    """How far the URDF's inertials may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative)."""
+    """How far nominal values may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative), stiffness (relative).
+
+    `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name; a geometric
+    parameter without is estimated from the measurements alone.
+    """
 
     mass: float = 0.07
     com: float = 0.010
     rotor_inertia: float = 0.05
+    stiffness: float = 0.3
+    length: float | None = None
+    angle: float | None = None
+    parameters: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.mass < 0 or self.com < 0 or not self.rotor_inertia > 0:
-            raise FlexcalError(
-                "the prior's mass and com must not be negative (0: known exactly), and its rotor_inertia must be positive."
-            )
+        if self.mass < 0 or self.com < 0:
+            raise FlexcalError("the prior's mass and com must not be negative (0: known exactly).")
+        single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
+        named = single | {"length": self.length, "angle": self.angle} | self.parameters
+        for name, value in named.items():
+            if value is not None and not value > 0:
+                raise FlexcalError(f"the prior's {name} must be positive, not {value:g}.")
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,6 @@ from flexcal.estimation import Parameter
 from flexcal.model.names import GEOMETRY, spring_names, unit_of
 from flexcal.model.robot_model import RobotModel
 
-UNIDENTIFIED_STIFFNESS = 0.3
-"""Relative 1σ of a stiffness that nothing but robot.yaml supports."""
 LENGTH_TOLERANCE = 3e-4
 """1σ of an uncalibrated length, m."""
 ANGLE_TOLERANCE = 5e-4
@@ -114,6 +112,6 @@ def _std(model: RobotModel, name: str, key: str) -> float:
         "com_y": model.prior.com,
         "com_z": model.prior.com,
         "rotor_inertia": model.prior.rotor_inertia,
-        "stiffness": UNIDENTIFIED_STIFFNESS,
+        "stiffness": model.prior.stiffness,
         "backlash": GAP_TOLERANCE,
     }.get(key, float("inf"))

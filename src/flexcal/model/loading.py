@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.kernels import Tree
 from flexcal.model.config import Bearings, ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
-from flexcal.model.names import COUPLED, FRICTION
+from flexcal.model.names import COUPLED, FRICTION, SCATTER
 from flexcal.model.point import Payload, Point
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
@@ -89,6 +89,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         tool=np.zeros(6),
         point_error=np.zeros((len(points), 3)),
         station=np.zeros((len(stations), 6)),
+        scatter=np.zeros(len(SCATTER)),
         backlash=np.zeros(n),
         gravity_compliance=np.zeros(n),
         lateral_compliance=np.zeros((n, 2)),

@@ -14,6 +14,7 @@ FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck"
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
+SCATTER = ("instrument", "instrument_share", "robot", "angular", "model")
 
 _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
@@ -24,6 +25,7 @@ _UNITS = {
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     "warm_up": "N m s/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
+    "instrument": "m", "robot": "m", "angular": "rad", "model": "m",
 }  # fmt: skip
 
 
@@ -90,6 +92,8 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
     for p, name in enumerate(model.points):
         for k, key in enumerate("xyz"):
             table[f"point.{name}.{key}"] = ("point_error", (p, k))
+    for k, key in enumerate(SCATTER):
+        table[f"scatter.{key}"] = ("scatter", (k,))
     if model.payload is not None:
         table["payload.mass"] = ("payload_mass", (0,))
         for k, key in enumerate("xyz"):

@@ -51,6 +51,7 @@ class RobotModel:
     tool: np.ndarray
     point_error: np.ndarray
     station: np.ndarray
+    scatter: np.ndarray
     backlash: np.ndarray
     gravity_compliance: np.ndarray
     lateral_compliance: np.ndarray

@@ -35,15 +35,14 @@ from flexcal.report.trust import Trust
 
 @dataclass(frozen=True, eq=False)
 class MapStudy:
-    """A map, its `box` (2, 3) m where there is one, `results` as the verb prints them; what a verification says, and that verification
-    with the 1σ (N, 3) m of its noise, None where its files state none."""
+    """A map, its `box` (2, 3) m where there is one, `results` as the verb prints them; what a verification says, and that verification."""
 
     model: RobotModel
     map: AccuracyMap
     box: np.ndarray | None
     results: Mapping[str, Any]
     scale: ErrorScale | None = None
-    verification: tuple[Verification, np.ndarray | None] | None = None
+    verification: Verification | None = None
 
 
 def write_map_page(path: Path, study: MapStudy) -> None:
@@ -198,7 +197,7 @@ def _sources(study: MapStudy) -> Section:
 
 def _observed(study: MapStudy) -> Section:
     assert study.verification is not None and study.scale is not None
-    found, noise = study.verification
+    found = study.verification
     scale = study.scale
     rows = (
         ("observed over predicted size", f"{scale.factor:.2f}"),
@@ -214,7 +213,7 @@ def _observed(study: MapStudy) -> Section:
         FigureBlock(
             "figure-predicted",
             "Observed against predicted errors",
-            predicted_quantiles(found, noise),
+            predicted_quantiles(found),
             "Sorted errors at the verification poses against the quantiles that the covariance of the parameters and the instrument's "
             "noise predict. Points on the dashed line: the prediction was right. Above it: errors are larger than predicted.",
             "Sorted observed errors against predicted quantiles.",

@@ -11,7 +11,7 @@ from flexcal.calibration import ErrorStatistics
 from flexcal.estimation import Estimate
 from flexcal.report.bearings_check import check_bearings
 from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
-from flexcal.report.checks import check_drift, check_left_out, check_outliers, check_rank, check_residual
+from flexcal.report.checks import check_drift, check_error_budget, check_left_out, check_outliers, check_rank
 from flexcal.report.considered_terms import considered_terms, left_out_errors
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.gravity_loads import GravityLoads
@@ -133,11 +133,9 @@ def calibration_checks(
         check_left_out(errors.mean, left_out, found.rank / (3 * errors.poses)).named(
             "left_out", independent=True
         ),
-        check_residual(
-            "Does the measurement noise explain the residuals?",
-            estimate,
-            sigma_given=results["fit"]["sigma_given"],
-        ).named("residual"),
+        check_error_budget(estimate, results["variances"], hardly_fits=results["fit"]["hardly_fits"]).named(
+            "residual"
+        ),
         check_rank(found.parameters, found.rank, found.gap).named("rank"),
         check_drift(results["drift"]).named("drift"),
         check_outliers(len(estimate.outliers), errors).named("outliers"),

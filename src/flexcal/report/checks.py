@@ -22,6 +22,10 @@ Errors at all poses come from one draw of the parameters, which counts as about 
 """
 
 FEW_POSES = 20
+FEW_NUMBERS = 4.0
+"""Independent numbers in the errors at all poses below which their size says little."""
+OVERSTATED = 0.5
+"""Noise over the stated sigma below which the stated one counts as wrong."""
 CLEAR_GAP = 3.0
 
 
@@ -64,36 +68,64 @@ def check_enough(poses: int) -> Check:
     return Check(question, f"{poses} points are few; measure {FEW_POSES} or more.", "care")
 
 
-def check_claimed_uncertainty(
-    verification: Verification, noise: np.ndarray | None = None, *, noise_given: bool = True
-) -> Check:
-    """Whether errors at verification poses are as large as the parameters' covariance, and `noise` (N, 3) m on top of it, predict."""
+def check_claimed_uncertainty(prediction: Mapping[str, Any] | None) -> Check:
+    """Whether errors at poses outside the fit are as large as predicted; `prediction` is that of results.json, None where there is none."""
     question = "Are the errors as large as predicted?"
-    if not noise_given:
+    if prediction is None:
         return Check(
             question,
-            "The files state no measurement noise, so errors cannot be compared with a prediction.",
+            "Cannot be judged: nothing was verified that a prediction could be compared with.",
             "unknown",
         )
-    clear = ~verification.ambiguous
-    std = verification.expected_rms(noise)[clear]
-    if not clear.any() or not (std > 0).all():
-        return Check(
-            question, "No uncertainty was predicted at these poses, so it cannot be compared.", "unknown"
-        )
-    size = np.linalg.norm(verification.errors[clear], axis=1)
-    inside = float((size < BOUND_95 * std).mean())
-    scale = float(np.sqrt((size**2).mean() / (std**2).mean()))
-    some = "the poses" if clear.all() else "the poses with a certain flank"
-    answer = (
-        f"They are {scale:.2f} times the predicted size, and {100 * inside:.0f} % of {some} lie within the bound predicted for 95 % of "
-        f"them. All poses share one set of parameters and so their luck: one robot in a hundred would exceed {CHANCE} times."
+    ratio, low, high = (prediction[key] for key in ("ratio", "ratio_low", "ratio_high"))
+    numbers = (
+        f"The errors at {prediction['poses']} poses are {ratio:.2f} times the predicted size (95 % interval {low:.2f} to {high:.2f}), and "
+        f"{100 * prediction['inside_95_percent']:.0f} % of them lie within the bound predicted for 95 %."
     )
-    if scale > MISSING:
-        return Check(question, f"{answer} This is more: the model lacks something.", "bad")
-    if scale > CHANCE:
-        return Check(question, f"{answer} Predicted uncertainties are somewhat too small.", "care")
-    return Check(question, answer, "good")
+    if prediction["verdict"] == "unknown":
+        return Check(
+            question,
+            f"Cannot be judged: instrument noise of unknown size is part of the errors. {numbers}",
+            "unknown",
+        )
+    if ratio > MISSING and low > 1:
+        return Check(question, f"No, they are larger: the model lacks something. {numbers}", "bad")
+    if ratio > CHANCE or low > 1:
+        return Check(question, f"No, they are larger. {numbers}", "care")
+    if prediction["freedom"] < FEW_NUMBERS:
+        return Check(
+            question, f"Cannot be judged: the errors are too strongly correlated. {numbers}", "unknown"
+        )
+    if high < 1:
+        return Check(question, f"They are smaller. {numbers}", "good")
+    return Check(question, f"Yes. {numbers}", "good")
+
+
+def check_error_budget(
+    estimate: Estimate, variances: Mapping[str, float | None], *, hardly_fits: bool
+) -> Check:
+    """Whether the residuals of the geometry are noise of instrument and robot; `variances` is that of results.json."""
+    question = "Are the residuals noise of instrument and robot?"
+    if estimate.status != "converged":
+        return Check(question, f"The fit did not end well: {estimate.message}.", "bad")
+    instrument, stated = variances["instrument_mm"], variances["stated_mm"]
+    robot, model = (float(variances[key] or 0.0) for key in ("robot_mm", "model_mm"))
+    said = "" if instrument is None else f"instrument {instrument:.3f}, "
+    with_ = " (instrument included, for no sigma is stated)" if instrument is None else ""
+    answer = (
+        f"Standard deviation of a coordinate: {said}robot {robot:.3f}{with_}, model error {model:.3f} mm."
+    )
+    if hardly_fits:
+        return Check(question, f"No: these data hardly fit this robot. {answer}", "bad")
+    if model > np.hypot(instrument or 0.0, robot):
+        return Check(
+            question,
+            f"No: systematic errors that the model lacks are larger than the noise. {answer}",
+            "care",
+        )
+    if instrument is not None and stated is not None and instrument < OVERSTATED * stated:
+        return Check(question, f"Yes, but the stated sigma of {stated:.3g} mm is too large. {answer}", "care")
+    return Check(question, f"Yes. {answer}", "good")
 
 
 def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = True) -> Check:

@@ -21,13 +21,15 @@ class MeasuredPoints:
     """N points in measuring order.
 
     `errors` (N, 3) m by model are measured minus predicted, in the instrument's frame; `ambiguous` (N,) poses at which the flank of a
-    backlash is not certain; `parameter_rms` (N,) m the distance that the parameters' covariance predicts, None where it was not asked for.
+    backlash is not certain. Distances that are predicted, None where they were not asked for: `parameter_rms` (N,) m from the parameters'
+    covariance, `scatter_rms` (N,) m from instrument, robot and model error.
     """
 
     poses: PoseSet
     errors: Mapping[str, np.ndarray]
     ambiguous: np.ndarray
     parameter_rms: np.ndarray | None = None
+    scatter_rms: np.ndarray | None = None
 
     @property
     def calibrated(self) -> np.ndarray:
@@ -43,10 +45,10 @@ class MeasuredPoints:
     def verification(self) -> Verification:
         """Errors of the model that is used, and what the parameters' covariance says of them; raises `ValueError` where that was not asked
         for."""
-        if self.parameter_rms is None:
+        if self.parameter_rms is None or self.scatter_rms is None:
             raise ValueError("points of a verification have the distances that the covariance predicts")
         position = self.poses.position - self.calibrated
-        return Verification(position, self.calibrated, self.parameter_rms, self.ambiguous)
+        return Verification(position, self.calibrated, self.parameter_rms, self.scatter_rms, self.ambiguous)
 
     @property
     def shown(self) -> dict[str, np.ndarray]:

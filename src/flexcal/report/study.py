@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Literal
 
-import numpy as np
-
 from flexcal.calibration import ErrorStatistics, Verification
 from flexcal.data import MultisinePlan
 from flexcal.estimates_file import Block
@@ -97,8 +95,3 @@ class TwoStageStudy:
     def floor(self) -> ErrorStatistics | None:
         """What would remain at the fresh poses with every parameter known; None of a robot that has other parameters than the model."""
         return None if self.results["verification"]["floor"] is None else self.errors("floor")
-
-    @property
-    def noise(self) -> np.ndarray:
-        """1σ (N, 3) m of the measurement at the fresh poses, as the tracker states it."""
-        return self.fresh.poses.sigma

@@ -8,10 +8,10 @@ from flexcal.report.before import before_rungs
 from flexcal.report.checks import (
     check_claimed_uncertainty,
     check_drift,
+    check_error_budget,
     check_flanks,
     check_fresh_poses,
     check_rank,
-    check_residual,
     check_springs,
     check_truth,
 )
@@ -101,14 +101,13 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict: those that a real robot would have too."""
     found, geometry, determined, fresh = study.stiffness, study.geometry, study.determined, study.verification
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
+    bad_data = study.results["calibration_fit"]["hardly_fits"]
     return (
         check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all).named(
             "fresh_poses", independent=True
         ),
-        check_claimed_uncertainty(fresh, study.noise).named("claimed_uncertainty", independent=True),
-        check_residual("Does the measurement noise explain the residuals of the geometry?", geometry).named(
-            "residual"
-        ),
+        check_claimed_uncertainty(study.results["prediction"]).named("claimed_uncertainty", independent=True),
+        check_error_budget(geometry, study.results["variances"], hardly_fits=bad_data).named("residual"),
         check_responses(found),
         check_drift(study.results["calibration_fit"]["drift"]).named("drift"),
         check_springs(found, stiffness, damping).named("springs"),

@@ -105,14 +105,12 @@ def _refitted(results: Mapping[str, Any]) -> str:
 
 def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
-    found, poses = points.verification, points.poses
+    found = points.verification
     flanks = (check_flanks(found).named("flanks"),) if results["backlash"] else ()
     return (
         check_unseen(results["fitted"]).named("unseen_poses", independent=True),
         check_enough(found.all.poses).named("enough_poses"),
-        check_claimed_uncertainty(found, poses.sigma, noise_given=poses.sigma_given).named(
-            "claimed_uncertainty", independent=True
-        ),
+        check_claimed_uncertainty(results["prediction"]).named("claimed_uncertainty", independent=True),
         *flanks,
         *(
             (check_known_points(results["uncalibrated_points"]).named("calibrated_points"),)
@@ -164,12 +162,12 @@ def _errors_section(study: VerificationStudy) -> Section:
             f"Cumulative distribution; P90 is {millimetres(result.all.p90)} mm.",
         ),
     ]
-    if poses.sigma_given:
+    if study.results["prediction"] is not None:
         blocks.append(
             FigureBlock(
                 "figure-predicted",
                 "Observed against predicted errors",
-                predicted_quantiles(result, poses.sigma),
+                predicted_quantiles(result),
                 "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed "
                 "line: the prediction was right. Above it: errors are larger than predicted. Below: smaller.",
                 "Sorted observed errors against predicted quantiles.",

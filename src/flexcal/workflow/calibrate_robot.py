@@ -18,6 +18,7 @@ from flexcal.calibration import (
     TermSelection,
     calibrate,
     compare_bearings,
+    hardly_fits,
     point_uncertainty,
     probable_robot,
     require_points,
@@ -43,6 +44,7 @@ from flexcal.report.responses_check import misfit_document, misfit_sentences
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.bearing_remarks import bearing_remarks, bearings_block
+from flexcal.workflow.calibrated_ranges import joint_extents
 from flexcal.workflow.calibrated_robot import TARGETS, TARGETS_BETWEEN
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
@@ -122,7 +124,11 @@ class RobotCalibration:
             "robot": selected.model.name,
             "joints": {joint.name: joint.kind for joint in selected.model.joints},
             "identifiability": identifiability_block(self.rigid.identifiability)
-            | {"selected": identifiability_block(found) | identifiability_spectrum(found)},
+            | {
+                "selected": identifiability_block(found)
+                | identifiability_spectrum(found)
+                | {"undetermined": [{"name": u.name, "cause": u.cause} for u in selected.undetermined]}
+            },
             "terms": list(selected.terms),
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
             "term_selection_by": chosen.by if chosen else None,
@@ -139,7 +145,9 @@ class RobotCalibration:
                 "sigma_given": selected.poses.sigma_given,
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),
+                "hardly_fits": hardly_fits(selected),
             },
+            "variances": selected.variances,
             "drift": drift.document(),
             "outliers": [
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
@@ -168,7 +176,7 @@ def calibrate_robot(
     files: Sequence[Path],
     *,
     terms: Sequence[str] | None = None,
-    loss: LossName = "squares",
+    loss: LossName = "auto",
     secant_scale: float = 0.0,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     out: Path | None = None,
@@ -178,9 +186,11 @@ def calibrate_robot(
     """Calibrate the robot of a robot.yaml on files of measured poses, and store the estimate as its block `calibration`.
 
     The robot starts from nominal and the other blocks of its estimates; stiffness found by stage 1 enters with its uncertainty. `terms`
-    (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. Where the files give no sigma, the
-    scatter about the fit stands for it. With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to
-    that folder, and nothing beside robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
+    (None: as robot.yaml says) are names, or "auto" for those that cross-validation supports. A sigma in the files is that of the
+    instrument; the scatter of robot and model are found from the points.
+
+    With `out`, estimates, results.json, points.csv, arm.npz, gravity_loads.npz and report.html go to that folder, and nothing beside
+    robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
     progress("reading", 0.0)
     require_distinct(files)
@@ -232,7 +242,9 @@ def calibrate_robot(
         TARGETS: TARGETS_BETWEEN.join(poses.targets),
     } | ({"bearings": model.bearings} if model.has_bearings else {})
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
-    estimate = replace(selected.estimate, provenance=origin)
+    estimate = replace(
+        selected.estimate, provenance=origin, ranges=joint_extents(selected.model, selected.poses.q)
+    )
     target = source if out is None else out / ESTIMATES
     before = robot_before(model, poses).errors(poses)
     result = RobotCalibration(

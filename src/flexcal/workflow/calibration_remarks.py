@@ -7,21 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration import Calibration, Drift, moved_far
-from flexcal.model.declared import UNIDENTIFIED_STIFFNESS
+from flexcal.calibration import Calibration, Drift, hardly_fits, moved_far, scattered
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.pose_remarks import unused_columns
 
 _LOOK = (
     "these data hardly fit this robot: look for a column with a wrong sign, unit or place in the order, for points of another "
-    "target or robot, and for a wrong xyz under `points:` (flexcal import looks for these); --loss cauchy finds single wrong points"
+    "target or robot, and for a wrong xyz under `points:` (flexcal import looks for these)"
 )
 
-_ABSURD = 100.0
-"""Reduced chi-square from which the data cannot be what they say."""
-
-_LARGEST_SCATTER = 1e-3
-"""Scatter (m) that no calibrated arm and no instrument has."""
+_OVERSTATED, _UNDERSTATED = 0.5, 2.0
+"""Noise that was found over the stated sigma below and above which the difference is worth a word."""
 
 _SHOWN = 3
 
@@ -51,7 +47,7 @@ def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
     if outliers:
         listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers)
         remarks.append(f"{len(outliers)} outliers: {listed}")
-    remarks += _noise(fit)
+    remarks += [*_undetermined(fit), *_noise(fit)]
     drift = Drift.of(fit)
     if drift.certain:
         remarks.append(
@@ -70,11 +66,6 @@ def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
     return tuple(remarks)
 
 
-def hardly_fits(fit: Calibration) -> bool:
-    """Whether data and robot can hardly belong together, so that nothing should be built on the fit."""
-    return bool(moved_far(fit)) or _noise_is_absurd(fit)
-
-
 def _nominal_springs(fit: Calibration) -> Sequence[str]:
     """Springs that stage 1 did not identify have a declared prior of their own in place of its posterior."""
     springs = [p for p in fit.prior.parameters if p.name.endswith(".stiffness")]
@@ -83,29 +74,44 @@ def _nominal_springs(fit: Calibration) -> Sequence[str]:
         return ()
     which = "" if len(nominal) == len(springs) else f" of {', '.join(nominal)}"
     return (
-        f"the stiffness{which} was not identified: the nominal one of robot.yaml is taken to be right to {UNIDENTIFIED_STIFFNESS:.0%}; "
+        f"the stiffness{which} was not identified: the nominal one of robot.yaml is taken to be right to {fit.model.prior.stiffness:.0%}; "
         "run 'flexcal identify stiffness' first to know it",
     )
 
 
+def _undetermined(fit: Calibration) -> Sequence[str]:
+    """Parameters that the poses hide, one sentence a cause."""
+    causes: dict[str, list[str]] = {}
+    for item in fit.undetermined:
+        causes.setdefault(item.cause, []).append(item.name)
+    return [
+        f"not determined by these poses, held at the nominal value: {', '.join(names)} ({cause})"
+        for cause, names in causes.items()
+    ]
+
+
 def _noise(fit: Calibration) -> Sequence[str]:
-    if not fit.poses.sigma_given:
-        text = f"no sigma in the files: the scatter of {_scatter(fit) / MILLIMETRE:.3f} mm a coordinate stands for it"
-        return (f"{text}, though it is too much to be noise" if _noise_is_absurd(fit) else text,)
-    if not fit.estimate.unexplained:
-        return ()
-    ratio = fit.estimate.reduced_chi2
-    return (
-        f"chi-square is {ratio:.2g} times what sigma explains: the model lacks something or sigma is too small, and the intervals are "
-        "too narrow",
+    budget = fit.variances
+    instrument, stated, robot, model = (
+        budget[key] for key in ("instrument_mm", "stated_mm", "robot_mm", "model_mm")
     )
-
-
-def _noise_is_absurd(fit: Calibration) -> bool:
-    if fit.poses.sigma_given:
-        return fit.estimate.reduced_chi2 > _ABSURD
-    return _scatter(fit) > _LARGEST_SCATTER
-
-
-def _scatter(fit: Calibration) -> float:
-    return float(np.sqrt(np.mean(fit.poses.sigma**2)))
+    assert robot is not None and model is not None
+    remarks = []
+    if instrument is None or stated is None:
+        text = f"no sigma in the files: instrument and robot together scatter by {robot:.3f} mm a coordinate about the fit (1σ)"
+        remarks.append(f"{text}, which is too much to be noise" if scattered(fit) else text)
+    elif instrument < _OVERSTATED * stated:
+        remarks.append(
+            f"the stated sigma of {stated:.3g} mm is {stated / np.hypot(instrument, robot):.3g} times the scatter of the points; what "
+            "they show is used"
+        )
+    elif robot > _UNDERSTATED * stated:
+        remarks.append(
+            f"the points scatter by {robot:.3f} mm a coordinate beside the stated sigma of {stated:.3g} mm: repeatability of the robot, "
+            "or a sigma that is too small; weights and intervals use both"
+        )
+    if model > 0:
+        remarks.append(
+            f"systematic errors of {model:.3f} mm a coordinate (1σ) remain that the model lacks; intervals are wider for it"
+        )
+    return remarks

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import date
 from importlib.metadata import version
 from pathlib import Path
@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration import (
+    ErrorCovariance,
     ErrorScale,
     ErrorStatistics,
     PoseRepeatability,
@@ -120,7 +121,7 @@ class RobotCertificate:
             remarks.append(
                 f"the calibration was fitted to {' and '.join(self.fitted)}, so this says little about other targets"
             )
-        if not self.after.poses.sigma_given and self.after.visits is None:
+        if not self.scale.noise_known:
             remarks.append(
                 "the files state no sigma, so the instrument's noise counts as the robot's; 'flexcal import --sigma' states it"
             )
@@ -213,7 +214,7 @@ def certify_robot(
         raise InputError(
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
         )
-    known, roots = verify_jointly(model, visited[after][0])
+    known, covariance = verify_jointly(model, visited[after][0])
     there = _visited(visited[after][0], _placed(model, *visited[after]))
     start = visited[before][0]
     declared = as_declared[rows[before][np.isin(wanted.pose[rows[before]], common)]]
@@ -227,7 +228,7 @@ def certify_robot(
         _visited(visited[after][0], _best_fit(calibrated.found, *visited[after])),
         len(every) - len(common),
         known,
-        error_scale(known, roots, _noise(there)),
+        error_scale(known, _measured_noise(there, covariance)),
         _files(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
@@ -294,11 +295,12 @@ def _visited(poses: PoseSet, targets: np.ndarray) -> Visited:
     return Visited(poses, errors, numbers, centres, visits)
 
 
-def _noise(visited: Visited) -> np.ndarray | None:
-    """1σ (N, 3) m with which a single measurement scatters: as seen from visit to visit, else as the instrument states, else unknown."""
-    if visited.visits is not None:
-        return np.full(visited.errors.shape, _visit_to_visit(visited.visits) / np.sqrt(3))
-    return visited.poses.sigma if visited.poses.sigma_given else None
+def _measured_noise(visited: Visited, covariance: ErrorCovariance) -> ErrorCovariance:
+    """The covariance with the scatter that was seen from visit to visit in place of the predicted one, where there were several visits."""
+    if visited.visits is None:
+        return covariance
+    variance = _visit_to_visit(visited.visits) ** 2 / 3
+    return replace(covariance, independent=np.tile(variance * np.eye(3), (len(visited.errors), 1, 1)))
 
 
 def _visit_to_visit(visits: list[PoseRepeatability]) -> float:

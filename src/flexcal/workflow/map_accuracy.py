@@ -33,6 +33,7 @@ from flexcal.report.accuracy_map import MapStudy, write_map_page
 from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
+from flexcal.workflow.calibrated_ranges import outside_ranges
 from flexcal.workflow.calibrated_robot import (
     CalibratedRobot,
     calibrated_robot,
@@ -70,6 +71,7 @@ class RobotMap:
     before: ErrorsBefore | None
     unmeasured: tuple[str, ...]
     fitted: tuple[str, ...]
+    outside: str
     provenance: Mapping[str, str]
     command: str = ""
 
@@ -86,6 +88,8 @@ class RobotMap:
             remarks.append(
                 "the verification files state no sigma, so the instrument's noise counts as the robot's; 'flexcal import --sigma' states it"
             )
+        if self.outside:
+            remarks.append(self.outside)
         if self.fitted:
             remarks.append(
                 f"the calibration was fitted to {' and '.join(self.fitted)}, which verifies nothing"
@@ -122,7 +126,6 @@ class RobotMap:
             "verification": None
             if scale is None
             else {
-                "poses": len(scale.probability),
                 **scale.document(),
                 "applied": applied_factor(scale),
                 "fitted": list(self.fitted),
@@ -181,9 +184,20 @@ def map_accuracy(
         tuple(calibrated.blocks),
     )
     sources = error_sources(reach, q[worst])
-    unmeasured = unmeasured_remark(calibrated, [reach.target])
     result = RobotMap(
-        reach, found, box, worst, shares, sources, scale, before, unmeasured, fitted, origin, command
+        reach,
+        found,
+        box,
+        worst,
+        shares,
+        sources,
+        scale,
+        before,
+        unmeasured_remark(calibrated, [reach.target]),
+        fitted,
+        outside_ranges(calibrated, q),
+        origin,
+        command,
     )
     page = MapStudy(model, found, box, result.document(), scale, study)
     if out != page_beside(out):
@@ -216,13 +230,12 @@ def _poses(
 
 def _verified(
     calibrated: CalibratedRobot, files: Sequence[Path]
-) -> tuple[ErrorScale | None, ErrorsBefore | None, tuple[Verification, np.ndarray | None] | None]:
-    """How large errors at the poses of the `files` are against their prediction, those before, and the verification with its noise."""
+) -> tuple[ErrorScale | None, ErrorsBefore | None, Verification | None]:
+    """How large errors at the poses of the `files` are against their prediction, those before, and the verification."""
     if not files:
         return None, None, None
     poses = verification_poses(calibrated, files)
-    found, roots = verify_jointly(calibrated.model, poses)
-    noise = poses.sigma if poses.sigma_given else None
+    found, covariance = verify_jointly(calibrated.model, poses)
     if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
         (said,) = refit_remarks(found, poses, None, moved)
         named = " and ".join(str(file) for file in files)
@@ -230,7 +243,7 @@ def _verified(
             f"{named} cannot say how large the map's errors are: {said}; give points measured as the calibration's."
         )
     before = robot_before(calibrated.nominal, poses).errors(poses)
-    return error_scale(found, roots, noise), before, (found, noise)
+    return error_scale(found, covariance), before, found
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:

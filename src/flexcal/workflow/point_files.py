@@ -37,6 +37,8 @@ def write_points(folder: Path, points: MeasuredPoints) -> None:
         columns |= _vectors(f"{model}_d", errors)
     if points.parameter_rms is not None:
         columns["parameter_rms"] = points.parameter_rms
+    if points.scatter_rms is not None:
+        columns["scatter_rms"] = points.scatter_rms
     columns["ambiguous"] = points.ambiguous
     with atomic_path(folder / POINTS) as temporary:
         pl.DataFrame(columns).write_csv(temporary)
@@ -76,7 +78,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
         if CALIBRATED not in errors or not joints or not len(table):
             raise InputError(f"{path} lacks columns or rows; run the verb that leaves it again.")
-        return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"))
+        return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"), column("scatter_rms"))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise _unreadable(path, problem) from problem
 

@@ -54,13 +54,13 @@ def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Re
         least = rms if best is None else _rms(best.result)
         if _rms(again.result) < (_WORTH if best is None or len(what) > len(best.what) else 1.0) * least:
             best = again
-    return best if best is not None and _explains(best, rms, poses) else None
+    return best if best is not None and _explains(best, rms) else None
 
 
-def _explains(best: Refitted, rms: float, poses: PoseSet) -> bool:
+def _explains(best: Refitted, rms: float) -> bool:
     left = _rms(best.result)
-    predicted = float(np.sqrt(np.mean(best.result.expected_rms(best.noise) ** 2)))
-    return left < _TENTH * rms or (poses.sigma_given and left < 2 * predicted)
+    predicted = float(np.sqrt(np.mean(best.result.expected_rms**2)))
+    return left < _TENTH * rms or (best.covariance.independent is not None and left < 2 * predicted)
 
 
 def refit_remarks(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify
+from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify, verify_jointly
 from flexcal.cell import read_truth
 from flexcal.data import Cell, MultisinePlan, Recording, write_plan, write_poses
 from flexcal.design import MeasuringSetup, design_poses, random_poses
@@ -162,6 +162,7 @@ def run_two_stage(
             floor = ErrorStatistics.of(exact.position - predict(nominal.with_values(known), exact).position)
         placed = robot_before(nominal, measured)
         assert placed.registered is not None and placed.own is not None
+        measured_verification, measured_covariance = verify_jointly(calibration.model, seen)
         run = TwoStageRun(
             nominal=nominal,
             informed=believed,
@@ -173,11 +174,12 @@ def run_two_stage(
             rigid=rigid,
             before=placed.errors(measured),
             verification_poses=exact,
-            nominal_verification=verify(placed.registered, exact, elastic=False),
-            own_verification=verify(placed.own, exact, elastic=False),
-            elastic_verification=verify(calibration.model, exact),
-            rigid_verification=tuple(verify(c.model, exact, elastic=False) for c in rigid),
-            measured_verification=verify(calibration.model, seen),
+            nominal_verification=verify(placed.registered, exact, elastic=False, noise_free=True),
+            own_verification=verify(placed.own, exact, elastic=False, noise_free=True),
+            elastic_verification=verify(calibration.model, exact, noise_free=True),
+            rigid_verification=tuple(verify(c.model, exact, elastic=False, noise_free=True) for c in rigid),
+            measured_verification=measured_verification,
+            measured_covariance=measured_covariance,
             floor=floor,
             truth=known,
             seconds=watch.seconds,
@@ -190,7 +192,9 @@ def run_two_stage(
         with watch.stage("cad_alone"):
             springs = stage_one(nominal, "cad_alone")
             fitted = calibrate(springs.robot(nominal), measured)
-            run = replace(run, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact)))
+            run = replace(
+                run, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact, noise_free=True))
+            )
             progress("cad_alone", 1.0)
     run = replace(run, results=two_stage_document(run, exported))
     progress("report", 0.0)

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 
 from flexcal.atomic import atomic_path
-from flexcal.calibration import Drift, ErrorStatistics, Verification
+from flexcal.calibration import Drift, ErrorStatistics, Verification, hardly_fits, prediction_document
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
@@ -52,11 +52,14 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
         "calibration": run.calibration.errors.in_millimetres(),
         "calibration_fit": {
             "reduced_chi2": run.calibration.estimate.reduced_chi2,
+            "hardly_fits": hardly_fits(run.calibration),
             "nominal": run.before.document()["registered"],
             "rigid": run.rigid[0].errors.in_millimetres(),
             "wrong_flanks": None if run.floor is None else wrong_flanks(run),
             "drift": drift.document(),
         },
+        "variances": run.calibration.variances,
+        "prediction": prediction_document(run.measured_verification, run.measured_covariance),
         "rigid_fits": [{"poses": len(c.poses), "rank": c.identifiability.rank} for c in run.rigid],
         "verification": {
             "nominal": run.nominal_verification.all.in_millimetres(),
@@ -145,7 +148,9 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
     columns |= {f"sigma_{axis}": poses.sigma[:, k] for k, axis in enumerate("xyz")}
     for model, verification in models.items():
         columns |= {f"{_COLUMNS[model]}_{axis}": verification.position[:, k] for k, axis in enumerate("xyz")}
-    columns |= {"parameter_rms": elastic.parameter_rms, "unambiguous": ~elastic.ambiguous}
+    columns |= {"parameter_rms": elastic.parameter_rms, "scatter_rms": run.measured_verification.scatter_rms}
+    columns |= {"model_rms": elastic.scatter_rms}
+    columns["unambiguous"] = ~elastic.ambiguous
     with atomic_path(path) as temporary:
         pl.DataFrame(columns).write_csv(temporary)
 
@@ -162,7 +167,7 @@ def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
         size, certain = len(table), table["unambiguous"].cast(pl.Boolean).to_numpy()
         q = table.select([name for name in table.columns if name[0] == "q"]).cast(pl.Float64).to_numpy()
 
-        def points(position: np.ndarray, sigma: np.ndarray) -> MeasuredPoints:
+        def points(position: np.ndarray, sigma: np.ndarray, scatter: str) -> MeasuredPoints:
             poses = PoseSet(
                 q=q,
                 position=position,
@@ -175,9 +180,11 @@ def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
                 pose=table["pose"].to_numpy(),
             )
             errors = {model: position - where for model, where in predicted.items()}
-            return MeasuredPoints(poses, errors, ~certain, table["parameter_rms"].cast(pl.Float64).to_numpy())
+            rms = (table[name].cast(pl.Float64).to_numpy() for name in ("parameter_rms", scatter))
+            return MeasuredPoints(poses, errors, ~certain, *rms)
 
-        return points(vectors("measured_"), vectors("sigma_")), points(vectors(""), np.zeros((size, 3)))
+        measured = points(vectors("measured_"), vectors("sigma_"), "scatter_rms")
+        return measured, points(vectors(""), np.zeros((size, 3)), "model_rms")
     except (pl.exceptions.PolarsError, TypeError, OSError) as problem:
         raise InputError(
             f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."

@@ -6,7 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from flexcal.calibration import Calibration, ErrorsBefore, ErrorStatistics, Verification
+from flexcal.calibration import (
+    Calibration,
+    ErrorCovariance,
+    ErrorsBefore,
+    ErrorStatistics,
+    Verification,
+)
 from flexcal.data import MultisinePlan, PoseSet
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
@@ -32,11 +38,11 @@ class TwoStageRun:
     `nominal` is the robot of the data sheet; `informed` what both stages start from, with the inertials `dynamics` that trajectories
     identified, where they did; `calibration.model` the calibrated one. `cad_alone` is what both stages find without these. `rigid` holds
     fits of the same robot without elasticity, the fairest one first; `rigid_verification` in the same order. Verifications on
-    `verification_poses` are against the noise-free truth; `measured_verification`, at the same poses, is against the instrument. `floor` is
-    the error that would remain with every parameter known, None of a robot that has other parameters than the model. `truth` maps
-    parameter names to SI values. `before` are the errors of the nominal robot at the calibration poses; `nominal_verification` is of the
-    same registered robot, and `own_verification` with the measured point found too. `results` is the document of results.json, `trust` the
-    verdict in it, `seconds` durations by stage.
+    `verification_poses` are against the noise-free truth; `measured_verification`, at the same poses, is against the instrument, with
+    `measured_covariance` as what is predicted of its errors. `floor` is the error that would remain with every parameter known, None of
+    a robot that has other parameters than the model. `truth` maps parameter names to SI values. `before` are the errors of the nominal
+    robot at the calibration poses; `nominal_verification` is of the same registered robot, and `own_verification` with the measured
+    point found too. `results` is the document of results.json, `trust` the verdict in it, `seconds` durations by stage.
     """
 
     nominal: RobotModel
@@ -53,6 +59,7 @@ class TwoStageRun:
     elastic_verification: Verification
     rigid_verification: tuple[Verification, ...]
     measured_verification: Verification
+    measured_covariance: ErrorCovariance
     floor: ErrorStatistics | None
     truth: Mapping[str, float]
     dynamics: Estimate | None = None

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -11,14 +11,16 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration import (
+    ErrorCovariance,
     ErrorsBefore,
     Refit,
     Refitted,
     Verification,
+    prediction_document,
     refitted,
     require_points,
     robot_before,
-    verify,
+    verify_jointly,
 )
 from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
@@ -29,6 +31,7 @@ from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_be
 from flexcal.report.trust import Trust
 from flexcal.report.verification import verification_checks
 from flexcal.units import MILLIMETRE
+from flexcal.workflow.calibrated_ranges import outside_ranges
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.point_files import write_arm, write_points
@@ -42,20 +45,23 @@ from flexcal.workflow.results import write_results
 class RobotVerification:
     """Errors of the calibrated robot `model` at `poses`, and `before` those of the uncalibrated one.
 
-    `refit` says what was fitted to these poses, None where nothing: then `result` has leave-one-out errors, and `as_calibrated` those
-    without. `better` has what would explain most of the errors placed again, None where nothing would. `uncalibrated` are points that
-    the calibration did not measure and that were not refitted. `fitted` are the files among them that the calibration was made from,
-    `provenance` all files with their hashes, `command` the command line, where there was one.
+    `covariance` is that of the errors, as predicted. `refit` says what was fitted to these poses, None where nothing: then `result` has
+    leave-one-out errors, and `as_calibrated` those without. `better` has what would explain most of the errors placed again, None where
+    nothing would. `uncalibrated` are points that the calibration did not measure and that were not refitted; `outside` says which poses
+    lie outside the joint ranges of the calibration. `fitted` are the files among them that the calibration was made from, `provenance`
+    all files with their hashes, `command` the command line, where there was one.
     """
 
     model: RobotModel
     poses: PoseSet
     result: Verification
+    covariance: ErrorCovariance
     before: ErrorsBefore
     refit: Refitted | None
     as_calibrated: Verification | None
     better: Refitted | None
     uncalibrated: tuple[str, ...]
+    outside: str
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
@@ -64,13 +70,16 @@ class RobotVerification:
     def points(self) -> MeasuredPoints:
         """The points with the errors before and after."""
         errors = errors_before(self.before) | {CALIBRATED: self.result.errors}
-        return MeasuredPoints(self.poses, errors, self.result.ambiguous, self.result.parameter_rms)
+        return MeasuredPoints(
+            self.poses, errors, self.result.ambiguous, self.result.parameter_rms, self.result.scatter_rms
+        )
 
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
         remarks = [
             *unused_columns(self.poses),
+            *([self.outside] if self.outside else []),
             *refit_remarks(self.result, self.poses, self.refit, self.better),
         ]
         if self.uncalibrated:
@@ -98,8 +107,8 @@ class RobotVerification:
     def _numbers(self) -> dict[str, Any]:
         """Everything but the verdict; `rms_mm` has the root mean square distances.
 
-        `parameters` is what the parameters' covariance predicts, `expected` with the measurement's sigma on top (null where the files give
-        none), `measured` what was found.
+        `parameters` is what the parameters' covariance predicts, `expected` with instrument, robot and model error on top (null where
+        neither instrument nor robot are known), `measured` what was found.
         """
         result = self.result
         measured = result.all.in_millimetres()
@@ -119,10 +128,11 @@ class RobotVerification:
             "refit_proposed": refit_document(self.better, len(self.poses)),
             "uncalibrated_points": list(self.uncalibrated),
             "rms_mm": {
-                "parameters": _rms(result.expected_rms()),
-                "expected": _rms(result.expected_rms(self.poses.sigma)) if self.poses.sigma_given else None,
+                "parameters": _rms(result.parameter_rms),
+                "expected": _rms(result.expected_rms) if self.covariance.independent is not None else None,
                 "measured": _rms(np.linalg.norm(result.errors, axis=1)),
             },
+            "prediction": prediction_document(result, self.covariance),
             "ambiguous_poses": int(result.ambiguous.sum()),
             "fitted": list(self.fitted),
             "remarks": list(self.remarks),
@@ -157,21 +167,21 @@ def verify_robot(
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
     fitted = fitted_files(calibrated, files)
     known = all(found_station(model, station) for station in poses.stations)
-    stands = verify(model, poses) if known else None
+    stands = verify_jointly(model, poses) if known else None
     anew = refitted(model, poses, refit) if refit else None
-    if anew is not None:
-        model, poses = anew.model, replace(poses, sigma=anew.noise)
-    found = stands if anew is None else anew.result
+    found = stands if anew is None else (anew.result, anew.covariance)
     assert found is not None
     result = RobotVerification(
-        model=model,
+        model=model if anew is None else anew.model,
         poses=poses,
-        result=found,
+        result=found[0],
+        covariance=found[1],
         before=before,
         refit=anew,
-        as_calibrated=stands if refit else None,
-        better=proposed_refit(model, poses, found) if anew is None else None,
+        as_calibrated=stands[0] if stands is not None and refit else None,
+        better=proposed_refit(model, poses, found[0]) if anew is None else None,
         uncalibrated=() if "point" in refit else unmeasured,
+        outside=outside_ranges(calibrated, poses.q),
         fitted=fitted,
         provenance=origin,
         command=command,

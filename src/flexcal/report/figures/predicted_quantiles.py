@@ -11,15 +11,15 @@ from flexcal.report.palette import AXIS, ELASTIC, INK
 from flexcal.units import MILLIMETRE
 
 
-def predicted_quantiles(verification: Verification, noise: np.ndarray | None = None) -> go.Figure:
-    """Quantiles of the observed distance against those predicted from the parameters' covariance, in millimetres.
+def predicted_quantiles(verification: Verification) -> go.Figure:
+    """Quantiles of the observed distance against those predicted from parameters and scatter, in millimetres.
 
-    `noise` (N, 3) m is 1σ of the instrument, where the points are measured ones. Poses with an uncertain flank are left out: the
+    Poses with an uncertain flank are left out: the
     covariance knows nothing of a wrong flank.
     """
     clear = ~verification.ambiguous
     observed = np.sort(np.linalg.norm(verification.errors[clear], axis=1)) / MILLIMETRE
-    expected = expected_quantiles(verification.expected_rms(noise)[clear]) / MILLIMETRE
+    expected = expected_quantiles(verification.expected_rms[clear]) / MILLIMETRE
     largest = 1.06 * max(float(observed.max(initial=1e-3)), float(expected.max(initial=1e-3)))
     figure = canvas(400)
     figure.add_trace(

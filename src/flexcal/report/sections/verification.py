@@ -56,9 +56,8 @@ def verification_section(study: TwoStageStudy) -> Section:
         FigureBlock(
             "figure-predicted",
             "Observed against predicted errors",
-            predicted_quantiles(elastic, study.noise),
-            "The covariance of the parameters and the stated noise of the tracker predict how large errors should be. Points on the dashed "
-            "line: the "
+            predicted_quantiles(elastic),
+            "Parameters, instrument, robot and model error predict how large errors should be. Points on the dashed line: the "
             "prediction was right. Above it: errors are larger than predicted. Below: smaller. Errors are correlated between poses, so "
             "all points may lie on one side by chance.",
             "Sorted observed errors against the quantiles predicted from the covariance of the parameters.",

@@ -1,0 +1,309 @@
+"""A fit of the geometry to measured points under one error model, and what its residuals say of that error model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.elastic_prior import ElasticPrior
+from flexcal.calibration.flanks import require_both_flanks
+from flexcal.calibration.geometry_fit import GeometryFit, PlainLoss
+from flexcal.calibration.marginal_fit import marginalised
+from flexcal.calibration.practical import Undetermined, undetermined
+from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.registration import register
+from flexcal.calibration.scatter import Scatter, error_cells, joint_turns, whitened
+from flexcal.calibration.structure import kinematic_identifiability, random_identifiability, require_enough
+from flexcal.calibration.terms import geometric_parameters
+from flexcal.calibration.variance_components import LinearFit
+from flexcal.data import PoseSet
+from flexcal.estimation import Estimate, Identifiability, Loss, Parameter, Parameters
+from flexcal.model import RobotModel
+from flexcal.model.names import SCATTER, unit_of
+
+_FLANK_PASSES = 4
+_FIRST_SCATTER = 1e-4
+"""Scatter (m) that a fit begins with: its size matters against priors only."""
+_CHI_MEDIAN = 2.366
+"""Median of chi-square with three degrees of freedom."""
+_SUSPICION = 1e-3
+"""Chance of suspecting an outlier where there is none."""
+_SLACK = 1.5
+"""By which the squared scatter of few points, taken from their median, may be too small."""
+
+_FREE_STIFFNESS = 0.3
+"""Relative 1σ by which every stiffness may differ from its prior while the scatter is estimated."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointFit:
+    """What a fit is made from: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`."""
+
+    start: RobotModel
+    poses: PoseSet
+    terms: tuple[str, ...]
+    geometric: Parameters
+    identifiability: Identifiability
+    structural: Identifiability
+    prior: ElasticPrior
+    elastic: bool
+    marginalised: bool
+    progress: Callable[[int, float], None] | None
+
+    @classmethod
+    def of(
+        cls,
+        model: RobotModel,
+        poses: PoseSet,
+        terms: tuple[str, ...],
+        prior: ElasticPrior,
+        elastic: bool,
+        *,
+        marginalised: bool,
+        progress: Callable[[int, float], None] | None,
+    ) -> PointFit:
+        """Raises `FlexcalError` for a backlash seen from one flank and for too few poses."""
+        bare = replace(model, station=np.zeros_like(model.station))
+        start = register(model, poses, predict(bare, poses, elastic=elastic).position)
+        if "backlash" in terms:
+            require_both_flanks(model, predict(start, poses, elastic=elastic).rest.flank)
+        geometric = geometric_parameters(start, poses, terms)
+        seen = kinematic_identifiability(start, poses, geometric)
+        require_enough(start, poses, geometric, seen)
+        structural = random_identifiability(start, poses, geometric, seen)
+        return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)
+
+    @property
+    def first_scatter(self) -> Scatter:
+        """The error model to begin with: what is stated, and what robots usually have."""
+        return Scatter(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
+
+    @property
+    def free(self) -> Parameters:
+        """Parameters that rank or a declared prior determine."""
+        kept = self.identifiability.kept_names
+        return Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
+
+    def solved(
+        self,
+        scatter: Scatter,
+        loss: Loss | PlainLoss,
+        near: FittedPoints | None = None,
+        *,
+        held: tuple[Undetermined, ...] = (),
+        spread: dict[str, float] | None = None,
+    ) -> FittedPoints:
+        """The fit under some scatter, from the solution `near`, repeated until the flanks are those of the robot that it finds.
+
+        `held` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components.
+        """
+        names = [item.name for item in held]
+        kept = Parameters(item for item in self.free if item.name not in names)
+        at = (
+            near.at
+            if near is not None
+            else predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
+        )
+        prior = self.prior
+        if near is not None:
+            kept = Parameters(
+                replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
+            )
+        whitening = scatter.weights(self.poses.sigma, joint_turns(at))
+        flank = at.rest.flank
+        for _ in range(_FLANK_PASSES):
+            task = GeometryFit(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
+            if self.marginalised and len(prior.parameters):
+                estimate = marginalised(task, progress=self.progress)
+            else:
+                estimate = task.reestimated(loss=loss, progress=self.progress)
+            fitted = self.start.with_values(estimate.values)
+            after = predict(fitted, self.poses, elastic=self.elastic, jacobians=True)
+            if (after.rest.flank == flank).all():
+                break
+            flank = after.rest.flank
+            if "backlash" in self.terms:
+                require_both_flanks(self.start, flank)
+        return FittedPoints(self, scatter, spread or {}, held, estimate, fitted, after, flank, task)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPoints:
+    """A solution: `estimate` of the parameters that move, the robot `model`, its prediction `at` the poses on `flank` (N, n)."""
+
+    fit: PointFit
+    scatter: Scatter
+    spread: dict[str, float]
+    held: tuple[Undetermined, ...]
+    estimate: Estimate
+    model: RobotModel
+    at: Prediction
+    flank: np.ndarray
+    task: GeometryFit
+
+    @cached_property
+    def residuals(self) -> np.ndarray:
+        """Measured minus predicted (N, 3), m."""
+        return self.fit.poses.position - self.at.position
+
+    @cached_property
+    def inliers(self) -> np.ndarray:
+        """(N,) rows that a robust loss did not set aside."""
+        return ~np.isin(np.arange(len(self.fit.poses)), self.estimate.outliers)
+
+    @cached_property
+    def linear(self) -> LinearFit:
+        """The fit linearised at its solution, without outliers.
+
+        Stiffness is nearly free there: an error of stage 1 must not pass for scatter of the robot, which would hide it.
+        """
+        estimate, prior, poses = self.estimate, self.fit.prior, self.fit.poses
+        elastic = prior.parameters.names
+        items = [estimate.parameters[name] for name in elastic]
+        moved = Parameters(items)
+        slopes = self.at.jacobian(elastic) * moved.natural_slope(moved.coordinates())
+        wide = [_FREE_STIFFNESS**2 if name.endswith(".stiffness") else 0.0 for name in elastic]
+        values, vectors = np.linalg.eigh(prior.covariance + np.diag(wide))
+        tied = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+        residual = self.residuals + slopes @ (moved.coordinates() - moved.prior_mean())
+        columns = self.at.jacobian(self.task.kept.names)
+        free = [not np.isfinite(p.prior_std) for p in self.task.kept]
+        known = np.array([p.prior_std for p in self.task.kept if np.isfinite(p.prior_std)])
+        shift = np.array([p.value for p in estimate.parameters.subset(self.task.kept.names)])
+        start = np.array([p.value if p.prior_mean is None else p.prior_mean for p in self.task.kept])
+        tied = np.concatenate([tied, columns[:, :, ~np.array(free)] * known], axis=2)
+        residual = residual + columns[:, :, ~np.array(free)] @ (shift - start)[~np.array(free)]
+        columns = columns[:, :, np.array(free)]
+        scale = np.linalg.norm(columns, axis=(0, 1))
+        rows = self.inliers
+        cells = tuple(None if c is None else c[rows] for c in error_cells(poses))
+        return LinearFit(
+            residual[rows],
+            columns[rows] / np.where(scale > 0, scale, 1.0),
+            tied[rows],
+            poses.sigma[rows],
+            joint_turns(self.at)[rows],
+            cells,
+        )
+
+    def estimated_scatter(self) -> tuple[Scatter, dict[str, float]]:
+        """Variance components of the residuals, and the standard deviation of each."""
+        return self.linear.scatter(stated=self.fit.poses.sigma_given)
+
+    def robust_scatter(self) -> Scatter:
+        """One scatter for all coordinates, from the median of the residuals' distances."""
+        rows = self.residuals.size
+        freedom = max(rows - self.fit.identifiability.rank, 1)
+        variance = float(np.median((self.residuals**2).sum(axis=1))) / _CHI_MEDIAN * rows / freedom
+        return Scatter(share=0.0, robot=float(np.sqrt(variance)))
+
+    def undetermined(self, scatter: Scatter) -> tuple[Undetermined, ...]:
+        """What the poses leave unknown under some scatter."""
+        fit = self.fit
+        kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
+        whitening = scatter.whitening(fit.poses.sigma, joint_turns(self.at))
+        return undetermined(fit.start, fit.poses, kept, whitening, fit.structural)
+
+    @property
+    def suspects_outliers(self) -> bool:
+        """Whether single points are farther off than the scatter of most others allows."""
+        from scipy.stats import chi2
+
+        whitening = self.scatter.whitening(self.fit.poses.sigma, joint_turns(self.at))
+        squares = (whitened(whitening, self.residuals).reshape(-1, 3) ** 2).sum(axis=1)
+        limit = float(chi2.isf(_SUSPICION / len(squares), 3)) * _SLACK
+        return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
+
+    @property
+    def poses(self) -> PoseSet:
+        """The poses; where they state no sigma, with that of the scatter."""
+        poses, scatter = self.fit.poses, self.scatter
+        if poses.sigma_given:
+            return poses
+        variances = np.diagonal(
+            replace(scatter, share=0.0).independent(poses.sigma, joint_turns(self.at)), axis1=1, axis2=2
+        )
+        return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
+
+    def whole_estimate(self) -> Estimate:
+        """All parameters: those that moved, those that were held with the uncertainty that this leaves, and the scatter."""
+        undetermined_names = [item.name for item in self.held]
+        dropped = tuple(d for d in self.fit.identifiability.dropped if d.name not in self.task.kept.names)
+        turns = [f"station.{s}.{key}" for s in self.fit.poses.stations for key in ("rx", "ry", "rz")]
+        names = dict.fromkeys([*undetermined_names, *(d.name for d in dropped)])
+        items = [self.fit.geometric[name] for name in names]
+        items += [Parameter(n, "rad", self.model.value(n)) for n in turns if n not in self.fit.geometric]
+        estimate, held = replace(self.estimate, covariance=self._covariance()), Parameters(items)
+        size, all_ = len(estimate.parameters), len(estimate.parameters) + len(held) + len(SCATTER)
+        covariance = np.zeros((all_, all_))
+        covariance[:size, :size] = estimate.covariance
+        count = len(undetermined_names)
+        if count:
+            gain = self._gain(undetermined_names)
+            sizes = np.array([item.size for item in self.held])
+            covariance[:size, :size] += (gain * sizes**2) @ gain.T
+            covariance[:size, size : size + count] = gain * sizes**2
+            covariance[size : size + count, :size] = (gain * sizes**2).T
+            covariance[range(size, size + count), range(size, size + count)] = sizes**2
+        scatter, known = self._scatter_parameters()
+        covariance[range(all_ - len(SCATTER), all_), range(all_ - len(SCATTER), all_)] = known**2
+        return replace(
+            estimate,
+            parameters=estimate.parameters + held + scatter,
+            covariance=covariance,
+            dropped=estimate.dropped + dropped,
+            identifiable=self._identifiable() + (False,) * len(held) + tuple(bool(k > 0) for k in known),
+        )
+
+    def _covariance(self) -> np.ndarray:
+        """Covariance (p, p) of the estimate under errors V that the weights V₀ take for independent and alike in all directions.
+
+        Σ + G (V - V₀) Gᵀ with the estimate's response G = Σ Aᵀ V₀⁻¹ to errors of the points; Σ has the prior in it.
+        """
+        estimate, scatter, task = self.estimate, self.scatter, self.task
+        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
+        own = task.columns(self.at, estimate.parameters.names) * slopes
+        respond = (estimate.covariance @ own.T).reshape(len(slopes), -1, 3)[:, self.inliers]
+        together = np.einsum(
+            "pni,nik->pk", respond, np.matmul(task.whitening, scatter.shared(self.fit.poses))[self.inliers]
+        )
+        single = scatter.independent(self.fit.poses.sigma, joint_turns(self.at))
+        beyond = np.matmul(np.matmul(task.whitening, single), np.swapaxes(task.whitening, 1, 2)) - np.eye(3)
+        spread = np.einsum("pni,nij,qnj->pq", respond, beyond[self.inliers], respond, optimize=True)
+        return estimate.covariance + spread + together @ together.T
+
+    def _gain(self, names: list[str]) -> np.ndarray:
+        """How the estimates (p, h) follow parameters that are held, per unit of these: -Σ Aᵀ A_h of the whitened columns."""
+        estimate = self.estimate
+        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
+        own = self.task.columns(self.at, estimate.parameters.names) * slopes
+        return -estimate.covariance @ own.T @ self.task.columns(self.at, tuple(names))
+
+    def _identifiable(self) -> tuple[bool, ...]:
+        """Those of the estimate, less what a declared prior alone determines."""
+        estimate = self.estimate
+        stds = np.sqrt(np.diag(estimate.covariance))
+        return tuple(
+            known and (p.name not in self.task.kept or bool(std < 0.8 * self.task.kept[p.name].prior_std))
+            for p, known, std in zip(estimate.parameters, estimate.identifiable, stds, strict=True)
+        )
+
+    def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:
+        scatter, spread = self.scatter, self.spread
+        instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma**2)))
+        values = (instrument, scatter.share, scatter.robot, scatter.angular, scatter.model)
+        parts = {key: getattr(scatter, key) for key in ("workspace", "order", "command")}
+        model_spread = np.sqrt(sum((parts[k] * spread.get(k, 0.0)) ** 2 for k in parts)) / max(
+            scatter.model, 1e-12
+        )
+        known = np.array(
+            [0.0, 0.0, spread.get("robot", 0.0), spread.get("angular", 0.0), float(model_spread)]
+        )
+        items = (
+            Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
+            for key, value in zip(SCATTER, values, strict=True)
+        )
+        return Parameters(items), known

@@ -1,0 +1,146 @@
+"""Covariance of what a fitted model does not predict of measured points: instrument, robot and model error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.folds import order_folds, workspace_folds
+from flexcal.calibration.prediction import Prediction
+from flexcal.data import PoseSet
+from flexcal.model import RobotModel
+
+_SMALLEST = 1e-6
+"""Standard deviation (m) that no instrument on an arm goes below: it stands beside priors where simulated points have no noise."""
+_SMALLEST_TURN = 1e-6
+"""The same of an angle (rad)."""
+_CELL_POSES, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
+"""Poses a block of the model error, and bounds on the number of blocks."""
+_SAME_COMMAND = 1e-4
+"""Joint positions (rad or m) closer than this are one command."""
+_FEWEST_REPEATED = 5
+"""Commands visited more than once that a variance between commands needs."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviations of the error components of measured points, each a coordinate (1σ).
+
+    `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, and
+    `angular` rad at every revolute joint: repeatability, independent from measurement to measurement; `workspace`, `order` and `command`
+    m: model error common to a cell of the workspace, to a stretch of the measuring order, and to all visits of one command.
+    """
+
+    share: float
+    robot: float
+    angular: float = 0.0
+    workspace: float = 0.0
+    order: float = 0.0
+    command: float = 0.0
+
+    @property
+    def model(self) -> float:
+        """Standard deviation of the model error of a coordinate, m."""
+        return float(np.sqrt(self.workspace**2 + self.order**2 + self.command**2))
+
+    def settled(self, before: Scatter, tolerance: float) -> bool:
+        """Whether every component is where it was, to a share `tolerance` of the whole."""
+        own, other = (np.array([s.robot, s.angular, s.workspace, s.order, s.command]) for s in (self, before))
+        size = np.array(
+            [
+                np.linalg.norm(own[[0, 2, 3, 4]]) + _SMALLEST,
+                own[1] + 1e-7,
+                *[np.linalg.norm(own[[0, 2, 3, 4]]) + _SMALLEST] * 3,
+            ]
+        )
+        return (
+            bool(np.all(np.abs(own - other) <= tolerance * size))
+            and abs(self.share - before.share) <= tolerance
+        )
+
+    def independent(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Covariance (N, 3, 3), m², of what is independent from measurement to measurement: instrument and repeatability.
+
+        `sigma` (N, 3) m is the stated one, `turns` (N, 3, r) m/rad how the revolute joints move the points.
+        """
+        diagonal = (self.share * sigma) ** 2 + self.robot**2 + _SMALLEST**2
+        return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
+
+    def whitening(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """W (N, 3, 3) 1/m with WᵀW the inverse of the sum of all variances of single measurements."""
+        whole = self.independent(sigma, turns) + self.model**2 * np.eye(3)
+        return np.linalg.inv(np.linalg.cholesky(whole))
+
+    def weights(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """The same (N, 3, 3) with the repeatability of the joints spread evenly over points and directions.
+
+        What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
+        """
+        even = replace(self, robot=self.evenly(turns), angular=0.0)
+        return even.whitening(sigma, turns)
+
+    def evenly(self, turns: np.ndarray) -> float:
+        """Standard deviation of a coordinate, m, from the robot's repeatability, root mean square over the points."""
+        turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
+        return float(np.sqrt(self.robot**2 + self.angular**2 * turned))
+
+    def shared(self, poses: PoseSet) -> np.ndarray:
+        """Columns (N, 3, k) m of the model error that several measurements have in common, each times a standard normal number."""
+        stds = (self.workspace, self.order, self.command)
+        columns = [
+            std * block_columns(labels)
+            for labels, std in zip(error_cells(poses), stds, strict=True)
+            if labels is not None and std > 0
+        ]
+        return np.concatenate([np.zeros((len(poses), 3, 0)), *columns], axis=2)
+
+
+def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """W (N, 3, 3) times `rows` (N, 3) or (N, 3, m), stacked: (3 N,) or (3 N, m)."""
+    if rows.ndim == 2:
+        return np.matmul(whitening, rows[:, :, None]).ravel()
+    return np.matmul(whitening, rows).reshape(3 * len(rows), rows.shape[2])
+
+
+def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
+    """What a calibration found of the errors of a robot's points; without a calibration the instrument alone where its sigma is `stated`.
+
+    A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
+    """
+    instrument, share, robot, angular, _ = model.scatter
+    if not model.scatter.any():
+        return Scatter(share=1.0, robot=0.0) if stated else None
+    if not stated:
+        share = 1.0 if instrument > 0 else 0.0
+    return Scatter(share=float(share), robot=float(robot), angular=float(angular))
+
+
+def error_cells(poses: PoseSet) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+    """Labels (N,) of the blocks that share a model error: cells of the workspace, stretches of the measuring order, commands.
+
+    None where there are too few poses, or too few commands that were visited again.
+    """
+    count = min(len(poses) // _CELL_POSES, _MOST_CELLS)
+    commands = np.unique(
+        np.column_stack([np.round(poses.q / _SAME_COMMAND), np.unique(poses.target, return_inverse=True)[1]]),
+        axis=0,
+        return_inverse=True,
+    )[1].ravel()
+    repeated = int((np.bincount(commands) > 1).sum())
+    visits = commands if repeated >= _FEWEST_REPEATED else None
+    if count < _FEWEST_CELLS:
+        return None, None, visits
+    return workspace_folds(poses.position, count), order_folds(len(poses), count), visits
+
+
+def block_columns(labels: np.ndarray) -> np.ndarray:
+    """Columns (N, 3, 3 K) of an error that is common to each of K blocks."""
+    rows = (labels[:, None] == np.unique(labels)[None]).astype(float)
+    return np.kron(rows, np.eye(3)).reshape(len(labels), 3, -1)
+
+
+def joint_turns(at: Prediction) -> np.ndarray:
+    """How every revolute joint, turned by one radian, moves the points: (N, 3, r), m/rad, in the instrument's frame."""
+    joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
+    return at.jacobian([f"{joint.name}.offset" for joint in joints])
