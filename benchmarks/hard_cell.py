@@ -20,11 +20,11 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import Verification, calibrate, verify
+from flexcal.calibration import calibrate, verify
 from flexcal.cell import CellConfig, VirtualCell
 from flexcal.data import PosePlan
 from flexcal.hard_cell import HardCell
-from flexcal.report.checks import BOUND_95, CHANCE
+from flexcal.report.checks import CHANCE
 from flexcal.workflow.two_stage import run_two_stage
 from flexcal.yaml_reader import read_yaml
 
@@ -70,7 +70,7 @@ def one_seed(seed: int) -> Judged:
     with tempfile.TemporaryDirectory() as folder:
         run = run_two_stage(ROBOT, Path(folder), seed=seed, cell="hard", report=False)
     robot = HardCell.drawn(ROBOT, seed).robot
-    inside, ratio = compared(run.measured_verification, run.verification_poses.sigma)
+    prediction = run.results["prediction"]
     estimate, verification = run.stiffness.estimate, run.results["verification"]
     names = [name for name in estimate.parameters.names if name in run.truth and name.endswith(".stiffness")]
     intervals = [(estimate.interval(name), run.truth[name]) for name in names]
@@ -80,8 +80,8 @@ def one_seed(seed: int) -> Judged:
         bearings="before" if robot.bearings_before else "after",
         sigma_factor=robot.sigma_factor,
         repeatability_mm=1e3 * robot.repeatability,
-        inside=inside,
-        ratio=ratio,
+        inside=prediction["inside_95_percent"],
+        ratio=prediction["ratio"],
         trusted=run.results["verdict"]["trusted"],
         reasons=tuple(run.results["verdict"]["reasons"]),
         measured=verification["measured"],
@@ -92,14 +92,6 @@ def one_seed(seed: int) -> Judged:
         chi2=(estimate.reduced_chi2, run.calibration.estimate.reduced_chi2),
         seconds=run.results["seconds"]["total"],
     )
-
-
-def compared(verification: Verification, noise: np.ndarray) -> tuple[float, float]:
-    """Share of measured points inside their 95 % bounds, and observed over predicted root mean square; `noise` (N, 3) m as stated."""
-    expected = verification.expected_rms(noise)
-    size = np.linalg.norm(verification.errors, axis=1)
-    inside = float((size < BOUND_95 * expected).mean())
-    return inside, float(np.sqrt((size**2).mean() / (expected**2).mean()))
 
 
 def table(runs: list[Judged]) -> str:

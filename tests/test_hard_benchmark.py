@@ -4,21 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
-from benchmarks.hard_cell import Judged, compared, table
-from flexcal.calibration import Verification
-
-
-def test_points_of_the_predicted_size_are_inside_in_95_percent(rng: np.random.Generator) -> None:
-    noise = np.full((20000, 3), 3e-5)
-    rms = np.full(20000, 4e-5)
-    errors = np.sqrt(rms**2 / 3 + noise[:, 0] ** 2)[:, None] * rng.normal(size=noise.shape)
-    verification = Verification(np.zeros_like(errors), errors, rms, np.zeros(20000, dtype=bool))
-    inside, ratio = compared(verification, noise)
-    assert abs(inside - 0.95) < 0.005 and abs(ratio - 1) < 0.01
-    inside, ratio = compared(replace(verification, errors=2 * errors), noise)
-    assert inside < 0.6 and abs(ratio - 2) < 0.02
+from benchmarks.hard_cell import Judged, table
 
 
 def test_only_a_trusted_robot_can_be_confidently_wrong() -> None:

@@ -15,7 +15,7 @@ TRIED = {
     ("ca",): {"calibrate"},
     ("design", ""): {"trajectory", "frequency", "poses"},
     ("design", "poses", "--c"): {"--count", "--criterion", "--candidates"},
-    ("calibrate", "robot.yaml", "poses.csv", "--loss", ""): {"squares", "huber", "cauchy"},
+    ("calibrate", "robot.yaml", "poses.csv", "--loss", ""): {"auto", "squares", "huber", "cauchy"},
     ("completion", "z"): {"zsh"},
 }
 

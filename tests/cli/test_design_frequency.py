@@ -38,7 +38,7 @@ def test_a_designed_plan_says_what_it_will_tell(run, tx90l_folder):
     assert largest["std"] == max(std for name, std in predicted.items() if name.endswith("stiffness"))
     assert [row["poses"] for row in document["curve"]] == [1, 2, 3, 4, 5, 6]
     page = out.with_suffix(".html").read_text(encoding="utf-8")
-    assert "How many poses are enough" in page and "Amplitude spectrum" in page
+    assert "Number of poses" in page and "Amplitude spectrum" in page
 
 
 def test_given_poses_have_a_prediction_too(run, tx90l_folder):

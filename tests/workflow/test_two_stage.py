@@ -119,7 +119,8 @@ def test_the_table_says_what_the_results_say(demo: Path) -> None:
     kinds = ("nominal", "own", "elastic", "rigid")
     points = [f"{kind}_{axis}" for kind in kinds for axis in "xyz"]
     seen = [f"{what}_{axis}" for what in ("measured", "sigma") for axis in "xyz"]
-    assert table.columns == ["pose", *joints, "x", "y", "z", *seen, *points, "parameter_rms", "unambiguous"]
+    rms = ("parameter_rms", "scatter_rms", "model_rms")
+    assert table.columns == ["pose", *joints, "x", "y", "z", *seen, *points, *rms, "unambiguous"]
     document = json.loads((demo / "results.json").read_text())["verification"]
     for kind in kinds:
         errors = (

@@ -17,10 +17,11 @@ from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.registration import register
 from flexcal.calibration.scatter import Scatter, error_cells, joint_turns, whitened
 from flexcal.calibration.structure import kinematic_identifiability, random_identifiability, require_enough
-from flexcal.calibration.terms import geometric_parameters
+from flexcal.calibration.terms import geometric_parameters, plausible_size, tolerances
 from flexcal.calibration.variance_components import LinearFit
 from flexcal.data import PoseSet
 from flexcal.estimation import Estimate, Identifiability, Loss, Parameter, Parameters
+from flexcal.estimation.identifiability import RANK_TOLERANCE
 from flexcal.model import RobotModel
 from flexcal.model.names import SCATTER, unit_of
 
@@ -74,6 +75,12 @@ class PointFit:
         seen = kinematic_identifiability(start, poses, geometric)
         require_enough(start, poses, geometric, seen)
         structural = random_identifiability(start, poses, geometric, seen)
+        if structural.rank > seen.rank:
+            # these poses hide something: what may be off most, as the place of the instrument, is to take it up
+            sizes = np.array([plausible_size(start, name) for name in geometric.names])
+            sizes = np.where(np.isfinite(sizes), sizes, tolerances(geometric))
+            seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
+            structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)
 
     @property
@@ -179,10 +186,13 @@ class FittedPoints:
         columns = columns[:, :, np.array(free)]
         scale = np.linalg.norm(columns, axis=(0, 1))
         rows = self.inliers
+        flat = (columns / np.where(scale > 0, scale, 1.0))[rows].reshape(3 * int(rows.sum()), -1)
+        basis, sizes, _ = np.linalg.svd(flat, full_matrices=False)
+        basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
         cells = tuple(None if c is None else c[rows] for c in error_cells(poses))
         return LinearFit(
             residual[rows],
-            columns[rows] / np.where(scale > 0, scale, 1.0),
+            basis.reshape(int(rows.sum()), 3, -1),
             tied[rows],
             poses.sigma[rows],
             joint_turns(self.at)[rows],

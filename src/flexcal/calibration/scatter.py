@@ -33,7 +33,7 @@ class Scatter:
     """
 
     share: float
-    robot: float
+    robot: float = 0.0
     angular: float = 0.0
     workspace: float = 0.0
     order: float = 0.0

@@ -18,23 +18,43 @@ _RANDOM_POSES = 100
 
 
 def kinematic_identifiability(
-    model: RobotModel, poses: PoseSet, parameters: Parameters, *, prefer: Sequence[str] = ()
+    model: RobotModel,
+    poses: PoseSet,
+    parameters: Parameters,
+    *,
+    scale: np.ndarray | None = None,
+    prefer: Sequence[str] = (),
 ) -> Identifiability:
-    """Rank at zero deflection with both flanks as they are: exact derivatives leave a gap of many decades (METHODS)."""
+    """Rank at zero deflection with both flanks as they are: exact derivatives leave a gap of many decades.
+
+    `scale` (p,) is the size of a change that matters, tolerances of manufacture by default: larger columns are kept first.
+    """
     straight = predict(model, poses, elastic=False, jacobians=True)
     columns = straight.jacobian(parameters.names).reshape(-1, len(parameters))
     preferred = [name for name in parameters.names if name.endswith("backlash")]
-    return analyse(columns, parameters.names, scale=tolerances(parameters), prefer=[*preferred, *prefer])
+    return analyse(
+        columns,
+        parameters.names,
+        scale=tolerances(parameters) if scale is None else scale,
+        prefer=[*preferred, *prefer],
+    )
 
 
 def random_identifiability(
-    model: RobotModel, poses: PoseSet, parameters: Parameters, seen: Identifiability
+    model: RobotModel,
+    poses: PoseSet,
+    parameters: Parameters,
+    seen: Identifiability,
+    *,
+    scale: np.ndarray | None = None,
 ) -> Identifiability:
     """The same on random poses of the whole joint ranges, the parameters that `seen` keeps tried first."""
     limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.joints])
     many = poses.subset(np.resize(np.arange(len(poses)), _RANDOM_POSES))
     spread = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], many.q.shape)
-    return kinematic_identifiability(model, replace(many, q=spread), parameters, prefer=seen.kept_names)
+    return kinematic_identifiability(
+        model, replace(many, q=spread), parameters, scale=scale, prefer=seen.kept_names
+    )
 
 
 def require_enough(model: RobotModel, poses: PoseSet, parameters: Parameters, found: Identifiability) -> None:

@@ -13,6 +13,8 @@ _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
 _SUPPORTED = 2.7
 """Gain in log-likelihood by which a component counts as found (p = 0.01, one variance at its bound of zero)."""
+_LARGEST = 30.0
+"""Variance over that about the fit, which no component exceeds."""
 _NEGLIGIBLE = 1e-4
 """Share of the total variance below which a component is zero."""
 
@@ -74,13 +76,16 @@ class LinearFit:
         scale = np.array([total / lever if name == "angular" else total for name in names])
         share = 1.0 if stated else 0.0
         variances, likelihood = self._maximum(names, scale, share)
-        scattering = variances > _NEGLIGIBLE * scale
-        if stated and not scattering[:2].any():
-            # nothing of the robot beside the stated sigma: it may be too large
-            fewer, sizes = ["robot", *names[2:], "share"], np.array([scale[0], *scale[2:], 1.0])
-            narrower, gained = self._maximum(fewer, sizes, None)
-            if gained - likelihood > _CLEAR_GAIN and narrower[-1] < 1:
-                names, scale, likelihood = fewer[:-1], sizes[:-1], gained
+        stated_square = float(np.mean(self.sigma**2))
+        if stated and total < stated_square:
+            # the points scatter less than the instrument alone should: its sigma may be too large
+            sizes = np.append(scale[2:], total / stated_square)
+            alone = self._maximum([*names[2:], "share"], sizes, None)[1]
+            if alone - likelihood > _CLEAR_GAIN:
+                names = ["robot", *names[2:]]
+                scale = np.append(scale[0], scale[2:])
+                sizes = np.append(scale, total / stated_square)
+                narrower, likelihood = self._maximum([*names, "share"], sizes, None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
         while len(names) > 1:
             # the component that the data support least, taken out while that costs less than chance would gain
@@ -113,9 +118,9 @@ class LinearFit:
             return value, slope * scale
 
         start = np.full(len(names), 0.7 / len(names))
-        bounds: list[tuple[float, float | None]] = [(1e-9, None)] * len(names)
+        bounds = [(1e-9, _LARGEST)] * len(names)
         if share is None:
-            start[-1], bounds[-1] = 0.5, (1e-12, 1.0)
+            start[-1], bounds[-1] = 0.5, (1e-6, min(1.0 / float(scale[-1]), _LARGEST))
         found = minimize(
             objective, start, jac=True, method="L-BFGS-B", bounds=bounds, options={"maxiter": 100}
         )
