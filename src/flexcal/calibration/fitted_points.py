@@ -89,6 +89,13 @@ class PointFit:
         return Scatter(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
 
     @property
+    def hidden(self) -> tuple[str, ...]:
+        """Parameters that random poses would determine and these do not, and that no declared prior does."""
+        seen = self.identifiability.kept_names
+        declared = [p.name for p in self.geometric if np.isfinite(p.prior_std)]
+        return tuple(name for name in self.structural.kept_names if name not in (*seen, *declared))
+
+    @property
     def free(self) -> Parameters:
         """Parameters that rank or a declared prior determine."""
         kept = self.identifiability.kept_names
@@ -215,7 +222,7 @@ class FittedPoints:
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
         whitening = scatter.whitening(fit.poses.sigma, joint_turns(self.at))
-        return undetermined(fit.start, fit.poses, kept, whitening, fit.structural)
+        return undetermined(fit.start, fit.poses, kept, whitening, fit.hidden)
 
     @property
     def suspects_outliers(self) -> bool:

@@ -10,7 +10,7 @@ from flexcal.calibration.prediction import predict
 from flexcal.calibration.scatter import whitened
 from flexcal.calibration.terms import plausible_size
 from flexcal.data import PoseSet
-from flexcal.estimation import Identifiability, Parameters, analyse
+from flexcal.estimation import Parameters, analyse
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.units import MILLIMETRE
 
@@ -32,13 +32,13 @@ class Undetermined:
 
 
 def undetermined(
-    start: RobotModel, poses: PoseSet, kept: Parameters, whitening: np.ndarray, structural: Identifiability
+    start: RobotModel, poses: PoseSet, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
 ) -> tuple[Undetermined, ...]:
     """Parameters whose standard deviation from the data alone exceeds their plausible size.
 
     Judged on the kinematic Jacobian at the nominal robot, weighed by W (N, 3, 3): what is seen only because the errors themselves, once
-    estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses; what random poses would
-    determine (`structural`) and these do not is undetermined too.
+    estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses; those that are
+    `hidden`, which random poses would determine and these do not, are undetermined too.
     """
     at = predict(start, poses, elastic=False, jacobians=True)
     sizes = np.array([plausible_size(start, name) for name in kept.names])
@@ -48,7 +48,7 @@ def undetermined(
     largest = np.linalg.norm(columns * scale, axis=0).max()
     found = analyse(columns, kept.names, scale=scale, prefer=preferred, tolerance=1 / max(largest, 1.0))
     lost = [item.name for item in found.dropped]
-    lost += [name for name in structural.kept_names if name not in kept.names]
+    lost += hidden
     partners = {item.name: item.absorbed_by for item in found.dropped}
     return tuple(
         Undetermined(name, plausible_size(start, name), _cause(start, poses, name, partners.get(name, ())))
