@@ -91,6 +91,9 @@ def test_calibration_report_is_complete(
         assert words in outline.words
     assert fit.estimate.provenance["input.some.csv"] in outline.words and COMMAND in outline.words
     assert "Are the residuals noise of instrument and robot?" in outline.words
+    assert (
+        "Uncertainty budget of a measured coordinate" in outline.words and "in the robot's" in outline.words
+    )
     assert all(name in outline.words for name in fit.selected.identifiability.kept_names)
 
 

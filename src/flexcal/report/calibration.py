@@ -20,6 +20,7 @@ from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, stat
 from flexcal.report.page import Check, Page, Section, Table, Text, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.responses_check import check_misfit, read_misfit
+from flexcal.report.sections.budget import budget_table
 from flexcal.report.sections.geometry import arm_figure, error_figures
 from flexcal.report.sections.identifiability import Determined, identifiability_blocks
 from flexcal.report.sections.parameters import parameter_figures, parameter_table
@@ -174,6 +175,7 @@ def _accuracy_section(study: CalibrationStudy) -> Section:
         (
             table,
             *([Text((), "Remarks", sentences(remarks))] if remarks else []),
+            budget_table(study.results["variances"]),
             arm_figure(study.arms, len(points.poses)),
             *(() if before is None else error_figures(points.poses, before, points.calibrated)),
         ),

@@ -12,6 +12,7 @@ from flexcal.report.figures.error_histogram import error_histogram
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, ArmPoses
 from flexcal.report.notation import millimetres
 from flexcal.report.page import FigureBlock, Section, Selector, Slider
+from flexcal.report.sections.budget import budget_table
 from flexcal.report.sections.identifiability import identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
 from flexcal.report.study import TwoStageStudy
@@ -40,6 +41,7 @@ def geometry_section(study: TwoStageStudy) -> Section:
             arm_figure(study.arms, len(poses)),
             *([] if before is None else [error_figure(poses, before, after)]),
             component_figure(poses, after),
+            budget_table(study.results["variances"]),
             *identifiability_blocks(study.determined, study.paper),
             parameter_table(study.geometry, study.kept, study.truth),
         ),
