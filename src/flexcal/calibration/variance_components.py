@@ -87,20 +87,31 @@ class LinearFit:
                 sizes = np.append(scale, total / stated_square)
                 narrower, likelihood = self._maximum([*names, "share"], sizes, None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
-        while len(names) > 1:
-            # the component that the data support least, taken out while that costs less than chance would gain
-            trials = []
-            for k in range(1, len(names)):
-                rest = [i for i in range(len(names)) if i != k]
-                trials.append((*self._maximum([names[i] for i in rest], scale[rest], share)[::-1], rest))
-            best, kept, rest = max(trials, key=lambda trial: trial[0])
-            if likelihood - best > _SUPPORTED:
-                break
-            names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
+        names, scale, variances = self._supported(names, scale, variances, likelihood, share)
         variances = np.where(variances > _NEGLIGIBLE * scale, variances, 0.0)
         stds = dict(zip(names, np.sqrt(variances).tolist(), strict=True))
         found = Scatter(share=share, **stds)
         return found, self._uncertainties(names, variances, share)
+
+    def _supported(
+        self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
+    ) -> tuple[list[str], np.ndarray, np.ndarray]:
+        """The components that the data support: the others are taken out one by one while that costs no more than chance gains."""
+        seen = [k for k in range(len(names)) if k == 0 or variances[k] > _NEGLIGIBLE * scale[k]]
+        names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
+        while len(names) > 1:
+            trials = []
+            for k in range(1, len(names)):
+                rest = [i for i in range(len(names)) if i != k]
+                near = variances[rest] / scale[rest]
+                near[0] += variances[k] / scale[k] / 2
+                found = self._maximum([names[i] for i in rest], scale[rest], share, near)
+                trials.append((found[1], found[0], rest))
+            best, kept, rest = max(trials, key=lambda trial: trial[0])
+            if likelihood - best > _SUPPORTED:
+                break
+            names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
+        return names, scale, variances
 
     def _mean_square(self) -> float:
         """Variance of a coordinate about the fit, m²; the parameters take their degrees of freedom."""
@@ -109,15 +120,20 @@ class LinearFit:
         left = self.residual.ravel() - basis @ (basis.T @ self.residual.ravel())
         return float(left @ left) / max(rows - size, 1) + 1e-24
 
-    def _maximum(self, names: list[str], scale: np.ndarray, share: float | None) -> tuple[np.ndarray, float]:
-        """Variances (k,) of the greatest restricted likelihood, and its logarithm; `share` None: it is the last of the variances."""
+    def _maximum(
+        self, names: list[str], scale: np.ndarray, share: float | None, near: np.ndarray | None = None
+    ) -> tuple[np.ndarray, float]:
+        """Variances (k,) of the greatest restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
+
+        `near` (k,) is where to begin, in units of `scale`.
+        """
         from scipy.optimize import minimize
 
         def objective(x: np.ndarray) -> tuple[float, np.ndarray]:
             value, slope = self._deviance(names, x * scale, share)
             return value, slope * scale
 
-        start = np.full(len(names), 0.7 / len(names))
+        start = np.full(len(names), 0.7 / len(names)) if near is None else np.clip(near, 1e-9, _LARGEST)
         bounds = [(1e-9, _LARGEST)] * len(names)
         if share is None:
             start[-1], bounds[-1] = 0.5, (1e-6, min(1.0 / float(scale[-1]), _LARGEST))
