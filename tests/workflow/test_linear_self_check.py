@@ -65,6 +65,7 @@ def test_nine_stiffnesses_and_the_delay(
         assert abs(fit.values[f"{joint}.delay"] - samples / RATE_HZ) < 0.01 / RATE_HZ
 
 
+@pytest.mark.slow
 def test_nine_stiffnesses_from_one_realisation_that_starts_at_rest(
     tx90l: RobotModel, linear: tuple[dict[str, float], MultisinePlan, list[Recording]]
 ) -> None:
