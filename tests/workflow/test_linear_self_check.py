@@ -47,7 +47,7 @@ def late(recordings: list[Recording], samples: int) -> list[Recording]:
     return [replace(r, q=np.roll(r.q, samples, axis=0)) for r in recordings]
 
 
-@pytest.mark.parametrize("samples", [0, 1])
+@pytest.mark.parametrize("samples", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_nine_stiffnesses_and_the_delay(
     tx90l: RobotModel, linear: tuple[dict[str, float], MultisinePlan, list[Recording]], samples: int
 ) -> None:
