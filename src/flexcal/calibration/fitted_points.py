@@ -116,21 +116,19 @@ class PointFit:
         """
         names = [item.name for item in held]
         kept = Parameters(item for item in self.free if item.name not in names)
-        at = (
-            near.at
-            if near is not None
-            else predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
-        )
-        prior = self.prior
-        if near is not None:
+        if near is None:
+            at = predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
+            turns = joint_turns(at)
+        else:
+            at, turns = near.at, near.turns
             kept = Parameters(
                 replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
             )
-        whitening = scatter.weights(self.poses.sigma, joint_turns(at))
+        whitening = scatter.weights(self.poses.sigma, turns)
         flank = at.rest.flank
         for _ in range(_FLANK_PASSES):
-            task = GeometryFit(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
-            if self.marginalised and len(prior.parameters):
+            task = GeometryFit(self.start, self.poses, kept, self.prior, flank, self.elastic, whitening)
+            if self.marginalised and len(self.prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
             else:
                 estimate = task.reestimated(loss=loss, progress=self.progress)
@@ -164,6 +162,11 @@ class FittedPoints:
         return self.fit.poses.position - self.at.position
 
     @cached_property
+    def turns(self) -> np.ndarray:
+        """How every revolute joint moves the points (N, 3, r), m/rad."""
+        return joint_turns(self.at)
+
+    @cached_property
     def inliers(self) -> np.ndarray:
         """(N,) rows that a robust loss did not set aside."""
         return ~np.isin(np.arange(len(self.fit.poses)), self.estimate.outliers)
@@ -184,13 +187,12 @@ class FittedPoints:
         tied = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         residual = self.residuals + slopes @ (moved.coordinates() - moved.prior_mean())
         columns = self.at.jacobian(self.task.kept.names)
-        free = [not np.isfinite(p.prior_std) for p in self.task.kept]
-        known = np.array([p.prior_std for p in self.task.kept if np.isfinite(p.prior_std)])
-        shift = np.array([p.value for p in estimate.parameters.subset(self.task.kept.names)])
-        start = np.array([p.value if p.prior_mean is None else p.prior_mean for p in self.task.kept])
-        tied = np.concatenate([tied, columns[:, :, ~np.array(free)] * known], axis=2)
-        residual = residual + columns[:, :, ~np.array(free)] @ (shift - start)[~np.array(free)]
-        columns = columns[:, :, np.array(free)]
+        free = ~np.isfinite(self.task.kept.prior_std())
+        known = self.task.kept.prior_std()[~free]
+        shift = estimate.parameters.subset(self.task.kept.names).coordinates() - self.task.kept.prior_mean()
+        tied = np.concatenate([tied, columns[:, :, ~free] * known], axis=2)
+        residual = residual + columns[:, :, ~free] @ shift[~free]
+        columns = columns[:, :, free]
         scale = np.linalg.norm(columns, axis=(0, 1))
         rows = self.inliers
         flat = (columns / np.where(scale > 0, scale, 1.0))[rows].reshape(3 * int(rows.sum()), -1)
@@ -202,7 +204,7 @@ class FittedPoints:
             basis.reshape(int(rows.sum()), 3, -1),
             tied[rows],
             poses.sigma[rows],
-            joint_turns(self.at)[rows],
+            self.turns[rows],
             cells,
         )
 
@@ -221,7 +223,7 @@ class FittedPoints:
         """What the poses leave unknown under some scatter."""
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
-        whitening = scatter.whitening(fit.poses.sigma, joint_turns(self.at))
+        whitening = scatter.whitening(fit.poses.sigma, self.turns)
         return undetermined(fit.start, fit.poses, kept, whitening, fit.hidden)
 
     @property
@@ -229,7 +231,7 @@ class FittedPoints:
         """Whether single points are farther off than the scatter of most others allows."""
         from scipy.stats import chi2
 
-        whitening = self.scatter.whitening(self.fit.poses.sigma, joint_turns(self.at))
+        whitening = self.scatter.whitening(self.fit.poses.sigma, self.turns)
         squares = (whitened(whitening, self.residuals).reshape(-1, 3) ** 2).sum(axis=1)
         limit = float(chi2.isf(_SUSPICION / len(squares), 3)) * _SLACK
         return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
@@ -241,7 +243,7 @@ class FittedPoints:
         if poses.sigma_given:
             return poses
         variances = np.diagonal(
-            replace(scatter, share=0.0).independent(poses.sigma, joint_turns(self.at)), axis1=1, axis2=2
+            replace(scatter, share=0.0).independent(poses.sigma, self.turns), axis1=1, axis2=2
         )
         return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
 
@@ -284,10 +286,9 @@ class FittedPoints:
         slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
         own = task.columns(self.at, estimate.parameters.names) * slopes
         respond = (estimate.covariance @ own.T).reshape(len(slopes), -1, 3)[:, self.inliers]
-        together = np.einsum(
-            "pni,nik->pk", respond, np.matmul(task.whitening, scatter.shared(self.fit.poses))[self.inliers]
-        )
-        single = scatter.independent(self.fit.poses.sigma, joint_turns(self.at))
+        shared = scatter.shared(error_cells(self.fit.poses), len(self.fit.poses))
+        together = np.einsum("pni,nik->pk", respond, np.matmul(task.whitening, shared)[self.inliers])
+        single = scatter.independent(self.fit.poses.sigma, self.turns)
         beyond = np.matmul(np.matmul(task.whitening, single), np.swapaxes(task.whitening, 1, 2)) - np.eye(3)
         spread = np.einsum("pni,nij,qnj->pq", respond, beyond[self.inliers], respond, optimize=True)
         return estimate.covariance + spread + together @ together.T

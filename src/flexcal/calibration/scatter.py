@@ -13,14 +13,17 @@ from flexcal.model import RobotModel
 
 _SMALLEST = 1e-6
 """Standard deviation (m) that no instrument on an arm goes below: it stands beside priors where simulated points have no noise."""
-_SMALLEST_TURN = 1e-6
-"""The same of an angle (rad)."""
+_SMALLEST_TURN = 1e-7
+"""Angle (rad) beside which a change of the repeatability of the joints is judged."""
 _CELL_POSES, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
 """Poses a block of the model error, and bounds on the number of blocks."""
 _SAME_COMMAND = 1e-4
 """Joint positions (rad or m) closer than this are one command."""
 _FEWEST_REPEATED = 5
 """Commands visited more than once that a variance between commands needs."""
+
+ErrorCells = tuple[np.ndarray | None, ...]
+"""Labels (N,) of the blocks that share a model error, as `error_cells` gives them."""
 
 
 @dataclass(frozen=True)
@@ -46,18 +49,10 @@ class Scatter:
 
     def settled(self, before: Scatter, tolerance: float) -> bool:
         """Whether every component is where it was, to a share `tolerance` of the whole."""
-        own, other = (np.array([s.robot, s.angular, s.workspace, s.order, s.command]) for s in (self, before))
-        size = np.array(
-            [
-                np.linalg.norm(own[[0, 2, 3, 4]]) + _SMALLEST,
-                own[1] + 1e-7,
-                *[np.linalg.norm(own[[0, 2, 3, 4]]) + _SMALLEST] * 3,
-            ]
-        )
-        return (
-            bool(np.all(np.abs(own - other) <= tolerance * size))
-            and abs(self.share - before.share) <= tolerance
-        )
+        own, other = (np.array([s.robot, s.workspace, s.order, s.command]) for s in (self, before))
+        same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
+        turned = abs(self.angular - before.angular) <= tolerance * (self.angular + _SMALLEST_TURN)
+        return bool(same) and turned and abs(self.share - before.share) <= tolerance
 
     def independent(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Covariance (N, 3, 3), m², of what is independent from measurement to measurement: instrument and repeatability.
@@ -85,15 +80,15 @@ class Scatter:
         turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
         return float(np.sqrt(self.robot**2 + self.angular**2 * turned))
 
-    def shared(self, poses: PoseSet) -> np.ndarray:
-        """Columns (N, 3, k) m of the model error that several measurements have in common, each times a standard normal number."""
+    def shared(self, cells: ErrorCells, count: int) -> np.ndarray:
+        """Columns (N, 3, k) m of the model error that some of `count` measurements share, each times a standard normal number."""
         stds = (self.workspace, self.order, self.command)
         columns = [
             std * block_columns(labels)
-            for labels, std in zip(error_cells(poses), stds, strict=True)
+            for labels, std in zip(cells, stds, strict=True)
             if labels is not None and std > 0
         ]
-        return np.concatenate([np.zeros((len(poses), 3, 0)), *columns], axis=2)
+        return np.concatenate([np.zeros((count, 3, 0)), *columns], axis=2)
 
 
 def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -116,7 +111,7 @@ def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
     return Scatter(share=float(share), robot=float(robot), angular=float(angular))
 
 
-def error_cells(poses: PoseSet) -> tuple[np.ndarray | None, np.ndarray | None, np.ndarray | None]:
+def error_cells(poses: PoseSet) -> ErrorCells:
     """Labels (N,) of the blocks that share a model error: cells of the workspace, stretches of the measuring order, commands.
 
     None where there are too few poses, or too few commands that were visited again.

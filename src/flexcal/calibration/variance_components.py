@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.scatter import Scatter, block_columns
+from flexcal.calibration.scatter import ErrorCells, Scatter
 
 _CLEAR_GAIN = 3.0
 """Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
@@ -32,7 +32,7 @@ class LinearFit:
     tied: np.ndarray
     sigma: np.ndarray
     turns: np.ndarray
-    cells: tuple[np.ndarray | None, ...]
+    cells: ErrorCells
 
     def projected(self, scatter: Scatter, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Whitened residual (m,) and further `columns` (N, 3, k) as (m, k), without what parameters and shared errors explain.
@@ -40,7 +40,7 @@ class LinearFit:
         Their scalar products are those under the marginal covariance of the residual, the `tied` numbers integrated out.
         """
         whitening = np.linalg.inv(np.linalg.cholesky(scatter.independent(self.sigma, self.turns)))
-        tied = np.concatenate([self.tied, *self.effects(scatter)], axis=2)
+        tied = np.concatenate([self.tied, scatter.shared(self.cells, len(self.residual))], axis=2)
         both = np.concatenate([self.free, tied, self.residual[:, :, None], columns], axis=2)
         size, count = self.free.shape[2], tied.shape[2]
         white = np.matmul(whitening, both).reshape(3 * len(both), both.shape[2])
@@ -50,15 +50,6 @@ class LinearFit:
         basis = np.linalg.qr(stacked[:, : size + count])[0]
         left = stacked[:, size + count :] - basis @ (basis.T @ stacked[:, size + count :])
         return left[:, 0], left[:, 1:]
-
-    def effects(self, scatter: Scatter) -> list[np.ndarray]:
-        """Columns (N, 3, k) m of the errors that the blocks share, in standard deviations."""
-        stds = (scatter.workspace, scatter.order, scatter.command)
-        return [
-            std * block_columns(c)
-            for c, std in zip(self.cells, stds, strict=True)
-            if c is not None and std > 0
-        ]
 
     def scatter(self, *, stated: bool) -> tuple[Scatter, dict[str, float]]:
         """The components, and the standard deviation of each of them that is not zero.
@@ -190,7 +181,7 @@ class _Likelihood:
         factor = np.linalg.cholesky(scatter.independent(fit.sigma, fit.turns))
         whitening = np.linalg.inv(factor)
         free = fit.free.shape[2]
-        columns = np.concatenate([fit.free, fit.tied, *fit.effects(scatter)], axis=2)
+        columns = np.concatenate([fit.free, fit.tied, scatter.shared(fit.cells, len(fit.residual))], axis=2)
         size = columns.shape[2]
         white = np.matmul(whitening, columns).reshape(-1, size)
         gram = white.T @ white
