@@ -224,6 +224,15 @@ def test_certificate(run, ur5: Path) -> None:
     )
 
 
+def test_a_certificate_has_the_particulars_that_were_given(run, ur5: Path) -> None:
+    """What is not given stays a line to fill in, as on the customer's sheets."""
+    given = ("--instrument", "tracker T", "--robot-serial", "R-17", "--operator", "A. Meier")
+    assert certify(run, ur5, *given).status == 0
+    page = (ur5 / "certificate.html").read_text(encoding="utf-8")
+    assert all(f"<td>{text}</td>" in page for text in ("tracker T", "R-17", "A. Meier"))
+    assert page.count('class="blank"') == 2
+
+
 def test_targets_without_a_command_are_not_compared(run, ur5: Path) -> None:
     table = pl.read_csv(ur5 / "after.csv").filter(pl.col("pose") > 2)
     table.write_csv(ur5 / "after.csv")

@@ -142,6 +142,9 @@ def test_responses(run, recorded: Path, tmp_path: Path) -> None:
     assert np.median(np.abs(first.std / first.response)[:, [0, 1, 2], [0, 1, 2]]) < 0.2
     document = run(*arguments, "--json").document
     assert [entry["pose"] for entry in document["responses"]] == [1, 2]
+    assert len(document["reciprocity"]) == 3
+    assert all(0.5 < pair["ratio"] < 1.35 for pair in document["reciprocity"])
+    assert document["verdict"]["trusted"] is not False
     page = (tmp_path / "report.html").read_text("utf-8")
     for file in (recorded / "robot.yaml", recorded / "recorded" / "plan.yaml", recorded / "recorded" / LOG):
         assert sha256_of(file) in page, file

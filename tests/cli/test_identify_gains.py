@@ -56,6 +56,8 @@ def test_gains_come_back_and_can_be_pasted(arm: Path, capsys: pytest.CaptureFixt
     assert significant(found["gains"][0], 5) in page
     assert f"{significant(factor['low'])} to {significant(factor['high'])}" in page
     assert found["provenance"]["input.loaded.csv"] in page and "All 2." in page
+    assert found["verdict"] == {"trusted": True, "reasons": ["half_gains"]}
+    assert set(found["halves"]["factors"]) == {"shoulder.drive_gain", "elbow.drive_gain"}
     assert main(["report", str(arm / "out")]) == 0
     assert (arm / "out" / "report.html").read_text("utf-8") == page
     capsys.readouterr()
@@ -67,6 +69,25 @@ def test_gains_come_back_and_can_be_pasted(arm: Path, capsys: pytest.CaptureFixt
     assert [again[f"{joint}.drive_gain"]["estimate"] for joint in ("shoulder", "elbow")] == pytest.approx(
         [1, 1], rel=1e-4
     )
+
+
+def test_a_gain_that_changes_while_recording_is_not_trusted(
+    arm: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Currents of the shoulder that are a fifth larger in the second half, as of a motor that warms up."""
+    for name in ("free", "loaded"):
+        table = pl.read_csv(arm / f"{name}.csv")
+        later = pl.col("t") > table["t"].to_numpy().max() / 2
+        table.with_columns(i1=pl.col("i1") * pl.when(later).then(1.2).otherwise(1.0)).write_csv(
+            arm / f"{name}.csv"
+        )
+    assert main(["identify", "gains", *arguments(arm, "free", "loaded"), "--json"]) == 0
+    printed = capsys.readouterr()
+    found = json.loads(printed.out)
+    assert found["verdict"]["trusted"] is None and "half_gains" in found["verdict"]["reasons"]
+    assert "the first and the second half of the recordings give different gains" in printed.err
+    shoulder = found["halves"]["factors"]["shoulder.drive_gain"]
+    assert shoulder["second"] / shoulder["first"] == pytest.approx(1 / 1.2, rel=0.02)
 
 
 def test_currents_of_any_scale(arm: Path, capsys: pytest.CaptureFixture[str]) -> None:

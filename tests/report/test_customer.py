@@ -11,7 +11,8 @@ import pytest
 from outline import Outline
 
 from flexcal.cli.main import main
-from flexcal.report.customer import Particulars, uncertainty_rows
+from flexcal.report.customer import uncertainty_rows
+from flexcal.report.particulars import Particulars
 from flexcal.workflow.customer_report import customer_report
 from flexcal.workflow.report_folder import read_results
 

@@ -23,17 +23,20 @@ AXES = ("joint_1", "joint_2")
 
 
 def measured(noise: Sequence[float], total: Sequence[float], pose: int = 0) -> FrequencyResponse:
-    """Five lines of two axes whose diagonal elements have these standard deviations, relative to them."""
+    """Seven lines of two axes whose diagonal elements have these standard deviations, relative to them; symmetric but for 1 %."""
     rng = np.random.default_rng(pose)
-    response = rng.uniform(0.5, 1.0, (5, 2, 2)) * np.exp(1j * rng.uniform(0, 6, (5, 2, 2)))
+    response = rng.uniform(0.5, 1.0, (7, 2, 2)) * np.exp(1j * rng.uniform(0, 6, (7, 2, 2)))
+    response[:, 1, 0] = response[:, 0, 1]
+    response[:, 1, 0] += 0.005 * np.sqrt(2.0) * rng.normal(size=(7, 2)) @ [1.0, 1.0j]
 
     def covariance(shares: Sequence[float]) -> np.ndarray:
         std = np.abs(response) * np.diag(shares)
-        stacked = np.swapaxes(std, 1, 2).reshape(5, 4)
+        std[:, [0, 1], [1, 0]] = 0.005 * np.sqrt(2.0)
+        stacked = np.swapaxes(std, 1, 2).reshape(7, 4)
         return np.einsum("li,ij->lij", stacked**2, np.eye(4)).astype(complex)
 
     return FrequencyResponse(
-        frequencies_hz=np.arange(5.0, 10.0),
+        frequencies_hz=np.arange(5.0, 12.0),
         response=response,
         covariance=covariance(total),
         noise_covariance=covariance(noise),
@@ -95,7 +98,7 @@ def test_what_limits_it_and_what_helps(tmp_path: Path) -> None:
         response = measured([0.2 * share] * 2, [0.2] * 2)
         study = left(tmp_path, [response])
         assert limit_of(study.results["responses"]) == limit
-        check = response_checks(study.results["responses"], [response])[0]
+        check = response_checks(study.results, [response])[1]
         assert check.status == "care" and "20.0 %" in check.answer and cure in check.answer
         verdict = response_page(study).verdict
         assert verdict.facts[1].value == limit.capitalize()
@@ -107,28 +110,42 @@ def test_what_limits_it_and_what_helps(tmp_path: Path) -> None:
 
 def statuses(responses: Sequence[FrequencyResponse], folder: Path) -> list[str]:
     study = left(folder, responses)
-    checks = response_checks(study.results["responses"], responses)
+    checks = response_checks(study.results, responses)
     assert response_page(study).verdict.checks == checks
     return [check.status for check in checks]
 
 
 def test_the_verdict_turns_with_the_responses(tmp_path: Path) -> None:
     good = [measured([0.01] * 2, [0.05] * 2, pose) for pose in range(3)]
-    assert statuses(good, tmp_path) == ["good"] * 4
-    assert statuses(good[:1], tmp_path) == ["good", "good", "unknown", "good"]
+    assert statuses(good, tmp_path) == ["good"] * 5
+    assert statuses(good[:1], tmp_path) == ["unknown", "good", "good", "unknown", "good"]
     for share, known in ((0.11, "care"), (0.31, "bad")):
         wide = [measured([0.01] * 2, [share] * 2, pose) for pose in range(3)]
-        assert statuses(wide, tmp_path)[0] == known
+        assert statuses(wide, tmp_path)[1] == known
     lost = [*good[:2], measured([0.01] * 2, [0.01, 0.31], 2)]
-    assert statuses(lost, tmp_path)[1] == "care"
-    answer = response_checks(left(tmp_path, lost).results["responses"], lost)[1].answer
+    assert statuses(lost, tmp_path)[2] == "care"
+    answer = response_checks(left(tmp_path, lost).results, lost)[2].answer
     assert "Not joint_2 in pose 3:" in answer
     odd = [*good[:2], measured([0.01] * 2, [0.09] * 2, 2)]
-    assert statuses(odd, tmp_path) == ["good"] * 4
-    odd = [replace(r, covariance=r.covariance / 2) for r in good[:2]] + odd[2:]
-    assert statuses(odd, tmp_path)[2] == "care"
+    assert statuses(odd, tmp_path) == ["good"] * 5
+    odd = [measured([0.005] * 2, [0.035] * 2, pose) for pose in range(2)] + odd[2:]
+    assert statuses(odd, tmp_path)[3] == "care"
     few = [replace(response, degrees_of_freedom=19.0) for response in good]
-    assert statuses(few, tmp_path)[3] == "care"
+    assert statuses(few, tmp_path)[4] == "care"
+
+
+def test_wrong_torque_gain_is_no_trusted_response(tmp_path: Path) -> None:
+    """The responses to the torque of joint_2 are 1.5 times too large, or 2 %."""
+    good = [measured([0.01] * 2, [0.05] * 2, pose) for pose in range(3)]
+    for gain, trusted, reason in (
+        (1.0, True, "reciprocity"),
+        (1.02, None, "reciprocity"),
+        (1.5, False, "reciprocity"),
+    ):
+        scaled = [replace(r, response=r.response * [1.0, gain]) for r in good]
+        results = left(tmp_path, scaled).results
+        assert results["verdict"] == {"trusted": trusted, "reasons": [reason]}
+        assert results["reciprocity"][0]["joints"] == list(AXES) and results["reciprocity"][0]["lines"] == 21
 
 
 def test_odd_distortion_is_shown_where_it_was_measured(tmp_path: Path) -> None:

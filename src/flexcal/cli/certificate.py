@@ -11,19 +11,21 @@ from tyro.conf import arg
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.options import Estimates, Json, Robot, require_robot
+from flexcal.cli.particulars import ParticularsOptions
 
 
 @dataclass(frozen=True)
-class Certificate:
-    """Certify a robot on a sheet of A4: how far it was from its targets before compensation, and how far it is after.
+class Certificate(ParticularsOptions):
+    """Write an accuracy certificate on two sheets of A4: pose accuracy at the same targets before and after compensation.
 
-    BEFORE was measured at the nominal commands of TARGETS, AFTER at those that 'flexcal compensate' made of it; both keep the targets' pose
-    numbers. Rows of one number are visits to one target. Print the page, or save it as PDF, from a browser.
+    BEFORE was measured at the nominal commands of TARGETS, AFTER at the commands that 'flexcal compensate' made from them; both keep the
+    pose numbers of TARGETS. Rows with the same pose number are repeated visits to one target. Particulars that are not given stay lines to
+    fill in by hand. Print the page, or save it as PDF, from a browser.
     """
 
     robot: Robot
     targets: Annotated[Path, arg(metavar="FILE")]
-    """The file that 'flexcal compensate' took."""
+    """File of targets that was given to 'flexcal compensate'."""
     before: Annotated[Path, arg(metavar="FILE")]
     """Points measured with nominal commands (CSV or Parquet)."""
     after: Annotated[Path, arg(metavar="FILE")]
@@ -47,6 +49,7 @@ class Certificate:
             self.after,
             self.out,
             estimates=self.estimates,
+            particulars=self.particulars,
             command=command_line(),
         )
         document = found.document()

@@ -14,10 +14,10 @@ from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least,
 
 @dataclass(frozen=True)
 class IdentifyGains:
-    """Find how many N m an ampere is at each joint, from recordings with and without the payload of robot.yaml.
+    """Identify the drive gain (N m/A) of each joint, from recordings with and without the payload of robot.yaml.
 
-    Every log says in a column `payload` how many kg were held; the mass must be right, centre of mass and inertia are fitted.
-    robot.yaml stays as it is: put the line that is printed into its `signals: tau:`.
+    A column `payload` of every log states the mass held in kg. This mass must be right; centre of mass and inertia are fitted.
+    robot.yaml is not changed: copy the printed line into its `signals: tau:`.
     """
 
     robot: Robot
@@ -30,7 +30,7 @@ class IdentifyGains:
         ),
     ]
     jobs: Annotated[int, arg(metavar="N")] = 1
-    """Logs that are read at once, each in a process of its own."""
+    """Logs that are read in parallel, each in a process of its own."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html and results.json."""
     json: Json = False
@@ -51,6 +51,7 @@ class IdentifyGains:
         document = found.document()
         console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
         console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
+        console.say(found.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify dynamics {self.robot} {self.logs[0]}")

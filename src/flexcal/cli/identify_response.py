@@ -15,7 +15,7 @@ from flexcal.cli.options import Json, Robot, require_robot
 
 @dataclass(frozen=True)
 class IdentifyResponse:
-    """Reduce the recordings of a frequency experiment to one frequency response matrix a pose, with noise and distortion."""
+    """Estimate one frequency response matrix per pose from the recordings of a frequency experiment, with its covariance."""
 
     robot: Robot
     folder: Annotated[
@@ -36,7 +36,7 @@ class IdentifyResponse:
     json: Json = False
 
     def run(self) -> None:
-        """Reduce, and print how certain the responses are."""
+        """Estimate, and print the uncertainty of the responses."""
         from flexcal.cli.tables import response_table
         from flexcal.workflow.identify_response import identify_response
 
@@ -49,5 +49,6 @@ class IdentifyResponse:
             )
         document = found.document()
         console.show(response_table(document["responses"]))
+        console.say(found.trust.sentence)
         console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify stiffness {self.robot} {self.out}")

@@ -10,34 +10,24 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json, MaybePath
+from flexcal.cli.particulars import ParticularsOptions
 from flexcal.errors import InputError
-
-_BLANK = arg(metavar="TEXT", help_behavior_hint="(default: a line to fill in)")
 
 
 @dataclass(frozen=True)
-class Report:
-    """Write report.html of a folder that demo, an identify verb, calibrate or verify left with --out, from stored numbers.
+class Report(ParticularsOptions):
+    """Write report.html of a folder that demo, an identify verb, calibrate or verify wrote with --out, from the stored numbers.
 
-    It is the page that the verb wrote, byte for byte. With --customer it is two sheets of A4 instead, DIR/customer.html: particulars of the
-    measurement, errors before and after, and their uncertainty; what is not given stays a line to fill in by hand.
+    The page is identical to the one that the verb wrote. With --customer, DIR/customer.html is written instead, two sheets of A4:
+    particulars of the measurement, errors before and after, and their uncertainty. Particulars that are not given stay lines to fill in by
+    hand.
     """
 
     folder: Annotated[Positional[Path], arg(metavar="DIR", help="folder with results.json")]
     compare: Annotated[MaybePath, arg(metavar="OTHER", help_behavior_hint="(default: none)")] = None
-    """Another folder of calibrate, verify or demo; then DIR/comparison.html says which of the two is more accurate, and what changed."""
+    """Another folder of calibrate, verify or demo; DIR/comparison.html then compares accuracy and parameters of the two."""
     customer: bool = False
-    """Write the two sheets for a customer, of a folder of calibrate or verify."""
-    instrument: Annotated[str, _BLANK] = ""
-    """Instrument with which the points were measured, for the customer."""
-    instrument_serial: Annotated[str, _BLANK] = ""
-    """Its serial number."""
-    robot_serial: Annotated[str, _BLANK] = ""
-    """Serial number of the robot."""
-    operator: Annotated[str, _BLANK] = ""
-    """Who measured."""
-    date: Annotated[str, _BLANK] = ""
-    """When it was measured."""
+    """Write the two sheets for a customer, from a folder of calibrate or verify."""
     json: Json = False
 
     @property
@@ -51,11 +41,12 @@ class Report:
 
     def run(self) -> None:
         """Write the report, and say where it is."""
+        from flexcal.report.particulars import NOT_GIVEN
+
         console = Console(self.json)
-        given = self.instrument or self.instrument_serial or self.robot_serial or self.operator or self.date
         if self.customer and self.compare is not None:
             raise InputError("--customer and --compare exclude each other; give one of them.")
-        if given and not self.customer:
+        if not self.customer and self.particulars != NOT_GIVEN:
             raise InputError("particulars of the measurement are for the customer's sheets; add --customer.")
         if self.customer:
             self._for_customer(console)
@@ -70,17 +61,9 @@ class Report:
         console.finish({"report": written}, f"open {written}")
 
     def _for_customer(self, console: Console) -> None:
-        from flexcal.report.customer import Particulars
         from flexcal.workflow.customer_report import customer_report
 
-        particulars = Particulars(
-            robot_serial=self.robot_serial,
-            instrument=self.instrument,
-            instrument_serial=self.instrument_serial,
-            operator=self.operator,
-            date=self.date,
-        )
-        written = customer_report(self.folder, particulars)
+        written = customer_report(self.folder, self.particulars)
         console.say(f"wrote {written}: two sheets of A4")
         console.finish({"report": written}, f"open {written}, and print it or save it as PDF")
 

@@ -232,7 +232,7 @@ STEPS = (
                 ("certificate",),
                 "certificate",
                 "Certificate",
-                "accuracy before and after compensation at the same targets, on a sheet of A4",
+                "accuracy before and after compensation at the same targets, on two sheets of A4",
                 "flexcal certificate robot.yaml --targets targets.csv --before nominal.csv --after compensated.csv",
             ),
             Verb(

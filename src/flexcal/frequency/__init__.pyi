@@ -13,10 +13,12 @@ from .multisine import (
     torque,
 )
 from .response import FrequencyResponse, frequency_response, frequency_responses
+from .symmetry import Reciprocity, reciprocity
 
 __all__ = [
     "Average",
     "FrequencyResponse",
+    "Reciprocity",
     "crest_factor",
     "frequency_response",
     "frequency_responses",
@@ -27,6 +29,7 @@ __all__ = [
     "odd_lines",
     "optimise_crest",
     "orthogonal_matrix",
+    "reciprocity",
     "reference",
     "spectra",
     "spectrum",

@@ -1,4 +1,4 @@
-"""The certificate: a robot before and after, on a sheet of paper (`flexcal certificate`)."""
+"""Accuracy certificate: pose accuracy before and after compensation, on two sheets of A4 (`flexcal certificate`)."""
 
 from __future__ import annotations
 
@@ -13,6 +13,7 @@ import numpy as np
 from flexcal.atomic import write_text
 from flexcal.report.notation import NOTHING, document_millimetres, significant
 from flexcal.report.palette import LIGHT
+from flexcal.report.particulars import Particulars
 from flexcal.report.render import templates
 from flexcal.report.trust import verdict_answer
 from flexcal.units import MILLIMETRE
@@ -23,11 +24,12 @@ _WIDTH, _ROW = 640.0, 34.0
 
 @dataclass(frozen=True, eq=False)
 class CertificateStudy:
-    """`results` as the verb prints them, and the error vectors (P, 3) m of each target before and after."""
+    """`results` as the verb prints them, error vectors (P, 3) m of the targets before and after, and particulars of the measurement."""
 
     results: Mapping[str, Any]
     before: np.ndarray
     after: np.ndarray
+    particulars: Particulars
 
 
 def write_certificate(path: Path, study: CertificateStudy) -> None:
@@ -44,6 +46,7 @@ def certificate_html(study: CertificateStudy) -> str:
         .get_template("certificate.html.j2")
         .render(
             results=results,
+            particulars=study.particulars.rows(),
             rows=accuracy_rows(results),
             parts=limiting_parts(results),
             conditions=_conditions(results),
@@ -83,7 +86,7 @@ def accuracy_rows(results: Mapping[str, Any]) -> list[tuple[str, ...]]:
 
 
 def limiting_parts(results: Mapping[str, Any]) -> list[tuple[str, str]]:
-    """What the errors after compensation are made of, root mean square, mm."""
+    """Parts of the error budget after compensation, root mean square, mm."""
     labels = {
         "measured": "measured distance to the target",
         "parameters": "uncertainty of the calibration, predicted",
@@ -99,8 +102,11 @@ def _conditions(results: Mapping[str, Any]) -> list[tuple[str, str]]:
     sigma = results["sigma_mm"]
     return [
         ("point", ", ".join(results["points"])),
-        ("instrument's place", ", ".join(results["stations"])),
-        ("instrument, 1σ an axis", "not stated" if sigma is None else f"{document_millimetres(sigma)} mm"),
+        ("instrument station", ", ".join(results["stations"])),
+        (
+            "instrument, 1σ per coordinate",
+            "not stated" if sigma is None else f"{document_millimetres(sigma)} mm",
+        ),
         ("payload", ", ".join(f"{significant(mass, 4)} kg" for mass in results["payload_kg"])),
         (
             "temperature",
@@ -116,7 +122,7 @@ def _judgement(results: Mapping[str, Any]) -> str:
     words = {
         "right": "The predicted uncertainty holds.",
         "optimistic": "The predicted uncertainty was too small.",
-        "unknown": "It cannot be judged: the instrument's noise is not known, and is in these numbers.",
+        "unknown": "The predicted uncertainty cannot be judged: these numbers contain instrument noise of unknown size.",
         "cautious": "The predicted uncertainty was larger than needed.",
     }[found["verdict"]]
     beyond = "" if found["verdict"] == "unknown" else "beyond the scatter of the measurements, "

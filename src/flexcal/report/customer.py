@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -22,6 +22,7 @@ from flexcal.report.notation import (
     statistics_cells,
 )
 from flexcal.report.palette import LIGHT
+from flexcal.report.particulars import Particulars
 from flexcal.report.render import templates
 from flexcal.report.trust import ANSWERS, Trust
 
@@ -29,22 +30,6 @@ _MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
 _FILES = 8
 """Files that are listed; the sheet holds no more."""
 _REMARKS = 4
-
-
-@dataclass(frozen=True)
-class Particulars:
-    """What the customer wants to know of the measurement; an empty one leaves a line to fill in by hand."""
-
-    robot_serial: str = ""
-    instrument: str = ""
-    instrument_serial: str = ""
-    operator: str = ""
-    date: str = ""
-
-    def rows(self) -> list[tuple[str, str]]:
-        """Label and text of each."""
-        names = {field.name: field.name.replace("_serial", ", serial number") for field in fields(self)}
-        return [(label, getattr(self, name)) for name, label in names.items()]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,18 +6,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+from flexcal.report.gain_checks import gain_checks
 from flexcal.report.notation import NOTHING, percent, significant
-from flexcal.report.page import Check, Fact, Page, Section, Status, Table, Verdict, tally, worst
+from flexcal.report.page import Fact, Page, Section, Status, Table, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
+from flexcal.report.trust import Trust
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "The gains of all drives are determined"),
-    "care": ("With care", "Some gains are uncertain; read which before declaring them"),
-    "bad": ("No", "These recordings determine no gain"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Drive gains identified, and the numbers can be trusted",
+    "care": "Drive gains identified, with reservations: read the checks below before declaring them",
+    "bad": "These recordings determine no drive gain",
+    "unknown": "Drive gains identified; whether they can be trusted cannot be judged",
 }
-_WIDE = 0.05
-"""1σ of a factor from which its gain is not known well."""
 
 
 def write_gains_report(path: str | Path, results: Mapping[str, Any]) -> None:
@@ -42,9 +43,7 @@ def gains_page(results: Mapping[str, Any]) -> Page:
 def _verdict(results: Mapping[str, Any]) -> Verdict:
     factors = results["parameters"]
     seen = {name: item for name, item in factors.items() if item["identifiable"]}
-    checks = (_check_told(len(seen), len(factors)), _check_sharp(seen))
-    status = worst(checks)
-    answer, headline = _TRUST[status]
+    trust = Trust(gain_checks(factors, results["halves"]))
     largest = max((abs(item["estimate"] - 1) for item in seen.values()), default=None)
     payloads = sorted(set(results["payloads_kg"]))
     facts = (
@@ -52,38 +51,14 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
         Fact(
             "How many are determined?", f"{len(seen)} of {len(factors)}", "", "The others stay as declared."
         ),
-        Fact("Can I trust it?", answer, "", f"{tally(checks)}; each is explained below.", status),
+        trust.fact(),
     )
     sentence = (
         f"The known mass of the payload is the reference: {len(results['payloads_kg'])} recordings hold "
-        f"{' or '.join(f'{mass:g} kg' for mass in payloads)}, and the change of the torques determines the gains."
+        f"{' or '.join(f'{mass:g} kg' for mass in payloads)}, and the change of the torques determines the gains. "
+        "A relative error of the declared mass is one of every gain, and no check below detects it."
     )
-    return Verdict(status, headline, sentence, facts, (), "", checks)
-
-
-def _check_told(seen: int, total: int) -> Check:
-    question = "Do the recordings determine every gain?"
-    if not seen:
-        return Check(question, "None: the payload changes no torque by enough.", "bad")
-    if seen < total:
-        return Check(
-            question, f"{seen} of {total}; move the payload so that gravity loads the other joints.", "care"
-        )
-    return Check(question, f"All {total}.", "good")
-
-
-def _check_sharp(seen: Mapping[str, Mapping[str, float]]) -> Check:
-    question = "Are the gains known well?"
-    wide = [name.removesuffix(".drive_gain") for name, item in seen.items() if item["std"] > _WIDE]
-    if wide:
-        return Check(
-            question,
-            f"Not of {', '.join(wide)}: worse than {100 * _WIDE:.0f} % (1σ). A heavier payload helps.",
-            "care",
-        )
-    return Check(
-        question, f"Each of them to {100 * _WIDE:.0f} % (1σ) or better.", "good" if seen else "unknown"
-    )
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", trust.checks)
 
 
 def _table(results: Mapping[str, Any]) -> Table:

@@ -12,17 +12,19 @@ import numpy as np
 from flexcal.frequency import FrequencyResponse
 from flexcal.report.measured_response import relative_to_diagonal
 from flexcal.report.notation import NOTHING, percent
-from flexcal.report.page import Fact, Page, Section, Status, Table, Verdict, tally, worst
+from flexcal.report.page import Fact, Page, Section, Status, Table, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.response_checks import limit_of, response_checks, worst_pose
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.responses import levels_block
+from flexcal.report.trust import Trust
 from flexcal.units import DEGREE
 
-_TRUST: dict[Status, tuple[str, str]] = {
-    "good": ("Yes", "Measured, and springs can be fitted to them"),
-    "care": ("With care", "Measured; read the checks below before fitting springs to them"),
-    "bad": ("No", "These responses are too uncertain to fit springs to"),
+_HEADLINES: dict[Status, str] = {
+    "good": "Frequency responses measured, and springs can be fitted to them",
+    "care": "Frequency responses measured, with reservations: read the checks below before fitting springs to them",
+    "bad": "Do not fit springs to these responses yet",
+    "unknown": "Frequency responses measured; whether they can be trusted cannot be judged",
 }
 
 
@@ -70,9 +72,7 @@ def response_page(study: ResponseStudy) -> Page:
 
 def _verdict(study: ResponseStudy) -> Verdict:
     entries = study.results["responses"]
-    checks = response_checks(entries, study.responses)
-    status = worst(checks)
-    answer, headline = _TRUST[status]
+    trust = Trust(response_checks(study.results, study.responses))
     least, limit = worst_pose(entries), limit_of(entries)
     advice = (
         "More realisations lower it, more periods of the same do not."
@@ -92,9 +92,7 @@ def _verdict(study: ResponseStudy) -> Verdict:
             "",
             f"Noise alone would leave {percent(least['relative_noise_std'])} there. {advice}",
         ),
-        Fact(
-            "Can springs be fitted to it?", answer, "", f"{tally(checks)}; each is explained below.", status
-        ),
+        trust.fact(),
     )
     low, high = (function(entry[key] for entry in entries) for function, key in _BAND)
     where = "1 pose" if len(entries) == 1 else f"{len(entries)} poses"
@@ -102,7 +100,7 @@ def _verdict(study: ResponseStudy) -> Verdict:
         f"The motors were excited in {where}, at {least['lines']} frequencies from {low:g} to {high:g} Hz; the "
         "resonances of the springs must lie between them."
     )
-    return Verdict(status, headline, sentence, facts, (), "", checks)
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", trust.checks)
 
 
 _BAND = (min, "lowest_hz"), (max, "highest_hz")

@@ -1,4 +1,4 @@
-"""The questions that decide whether measured frequency responses can be trusted."""
+"""The checks behind the verdict on measured frequency responses."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import Any, Literal
 import numpy as np
 
 from flexcal.frequency import FrequencyResponse
+from flexcal.report.checks import CHANCE, MISSING
 from flexcal.report.measured_response import relative_to_diagonal
 from flexcal.report.notation import percent, significant
 from flexcal.report.page import Check
@@ -19,6 +20,10 @@ _LARGE, _TOO_LARGE = 0.1, 0.3
 _UNLIKE = 2.0
 """Times the median pose's from which a pose stands out."""
 _FREEDOM = 20
+_FEW_LINES = 20
+"""Lines of all poses below which the difference of two elements says little."""
+_ASYMMETRY = 0.1
+"""Difference of G_ij and G_ji beyond noise, relative to their size, from which the responses are not those of one mechanical system."""
 _SHOWN = 3
 _CURES: dict[Limit, str] = {
     "noise": "Noise dominates: record more periods, or increase the torques.",
@@ -27,7 +32,7 @@ _CURES: dict[Limit, str] = {
 
 
 def limit_of(entries: Sequence[Mapping[str, Any]]) -> Limit:
-    """What more than half of the variance is, of all poses together; `entries` are `responses` of results.json."""
+    """Source of more than half of the variance over all poses; `entries` are `responses` of results.json."""
     noise, total = (
         sum(entry[key] ** 2 for entry in entries) for key in ("relative_noise_std", "relative_std")
     )
@@ -35,20 +40,43 @@ def limit_of(entries: Sequence[Mapping[str, Any]]) -> Limit:
 
 
 def worst_pose(entries: Sequence[Mapping[str, Any]]) -> Mapping[str, Any]:
-    """The one that is known least."""
+    """The one with the largest relative standard deviation."""
     return max(entries, key=lambda entry: entry["relative_std"])
 
 
-def response_checks(
-    entries: Sequence[Mapping[str, Any]], responses: Sequence[FrequencyResponse]
-) -> tuple[Check, ...]:
-    """The checks behind the verdict."""
+def response_checks(results: Mapping[str, Any], responses: Sequence[FrequencyResponse]) -> tuple[Check, ...]:
+    """The checks behind the verdict, from results.json and its responses."""
+    entries = results["responses"]
     return (
-        _check_known(entries),
-        _check_axes(responses),
-        _check_poses(entries),
-        _check_freedom(entries),
+        _check_reciprocity(results["reciprocity"]).named("reciprocity", independent=True),
+        _check_known(entries).named("response_uncertainty"),
+        _check_axes(responses).named("excited_axes"),
+        _check_poses(entries).named("equal_poses"),
+        _check_freedom(entries).named("degrees_of_freedom"),
     )
+
+
+def _check_reciprocity(pairs: Sequence[Mapping[str, Any]]) -> Check:
+    question = "Are the responses reciprocal (G_ij = G_ji)?"
+    if not pairs:
+        return Check(question, "Cannot be judged: one axis only was excited.", "unknown")
+    worst = max(pairs, key=lambda pair: pair["ratio"])
+    if worst["lines"] < _FEW_LINES:
+        return Check(question, f"Cannot be judged from {worst['lines']} lines.", "unknown")
+    answer = (
+        f"The difference between the responses of {' and '.join(worst['joints'])} to torques at each other is "
+        f"{significant(worst['ratio'], 3)} times its standard deviation (rms over all lines), the largest of all pairs."
+    )
+    cause = "Check torque gain and sign of these axes, and the order of the columns."
+    if worst["ratio"] > MISSING and worst["difference"] > _ASYMMETRY:
+        return Check(
+            question,
+            f"No. {answer} Beyond noise and distortion they differ by {percent(worst['difference'])}. {cause}",
+            "bad",
+        )
+    if worst["ratio"] > CHANCE:
+        return Check(question, f"Not within their uncertainty. {answer} {cause}", "care")
+    return Check(question, f"Yes. {answer}", "good")
 
 
 def _check_known(entries: Sequence[Mapping[str, Any]]) -> Check:
@@ -87,7 +115,7 @@ def _check_axes(responses: Sequence[FrequencyResponse]) -> Check:
 
 
 def _check_poses(entries: Sequence[Mapping[str, Any]]) -> Check:
-    question = "Are all poses equally certain?"
+    question = "Is the uncertainty alike in all poses?"
     if len(entries) == 1:
         return Check(question, "There is one pose only.", "unknown")
     worst, middle = worst_pose(entries), float(np.median([entry["relative_std"] for entry in entries]))
@@ -99,7 +127,9 @@ def _check_poses(entries: Sequence[Mapping[str, Any]]) -> Check:
             "care",
         )
     return Check(
-        question, f"The worst is {significant(times, 2)} times as uncertain as the median one.", "good"
+        question,
+        f"The largest standard deviation is {significant(times, 2)} times the median pose's.",
+        "good",
     )
 
 

@@ -183,6 +183,40 @@ PHRASES: dict[str, dict[str, str]] = {
         "bad": "the fit does not explain the torques",
         "else": "the torque error is large",
     },
+    "reciprocity": {
+        "good": "the responses are reciprocal within their uncertainty",
+        "bad": "the responses are not reciprocal",
+        "care": "the responses are not reciprocal within their uncertainty",
+        "else": "reciprocity cannot be judged",
+    },
+    "response_uncertainty": {
+        "good": "the responses are known well",
+        "else": "the uncertainty of the responses is large",
+    },
+    "excited_axes": {"good": "every axis is excited", "else": "an axis is hardly excited in a pose"},
+    "equal_poses": {
+        "good": "the uncertainty is alike in all poses",
+        "else": "a pose is much more uncertain than the others",
+    },
+    "degrees_of_freedom": {
+        "good": "the covariance is well estimated",
+        "else": "the covariance has few degrees of freedom",
+    },
+    "half_gains": {
+        "good": "the first and the second half of the recordings give the same gains",
+        "unknown": "the recordings are too short to compare their halves",
+        "else": "the first and the second half of the recordings give different gains",
+    },
+    "gains": {
+        "good": "all gains are determined",
+        "bad": "the recordings determine no gain",
+        "else": "the recordings do not determine every gain",
+    },
+    "gain_uncertainty": {
+        "good": "the gains are known well",
+        "unknown": "no gain is determined",
+        "else": "a gain is known poorly",
+    },
     "mass": {"good": "the mass is known well", "else": "the mass is known poorly"},
     "payload_parameters": {
         "good": "all payload parameters are determined",

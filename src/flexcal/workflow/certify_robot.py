@@ -1,4 +1,4 @@
-"""A robot at the same targets before and after compensation."""
+"""Accuracy of a robot at the same targets before and after compensation."""
 
 from __future__ import annotations
 
@@ -34,6 +34,7 @@ from flexcal.model import RobotModel, carried_mass
 from flexcal.model.resting_tool import points_kinematics
 from flexcal.model.rotations import vector_rotation
 from flexcal.report.certificate import CertificateStudy, write_certificate
+from flexcal.report.particulars import NOT_GIVEN, Particulars
 from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
@@ -175,6 +176,7 @@ def certify_robot(
     out: Path,
     *,
     estimates: Path | None = None,
+    particulars: Particulars = NOT_GIVEN,
     command: str = "",
 ) -> RobotCertificate:
     """Compare measurements at nominal and at compensated commands with the targets of both, and write the certificate to `out`.
@@ -236,7 +238,9 @@ def certify_robot(
         fitted_files(calibrated, [after]),
         command,
     )
-    write_certificate(out, CertificateStudy(result.document(), result.before.centres, result.after.centres))
+    write_certificate(
+        out, CertificateStudy(result.document(), result.before.centres, result.after.centres, particulars)
+    )
     return result
 
 

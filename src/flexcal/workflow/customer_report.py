@@ -7,7 +7,8 @@ from pathlib import Path
 from flexcal.data.pose_set import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.report.calibration import calibration_checks
-from flexcal.report.customer import CustomerStudy, Particulars, write_customer_report
+from flexcal.report.customer import CustomerStudy, write_customer_report
+from flexcal.report.particulars import Particulars
 from flexcal.report.sections.provenance import input_files
 from flexcal.report.trust import Trust
 from flexcal.report.verification import verification_checks

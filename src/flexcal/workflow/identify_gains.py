@@ -1,4 +1,4 @@
-"""Recordings with and without a payload to drive gains."""
+"""Drive gains from recordings with and without a payload of known mass."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ from flexcal.estimates_file import provenance
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
+from flexcal.report.gain_checks import gain_checks
+from flexcal.report.trust import Trust
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.half_gains import HalfGains, half_gains
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.results import quantities, write_results
@@ -34,12 +37,14 @@ from flexcal.workflow.treatment import treatment_of
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedGains:
-    """`factors`: what the torques must be multiplied by; `declared` (n,) are the gains of `signals: tau:`, 1 where there are none.
+    """Drive gains: `factors` to the `declared` gains (n,) of `signals: tau:`, which are 1 where there are none.
 
-    `payloads` are kg by log; `provenance` has all files with their hashes, `command` the command line, where there was one.
+    `halves` are the factors from each half of the recordings, None where a half alone does not determine them. `payloads` are kg by log;
+    `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     factors: Estimate
+    halves: HalfGains | None
     declared: np.ndarray
     payloads: tuple[float, ...]
     robot: str
@@ -48,17 +53,28 @@ class IdentifiedGains:
 
     @property
     def gains(self) -> list[float]:
-        """To be declared in place of the old ones; where the recordings do not tell one it stays."""
+        """Declared gains times factors (n,); as declared where the recordings do not determine the factor."""
         found = zip(
             self.declared, self.factors.parameters.coordinates(), self.factors.identifiable, strict=True
         )
         return [float(gain * factor) if told else float(gain) for gain, factor, told in found]
+
+    @property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(gain_checks(quantities(self.factors), self._halves))
+
+    @property
+    def _halves(self) -> dict[str, Any] | None:
+        return None if self.halves is None else self.halves.document()
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         return {
             "robot": self.robot,
             "parameters": quantities(self.factors),
+            "halves": self._halves,
+            "verdict": self.trust.document(),
             "declared_gains": list(self.declared),
             "gains": self.gains,
             "payloads_kg": list(self.payloads),
@@ -94,10 +110,15 @@ def identify_gains(
         systems = log_systems(
             parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
         )
-    data = RegressionData.of(observation, BaseParameters.of(observation), systems)
-    origin = provenance([robot, model.urdf, *logs])
+    base = BaseParameters.of(observation)
     result = IdentifiedGains(
-        drive_gains(data, payloads), declared, tuple(payloads), model.name, origin, command
+        drive_gains(RegressionData.of(observation, base, systems), payloads),
+        half_gains(observation, base, systems, payloads),
+        declared,
+        tuple(payloads),
+        model.name,
+        provenance([robot, model.urdf, *logs]),
+        command,
     )
     if out is not None:
         from flexcal.workflow.report_folder import report_folder

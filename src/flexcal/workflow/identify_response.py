@@ -1,9 +1,10 @@
-"""Recordings of a frequency experiment to one frequency response a pose."""
+"""Frequency responses from the recordings of a frequency experiment, one response matrix per pose."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
 
@@ -18,16 +19,19 @@ from flexcal.frequency import (
     FrequencyResponse,
     frequency_responses,
     local_polynomial_responses,
+    reciprocity,
 )
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.measured_response import relative_to_diagonal
+from flexcal.report.response_checks import response_checks
+from flexcal.report.trust import Trust
 from flexcal.workflow.results import write_results
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedResponses:
-    """The responses by pose, and the files they are in.
+    """Measured frequency responses by pose, and the files that hold them.
 
     `provenance` has all files that they come from, with their hashes, `command` the command line, where there was one.
     """
@@ -42,10 +46,26 @@ class IdentifiedResponses:
         """The content of results.json; the relative numbers are medians over lines and diagonal elements."""
         return {
             "robot": self.robot,
-            "responses": [_summary(r, f) for r, f in zip(self.responses, self.files, strict=True)],
+            "responses": self._entries,
+            "reciprocity": self._pairs,
+            "verdict": self.trust.document(),
             "provenance": dict(self.provenance),
             "command": self.command,
         }
+
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        results = {"responses": self._entries, "reciprocity": self._pairs}
+        return Trust(response_checks(results, self.responses))
+
+    @cached_property
+    def _entries(self) -> list[dict[str, Any]]:
+        return [_summary(r, f) for r, f in zip(self.responses, self.files, strict=True)]
+
+    @cached_property
+    def _pairs(self) -> list[dict[str, Any]]:
+        return [asdict(pair) for pair in reciprocity(self.responses)]
 
 
 def identify_response(
