@@ -89,7 +89,7 @@ def compared(
     sigmas: tuple[float | None, ...] = (None, TRACKER),
 ) -> Iterator[BearingAxes]:
     """What points (N, 3) at `q` say of a declaration, for each stated noise."""
-    model = RobotModel.from_yaml(write_robot(folder, declared))
+    model = RobotModel.from_yaml(write_robot(folder, declared), estimates=False)
     for sigma in sigmas:
         write_poses(folder / "poses.csv", q, xyz, sigma)
         measured = read_poses([folder / "poses.csv"], model)

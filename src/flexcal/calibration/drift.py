@@ -32,11 +32,11 @@ class Drift:
     @property
     def probability(self) -> float:
         """How often points that stay show as long a way, p of the F test."""
-        from scipy.stats import f
+        from scipy.special import fdtrc
 
         size = len(self.travel)
         statistic = self.travel @ np.linalg.solve(self.covariance, self.travel) / size
-        return float(f.sf(statistic, size, max(self.freedom, 1)))
+        return float(fdtrc(size, max(self.freedom, 1), statistic))
 
     @property
     def certain(self) -> bool:

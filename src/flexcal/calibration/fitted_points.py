@@ -9,13 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.elastic_prior import ElasticPrior
+from flexcal.calibration.error_cells import ErrorCells
 from flexcal.calibration.flanks import require_both_flanks
 from flexcal.calibration.geometry_fit import GeometryFit, PlainLoss
 from flexcal.calibration.marginal_fit import marginalised
 from flexcal.calibration.practical import Undetermined, undetermined
 from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.registration import register
-from flexcal.calibration.scatter import Scatter, error_cells, joint_turns, whitened
+from flexcal.calibration.scatter import Scatter, joint_turns, whitened
 from flexcal.calibration.structure import kinematic_identifiability, random_identifiability, require_enough
 from flexcal.calibration.terms import geometric_parameters, plausible_size, tolerances
 from flexcal.calibration.variance_components import LinearFit
@@ -82,6 +83,16 @@ class PointFit:
             seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)
+
+    @cached_property
+    def cells(self) -> ErrorCells:
+        """Which points share an error."""
+        return ErrorCells.of(self.poses)
+
+    @cached_property
+    def straight(self) -> Prediction:
+        """The points of the robot that the fit starts from, undeflected."""
+        return predict(self.start, self.poses, elastic=False, jacobians=True)
 
     @property
     def first_scatter(self) -> Scatter:
@@ -198,14 +209,13 @@ class FittedPoints:
         flat = (columns / np.where(scale > 0, scale, 1.0))[rows].reshape(3 * int(rows.sum()), -1)
         basis, sizes, _ = np.linalg.svd(flat, full_matrices=False)
         basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
-        cells = tuple(None if c is None else c[rows] for c in error_cells(poses))
         return LinearFit(
             residual[rows],
             basis.reshape(int(rows.sum()), 3, -1),
             tied[rows],
             poses.sigma[rows],
             self.turns[rows],
-            cells,
+            self.fit.cells.subset(rows),
         )
 
     def estimated_scatter(self) -> tuple[Scatter, dict[str, float]]:
@@ -224,16 +234,16 @@ class FittedPoints:
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
         whitening = scatter.whitening(fit.poses.sigma, self.turns)
-        return undetermined(fit.start, fit.poses, kept, whitening, fit.hidden)
+        return undetermined(fit.straight, kept, whitening, fit.hidden)
 
     @property
     def suspects_outliers(self) -> bool:
         """Whether single points are farther off than the scatter of most others allows."""
-        from scipy.stats import chi2
+        from scipy.special import chdtri
 
         whitening = self.scatter.whitening(self.fit.poses.sigma, self.turns)
         squares = (whitened(whitening, self.residuals).reshape(-1, 3) ** 2).sum(axis=1)
-        limit = float(chi2.isf(_SUSPICION / len(squares), 3)) * _SLACK
+        limit = float(chdtri(3, _SUSPICION / len(squares))) * _SLACK
         return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
 
     @property
@@ -285,13 +295,15 @@ class FittedPoints:
         estimate, scatter, task = self.estimate, self.scatter, self.task
         slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
         own = task.columns(self.at, estimate.parameters.names) * slopes
-        respond = (estimate.covariance @ own.T).reshape(len(slopes), -1, 3)[:, self.inliers]
-        shared = scatter.shared(error_cells(self.fit.poses), len(self.fit.poses))
-        together = np.einsum("pni,nik->pk", respond, np.matmul(task.whitening, shared)[self.inliers])
-        single = scatter.independent(self.fit.poses.sigma, self.turns)
-        beyond = np.matmul(np.matmul(task.whitening, single), np.swapaxes(task.whitening, 1, 2)) - np.eye(3)
-        spread = np.einsum("pni,nij,qnj->pq", respond, beyond[self.inliers], respond, optimize=True)
-        return estimate.covariance + spread + together @ together.T
+        white = own.reshape(-1, 3, len(slopes))[self.inliers] @ estimate.covariance
+        respond = np.swapaxes(task.whitening[self.inliers], 1, 2) @ white
+        linear = self.linear
+        together = np.einsum("nip,nik->pk", respond, scatter.shared(linear.cells))
+        jointly = scatter.jointly(linear.sigma, linear.turns, linear.cells)
+        visits = linear.cells.gathered(respond)
+        spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
+        taken = np.einsum("nip,niq->pq", white, white, optimize=True)
+        return estimate.covariance + spread - taken + together @ together.T
 
     def _gain(self, names: list[str]) -> np.ndarray:
         """How the estimates (p, h) follow parameters that are held, per unit of these: -Σ Aᵀ A_h of the whitened columns."""
@@ -310,18 +322,21 @@ class FittedPoints:
         )
 
     def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:
-        scatter, spread = self.scatter, self.spread
+        scatter = self.scatter
         instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma**2)))
-        values = (instrument, scatter.share, scatter.robot, scatter.angular, scatter.model)
-        parts = {key: getattr(scatter, key) for key in ("workspace", "order", "command")}
-        model_spread = np.sqrt(sum((parts[k] * spread.get(k, 0.0)) ** 2 for k in parts)) / max(
-            scatter.model, 1e-12
-        )
-        known = np.array(
-            [0.0, 0.0, spread.get("robot", 0.0), spread.get("angular", 0.0), float(model_spread)]
-        )
+        robot, robot_std = self._together("robot", "pose")
+        model, model_std = self._together("workspace", "order", "command")
+        values = (instrument, scatter.share, robot, scatter.angular, model)
+        known = np.array([0.0, 0.0, robot_std, self.spread.get("angular", 0.0), model_std])
         items = (
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
             for key, value in zip(SCATTER, values, strict=True)
         )
         return Parameters(items), known
+
+    def _together(self, *names: str) -> tuple[float, float]:
+        """Root sum of squares of components of the scatter, and its standard deviation."""
+        sizes = np.array([getattr(self.scatter, name) for name in names])
+        spread = np.array([self.spread.get(name, 0.0) for name in names])
+        whole = float(np.linalg.norm(sizes))
+        return whole, float(np.linalg.norm(sizes * spread)) / whole if whole > 0 else 0.0

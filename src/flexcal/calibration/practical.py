@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.prediction import predict
+from flexcal.calibration.prediction import Prediction
 from flexcal.calibration.scatter import whitened
 from flexcal.calibration.terms import plausible_size
 from flexcal.data import PoseSet
@@ -32,15 +32,15 @@ class Undetermined:
 
 
 def undetermined(
-    start: RobotModel, poses: PoseSet, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
+    at: Prediction, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
 ) -> tuple[Undetermined, ...]:
     """Parameters whose standard deviation from the data alone exceeds their plausible size.
 
-    Judged on the kinematic Jacobian at the nominal robot, weighed by W (N, 3, 3): what is seen only because the errors themselves, once
-    estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses; those that are
-    `hidden`, which random poses would determine and these do not, are undetermined too.
+    Judged on the kinematic Jacobian `at` the nominal robot without deflection, weighed by W (N, 3, 3): what is seen only because the
+    errors themselves, once estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses;
+    those that are `hidden`, which random poses would determine and these do not, are undetermined too.
     """
-    at = predict(start, poses, elastic=False, jacobians=True)
+    start, poses = at.model, at.poses
     sizes = np.array([plausible_size(start, name) for name in kept.names])
     columns = whitened(whitening, at.jacobian(kept.names))
     preferred = [item.name for item, size in zip(kept, sizes, strict=True) if not np.isfinite(size)]

@@ -6,37 +6,29 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.folds import order_folds, workspace_folds
+from flexcal.calibration.error_cells import ErrorCells, block_columns
 from flexcal.calibration.prediction import Prediction
-from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 
 _SMALLEST = 1e-6
 """Standard deviation (m) that no instrument on an arm goes below: it stands beside priors where simulated points have no noise."""
 _SMALLEST_TURN = 1e-7
 """Angle (rad) beside which a change of the repeatability of the joints is judged."""
-_CELL_POSES, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
-"""Poses a block of the model error, and bounds on the number of blocks."""
-_SAME_COMMAND = 1e-4
-"""Joint positions (rad or m) closer than this are one command."""
-_FEWEST_REPEATED = 5
-"""Commands visited more than once that a variance between commands needs."""
-
-ErrorCells = tuple[np.ndarray | None, ...]
-"""Labels (N,) of the blocks that share a model error, as `error_cells` gives them."""
 
 
 @dataclass(frozen=True)
 class Scatter:
     """Standard deviations of the error components of measured points, each a coordinate (1σ).
 
-    `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, and
-    `angular` rad at every revolute joint: repeatability, independent from measurement to measurement; `workspace`, `order` and `command`
-    m: model error common to a cell of the workspace, to a stretch of the measuring order, and to all visits of one command.
+    `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
+    from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
+    repeatability; `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
+    order, and to all visits of one command.
     """
 
     share: float
     robot: float = 0.0
+    pose: float = 0.0
     angular: float = 0.0
     workspace: float = 0.0
     order: float = 0.0
@@ -49,18 +41,28 @@ class Scatter:
 
     def settled(self, before: Scatter, tolerance: float) -> bool:
         """Whether every component is where it was, to a share `tolerance` of the whole."""
-        own, other = (np.array([s.robot, s.workspace, s.order, s.command]) for s in (self, before))
+        own, other = (np.array([s.robot, s.pose, s.workspace, s.order, s.command]) for s in (self, before))
         same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
         turned = abs(self.angular - before.angular) <= tolerance * (self.angular + _SMALLEST_TURN)
         return bool(same) and turned and abs(self.share - before.share) <= tolerance
 
     def independent(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Covariance (N, 3, 3), m², of what is independent from measurement to measurement: instrument and repeatability.
+        """Covariance (N, 3, 3), m², of instrument and repeatability at each measurement.
 
         `sigma` (N, 3) m is the stated one, `turns` (N, 3, r) m/rad how the revolute joints move the points.
         """
-        diagonal = (self.share * sigma) ** 2 + self.robot**2 + _SMALLEST**2
+        diagonal = (self.share * sigma) ** 2 + self.robot**2 + self.pose**2 + _SMALLEST**2
         return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
+
+    def jointly(self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorCells) -> np.ndarray:
+        """The same (G, 3 T, 3 T), m², of all measurements of a visit to a pose together, which are independent of other visits'.
+
+        The diagonal is 1 where a visit lacks a point.
+        """
+        diagonal = cells.gathered((self.share * sigma) ** 2 + self.robot**2 + _SMALLEST**2)
+        single = np.where(diagonal > 0, diagonal, 1.0)[:, :, None] * np.eye(diagonal.shape[1])
+        turned = cells.gathered(turns)
+        return single + self.pose**2 * cells.common + self.angular**2 * turned @ np.swapaxes(turned, 1, 2)
 
     def whitening(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """W (N, 3, 3) 1/m with WᵀW the inverse of the sum of all variances of single measurements."""
@@ -72,23 +74,21 @@ class Scatter:
 
         What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
         """
-        even = replace(self, robot=self.evenly(turns), angular=0.0)
+        even = replace(self, robot=self.evenly(turns), pose=0.0, angular=0.0)
         return even.whitening(sigma, turns)
 
     def evenly(self, turns: np.ndarray) -> float:
         """Standard deviation of a coordinate, m, from the robot's repeatability, root mean square over the points."""
         turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
-        return float(np.sqrt(self.robot**2 + self.angular**2 * turned))
+        return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
 
-    def shared(self, cells: ErrorCells, count: int) -> np.ndarray:
-        """Columns (N, 3, k) m of the model error that some of `count` measurements share, each times a standard normal number."""
-        stds = (self.workspace, self.order, self.command)
+    def shared(self, cells: ErrorCells) -> np.ndarray:
+        """Columns (N, 3, k) m of the model error that some measurements share, each times a standard normal number."""
+        stds = {name: getattr(self, name) for name in cells.blocks}
         columns = [
-            std * block_columns(labels)
-            for labels, std in zip(cells, stds, strict=True)
-            if labels is not None and std > 0
+            stds[name] * block_columns(labels) for name, labels in cells.blocks.items() if stds[name] > 0
         ]
-        return np.concatenate([np.zeros((count, 3, 0)), *columns], axis=2)
+        return np.concatenate([np.zeros((len(cells.pose), 3, 0)), *columns], axis=2)
 
 
 def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
@@ -109,30 +109,6 @@ def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
     if not stated:
         share = 1.0 if instrument > 0 else 0.0
     return Scatter(share=float(share), robot=float(robot), angular=float(angular))
-
-
-def error_cells(poses: PoseSet) -> ErrorCells:
-    """Labels (N,) of the blocks that share a model error: cells of the workspace, stretches of the measuring order, commands.
-
-    None where there are too few poses, or too few commands that were visited again.
-    """
-    count = min(len(poses) // _CELL_POSES, _MOST_CELLS)
-    commands = np.unique(
-        np.column_stack([np.round(poses.q / _SAME_COMMAND), np.unique(poses.target, return_inverse=True)[1]]),
-        axis=0,
-        return_inverse=True,
-    )[1].ravel()
-    repeated = int((np.bincount(commands) > 1).sum())
-    visits = commands if repeated >= _FEWEST_REPEATED else None
-    if count < _FEWEST_CELLS:
-        return None, None, visits
-    return workspace_folds(poses.position, count), order_folds(len(poses), count), visits
-
-
-def block_columns(labels: np.ndarray) -> np.ndarray:
-    """Columns (N, 3, 3 K) of an error that is common to each of K blocks."""
-    rows = (labels[:, None] == np.unique(labels)[None]).astype(float)
-    return np.kron(rows, np.eye(3)).reshape(len(labels), 3, -1)
 
 
 def joint_turns(at: Prediction) -> np.ndarray:

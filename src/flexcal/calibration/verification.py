@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.calibration.error_cells import ErrorCells, block_columns
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
-from flexcal.calibration.scatter import block_columns, error_cells, joint_turns, known_scatter
+from flexcal.calibration.scatter import joint_turns, known_scatter
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 
@@ -115,7 +116,7 @@ def _freedom(model: RobotModel, at: Prediction, predicted: float) -> float:
 
 def _shared_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
     """Columns (N, 3, k) m of the model error, common to the poses of a cell of the workspace."""
-    cells = error_cells(poses)[0]
+    cells = ErrorCells.of(poses).workspace
     labels = np.arange(len(poses)) if cells is None else cells
     return model.value("scatter.model") * block_columns(labels)
 
