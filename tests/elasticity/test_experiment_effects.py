@@ -9,7 +9,7 @@ import pytest
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity import ReferenceMotion, Tolerances, reference_shift
-from flexcal.elasticity.gap import gap_compliance
+from flexcal.elasticity.drive_torque import DriveTorque
 from flexcal.elasticity.model_error import LowRank
 from flexcal.model.closed_loop import multisine_torque
 from flexcal.model.linearisation import linearise
@@ -61,7 +61,7 @@ def test_shift_is_quadratic_in_the_amplitude_and_vanishes_at_rest(tx90l, poses):
 def test_compliance_of_a_gap(tx90l, poses, rng):
     """That of the twist against a Gaussian torque through zero; a drive held far from zero torque never opens its gap."""
     q, plan = poses["default"][0], plan_of(tx90l, poses["default"][:1])
-    added = gap_compliance(tx90l, q, None, plan).mean(axis=0)
+    added = DriveTorque.of(tx90l, q, None, plan).gap_compliance().mean(axis=0)
     motion, system = ReferenceMotion.of(plan), linearise(tx90l, q)
     size = multisine_torque(tx90l, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
     torque = size[0] * rng.standard_normal(400_000)
@@ -71,7 +71,8 @@ def test_compliance_of_a_gap(tx90l, poses, rng):
     assert half_gap * added[0] > 0.2
     assert 1 / stiffness * (1 + half_gap * added[0]) == pytest.approx(compliance, rel=2e-3)
     assert 1e-5 * added[1] < 1e-6
-    moving = gap_compliance(tx90l, q, None, replace(plan, reference_amplitude=np.deg2rad(3.0)))
+    swaying = replace(plan, reference_amplitude=np.deg2rad(3.0))
+    moving = DriveTorque.of(tx90l, q, None, swaying).gap_compliance()
     assert moving.mean(axis=0)[1] > added[1]
 
 

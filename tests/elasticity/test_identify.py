@@ -19,7 +19,7 @@ from flexcal.elasticity import (
     identify_stiffness,
     reference_shift,
 )
-from flexcal.elasticity.gap import gap_compliance
+from flexcal.elasticity.drive_torque import DriveTorque
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.elasticity.weighting import CovarianceWeighting
 from flexcal.estimation import Parameters
@@ -235,7 +235,7 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
     half_gap, responses = {1: 4e-5, 2: 6e-5}, []
     dragging = replace(tx90l, viscous=tx90l.viscous * np.append(VISCOUS, np.ones(3)))
     for q in poses["default"]:
-        added = gap_compliance(dragging, q, None, plan)[0]
+        added = DriveTorque.of(dragging, q, None, plan).gap_compliance()[0]
         soft = {
             f"joint_{axis + 1}.drive.{key}": 1 / (1 + size * added[axis])
             for axis, size in half_gap.items()

@@ -45,6 +45,7 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
     if not model.elastic:
         return []
     names = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
+    names += [name for e in model.elastic if model.posterior.determines(name := f"{e.name}.drive.hardening")]
     names += uncertain_inertials(model, [i for i in range(model.n) if _carried(model, i)])
     if poses.payload is None or poses.payload.any():
         names += uncertain_payload(model)

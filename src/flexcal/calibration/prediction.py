@@ -12,6 +12,7 @@ from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model import Equilibrium, PointKinematics, RobotModel, carried_mass, tool_at_rest
 from flexcal.model.equilibrium import lateral_slopes
+from flexcal.model.hardening import twist_by_hardening, twist_of
 from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
@@ -56,6 +57,9 @@ class Prediction:
             elif key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
                 i = self.model.joint_index(owner)
                 result[:, :, k] = self._twist(i, key)[:, None] * by_geometry[:, :, 6 * i]
+            elif key == "hardening":
+                i = self.model.joint_index(owner.removesuffix(".drive"))
+                result[:, :, k] = self._twist(i, key)[:, None] * by_motion[:, :, i, 2]
             elif key in LATERAL:
                 i = self.model.joint_index(owner)
                 tilt = self._lateral[:, i, LATERAL.index(key)]
@@ -65,7 +69,11 @@ class Prediction:
         return result
 
     def _twist(self, joint: int, key: str) -> np.ndarray:
-        """How far a joint turns (N,) with its backlash, gravity compliance or one wave of its transmission error."""
+        """How far a joint turns (N,) with its backlash, gravity compliance, hardening or one wave of its transmission error."""
+        if key == "hardening":
+            hardening = self.model.hardening[joint]
+            twist = twist_of(-self.rest.torque[:, joint], self.model.stiffness[joint, 2], hardening)
+            return twist_by_hardening(twist, hardening)
         if key == "backlash":
             return -self.rest.flank[:, joint]
         if key == "gravity_compliance":

@@ -10,6 +10,7 @@ from flexcal.calibration.prediction import left_jacobian
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, carried_mass, gravity_torque, point_kinematics
 from flexcal.model.equilibrium import elastic_axes, lateral_slopes, spring_loads
+from flexcal.model.hardening import tangent_ratio, twist_by_hardening, twist_of
 from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
@@ -58,6 +59,9 @@ class Propagation:
         at = point_kinematics(model, q, point=self.target)
         stiffness = model.stiffness[axes[:, 0], axes[:, 1]]
         by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
+        if model.hardening.any():
+            hardening = np.where(axes[:, 1] == 2, model.hardening[axes[:, 0]], 0.0)
+            by_load /= tangent_ratio(twist_of(loads, stiffness, hardening), hardening)[:, None]
         by_geometry = at.geometry_jacobian[:, :3]
         by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
         twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, loads)[:, None]
@@ -96,6 +100,10 @@ class Propagation:
                 columns[:, k] = -np.sign(torque[:, joint])
             elif kind == "gravity_compliance":
                 columns[:, k] = -torque[:, joint]
+            elif kind == "hardening":
+                hardening = self.model.hardening[joint]
+                twist = twist_of(-torque[:, joint], self.model.stiffness[joint, 2], hardening)
+                columns[:, k] = twist_by_hardening(twist, hardening)
             elif kind in LATERAL:
                 columns[:, k] = 0.0
             else:
@@ -116,8 +124,10 @@ class Propagation:
                 twists[:, :, k] = np.matmul(by_tilt[:, :, joint], slopes[:, joint, axis, :, None])[:, :, 0]
 
     def _torque(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
-        """Gravity torque (N, n) on the joints with backlash or gravity compliance; that on drives with springs is among the `loads`."""
-        loaded = {joint for joint, kind in self.twisting if kind in ("backlash", "gravity_compliance")}
+        """Gravity torque (N, n) on the joints that twist by it; that on drives with springs is among the `loads`."""
+        loaded = {
+            joint for joint, kind in self.twisting if kind in ("backlash", "gravity_compliance", "hardening")
+        }
         springs = {
             joint: k for k, (joint, component) in enumerate(elastic_axes(self.model)) if component == 2
         }
@@ -198,11 +208,13 @@ def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
     owner, _, key = name.rpartition(".")
     if key in ("backlash", "gravity_compliance", *LATERAL) or key.startswith("transmission_"):
         return model.joint_index(owner), key
+    if key == "hardening":
+        return model.joint_index(owner.removesuffix(".drive")), key
     return None
 
 
 def _is_elastic(name: str) -> bool:
-    return name.endswith((".stiffness", ".mass", ".com_x", ".com_y", ".com_z"))
+    return name.endswith((".stiffness", ".hardening", ".mass", ".com_x", ".com_y", ".com_z"))
 
 
 def _is_geometric(name: str) -> bool:

@@ -21,7 +21,7 @@ def source_of(name: str) -> str:
         return "instrument's place"
     if owner == "payload":
         return "payload"
-    if key == "stiffness":
+    if key in ("stiffness", "hardening"):
         return "springs"
     if key in ("mass", "com_x", "com_y", "com_z"):
         return "link masses"

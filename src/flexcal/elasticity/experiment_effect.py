@@ -52,8 +52,8 @@ def _effect(
     strength = np.where(model.robot.coulomb > 0, excess, 0.0)[axes]
     system = linearise(robot, pose.q, payload)
     pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)
-    share = pose.open_share(natural)
-    opening = share / (1.0 - share.mean(axis=0))
+    ratio = pose.stiffness_ratio(natural)
+    opening = 1.0 - ratio / ratio.mean(axis=0)
     moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening)
     late = np.array([natural[number] if number >= 0 else 0.0 for number in pose.delays])
     phase = np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]

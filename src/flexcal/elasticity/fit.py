@@ -22,8 +22,10 @@ from flexcal.progress import Progress, silent
 ROUNDS = 2
 """Fits, each with model error and reference motion evaluated at the last optimum."""
 
-FINE, COARSE = 1e-7, 1e-3
+FINE, COARSE = 1e-6, 1e-3
 """Tolerances of the last fit, and of those before it."""
+COARSE_ITERATIONS = 60
+"""Most iterations of the latter: a model that is wrong may go on for hundreds, to no end."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +33,7 @@ class ResponseData:
     """Measured responses, and how they were measured and are weighed.
 
     With the `plan`, the reference motion is part of the prediction. `tolerances` are the standard deviations of what the model leaves out.
-    `inertias_known` keeps link and payload inertias at the model's.
+    `inertias_known` keeps link and payload inertias at the model's; with `hardening` that of the drives is estimated.
     """
 
     responses: tuple[FrequencyResponse, ...]
@@ -39,6 +41,7 @@ class ResponseData:
     weighting: Weighting = field(default_factory=CovarianceWeighting)
     tolerances: Tolerances = field(default_factory=Tolerances)
     inertias_known: bool = False
+    hardening: bool = False
 
     @property
     def effects(self) -> bool:
@@ -49,7 +52,11 @@ class ResponseData:
         """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` where responses do not fit the robot."""
         return model.posterior.prior(
             stage_one_parameters(
-                model, self.responses, inertias_known=self.inertias_known, gaps=self.plan is not None
+                model,
+                self.responses,
+                inertias_known=self.inertias_known,
+                gaps=self.plan is not None,
+                hardening=self.hardening,
             )
         )
 
@@ -109,14 +116,15 @@ def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float)
     predicting = ResponseModel.of(model, responses, parameters)
     effects = [ExperimentEffect.none(response) for response in responses]
     if plan is not None:
-        predicting = predicting.with_open_gaps(x, plan)
+        predicting = predicting.with_loaded_drives(x, plan)
         if plan.reference_amplitude > 0:
             effects = experiment_effects(predicting, x, ReferenceMotion.of(plan))
     residual = StageOneResidual.of(predicting, responses, data.weighting)
     residual = residual.shifted(predicting, [effect.shift for effect in effects])
     error = ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
     problem = _problem(residual, error, parameters, prior)
-    fitted = solve(problem, starts=x[None], tolerance=tolerance)
+    iterations = COARSE_ITERATIONS if tolerance == COARSE else 200
+    fitted = solve(problem, starts=x[None], tolerance=tolerance, max_iterations=iterations)
     return ResponseFit(residual, tuple(effects), error, problem, fitted)
 
 

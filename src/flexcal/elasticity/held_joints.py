@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.elasticity.fit import ResponseData, ResponseFit
 from flexcal.elasticity.naming import held_inertia_name
 from flexcal.elasticity.prediction import Prediction, ResponseModel
+from flexcal.elasticity.score_test import asks_for
 from flexcal.estimation import profile_rise
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -64,24 +65,9 @@ class HeldJoints:
     def asked_for(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> bool:
         """Whether the residual of `fit`, with all these joints rigid, holds what their compliances would add to the responses.
 
-        Rao's score test: with C the sensitivity to the compliances, orthogonal to that of all fitted parameters, T = rᵀ C (Cᵀ C)⁻¹ Cᵀ r
-        is χ² of as many degrees of freedom as joints, times the variance of what is left. The threshold is the Bayesian information
-        criterion's, log(rows) a joint.
+        Rao's score test by their compliances.
         """
-        if not self.springs:
-            return False
-        residual, jacobian = fit.problem.linearise(fit.x)
-        prior_rows = fit.problem.prior_rows()
-        offset = prior_rows @ (fit.x - fit.problem.parameters.prior_mean())
-        columns = fit.whiten(self._shifts(model, fit))
-        columns = np.vstack([columns, np.zeros((len(prior_rows), len(self.springs)))])
-        nuisance = np.vstack([jacobian, prior_rows])
-        basis = np.linalg.qr(nuisance / np.linalg.norm(nuisance, axis=0))[0]
-        columns -= basis @ (basis.T @ columns)
-        scores = columns.T @ np.concatenate([residual, offset])
-        statistic = scores @ np.linalg.lstsq(columns.T @ columns, scores)[0]
-        variance = max(1.0, fit.estimate.reduced_chi2) * data.tolerances.inflation(data.responses)
-        return bool(statistic > variance * len(self.springs) * np.log(len(residual)))
+        return bool(self.springs) and asks_for(fit, data, fit.whiten(self._shifts(model, fit)))
 
     def _shifts(self, model: RobotModel, fit: ResponseFit) -> np.ndarray:
         """Change (m, k) of the residual by each compliance, in units of that of `springs`, by a forward difference from rigid."""

@@ -9,6 +9,7 @@ import numpy as np
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.fit import FINE, ResponseData, ResponseFit, final_fit, first_fit, fit_responses
+from flexcal.elasticity.hardening_drives import with_hardening
 from flexcal.elasticity.held_joints import HeldJoints
 from flexcal.elasticity.misfit import misfit_of_fit, misfit_std
 from flexcal.elasticity.model_error import Tolerances
@@ -18,7 +19,7 @@ from flexcal.elasticity.profile import profile_stretch
 from flexcal.elasticity.response_bearings import ResponseBearings, with_fitting_bearings
 from flexcal.elasticity.search import MultiStart, Search
 from flexcal.elasticity.weighting import CovarianceWeighting, Weighting
-from flexcal.estimation import Estimate, Parameters, solve
+from flexcal.estimation import Estimate, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -73,8 +74,9 @@ def identify_stiffness(
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
     measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the
     `plan`, what the reference motion does is part of the model: the arm's inertia changes along it, friction acts in pulses at its
-    reversals, gaps stand open while the torque of their drive passes zero. `tolerances` are what the model leaves out, all of it in
-    the covariance; `Tolerances.none()` for an exact linear plant. `inertias_known` fixes link and payload inertias at the model's.
+    reversals, gaps stand open while the torque of their drive passes zero, and drives harden under it where the responses ask for that.
+    `tolerances` are what the model leaves out, all of it in the covariance; `Tolerances.none()` for an exact linear plant.
+    `inertias_known` fixes link and payload inertias at the model's.
 
     The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
     neighbouring lines, the first inflated by the reduced χ² where it exceeds 1; a badly known stiffness has the width of its profile
@@ -95,6 +97,10 @@ def identify_stiffness(
     x = search.find(model, responses, *data.parameters(model), rng, progress)
     progress("fitting", 0.0)
     first = first_fit(model, data, x)
+    harder = with_hardening(model, data, first)
+    if harder is not data:
+        data = harder
+        first = first_fit(model, data, data.parameters(model)[0].coordinates(first.estimate.values))
     progress("fitting", 0.3)
 
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
@@ -154,26 +160,21 @@ def _searched_fit(
     """The fit of a robot with braked elastic joints: with rotors that stand still at the start and, where that leaves a misfit, with rotors
     that move with the arm because position loops hold them; the better of both."""
     parameters, prior = data.parameters(model)
-    rotors = {held_inertia_name(e.name): float(model.rotor_inertia[e.index]) for e in model.elastic}
-    moving = Parameters(
-        replace(item, value=rotors[item.name], prior_mean=item.value) if item.name in rotors else item
-        for item in parameters
+    x = search.find(
+        model,
+        data.responses,
+        parameters,
+        prior,
+        rng,
+        lambda _, share: progress("fitting", 0.3 + 0.2 * share),
     )
-    fits: list[ResponseFit] = []
-    for start in (parameters, moving):
-        first = 0.3 + 0.2 * len(fits)
-        x = search.find(
-            model,
-            data.responses,
-            start,
-            prior,
-            rng,
-            lambda _, share, first=first: progress("fitting", first + 0.2 * share),
-        )
-        fits.append(fit_responses(model, data, x))
-        if misfit_of_fit(fits[-1], data.responses) is None:
-            break
-    return min(fits, key=lambda fit: fit.estimate.reduced_chi2)
+    first = first_fit(model, data, x)
+    if misfit_of_fit(first, data.responses) is not None:
+        rotors = {held_inertia_name(e.name): float(model.rotor_inertia[e.index]) for e in model.elastic}
+        moving = [(item.name, rotors.get(item.name, item.value)) for item in parameters.with_coordinates(x)]
+        second = first_fit(model, data, parameters.coordinates(dict(moving)))
+        first = min(first, second, key=lambda fit: fit.estimate.reduced_chi2)
+    return final_fit(model, data, first)
 
 
 def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:

@@ -25,6 +25,11 @@ def half_gap_name(joint: str) -> str:
     return f"{joint}.drive.half_gap"
 
 
+def hardening_name(joint: str) -> str:
+    """Name of the hardening of a drive, 1/rad²."""
+    return f"{joint}.drive.hardening"
+
+
 def held_inertia_name(joint: str) -> str:
     """Name of the inertia that moves with the arm of a joint whose motor is held."""
     return f"{joint}.held_inertia"

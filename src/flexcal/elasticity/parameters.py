@@ -6,15 +6,25 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.elasticity.naming import half_gap_name, held_inertia_name, pose_labels, viscous_name
+from flexcal.elasticity.naming import (
+    half_gap_name,
+    hardening_name,
+    held_inertia_name,
+    pose_labels,
+    viscous_name,
+)
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.declared import FRICTION_LOG_STD, elastic_inertials, springs_and_rotors
+from flexcal.model.names import unit_of
 
 HALF_GAP_STD = 1e-4
 """Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
+
+HARDENING_STD = 3e5
+"""Prior of a drive's hardening, 1σ in 1/rad²: 30 % more torque at 1 mrad, about the twist of a loaded gear, than its stiffness says."""
 
 
 def stage_one_parameters(
@@ -23,15 +33,16 @@ def stage_one_parameters(
     *,
     inertias_known: bool = False,
     gaps: bool = False,
+    hardening: bool = False,
 ) -> Parameters:
     """Every parameter of stage 1 with its prior.
 
     Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
     in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
     prior 0 ± the sample time. Rotor inertias have the prior of robot.yaml; so have mass and centre of mass of every link that an
-    elastic joint moves, and the payload's mass, unless `inertias_known`. With `gaps`, a drive
-    with backlash has its half gap: while it stands open, the drive appears softer. Raises `FlexcalError` where responses do not fit
-    the robot.
+    elastic joint moves, and the payload's mass, unless `inertias_known`. With `gaps`, a drive with backlash has its half gap: while it
+    stands open, the drive appears softer. With `hardening`, every drive may be stiffer where it carries more torque. Raises
+    `FlexcalError` where responses do not fit the robot.
     """
     check_responses(model, responses)
     loaded = any(r.payload != 0 for r in responses)
@@ -61,6 +72,17 @@ def stage_one_parameters(
             )
             for joint in model.driven
             if joint.index in model.backlash_joints
+        ]
+    if hardening:
+        items += [
+            Parameter(
+                name := hardening_name(joint.name),
+                unit_of(name),
+                float(model.hardening[joint.index]),
+                lower=0.0,
+                prior_std=HARDENING_STD,
+            )
+            for joint in model.driven
         ]
     return Parameters(items)
 

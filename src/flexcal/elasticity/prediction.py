@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.elasticity.gap import gap_compliance
-from flexcal.elasticity.naming import half_gap_name, pose_labels, viscous_name
+from flexcal.elasticity.drive_torque import DriveTorque
+from flexcal.elasticity.naming import half_gap_name, hardening_name, pose_labels, viscous_name
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
@@ -31,7 +31,8 @@ class PoseModel:
     """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
 
     `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
-    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `delays` (E,)
+    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` and
+    `hardening_stiffness` (phases, E) are the same for drives that harden: relative stiffness, per 1/rad². `delays` (E,)
     are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
     """
 
@@ -41,13 +42,15 @@ class PoseModel:
     robot_names: dict[str, int]
     gaps: dict[int, int]
     gap_compliance: np.ndarray
+    hardening: dict[int, int]
+    hardening_stiffness: np.ndarray
     delays: np.ndarray
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
         """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
         known = {name: float(natural[number]) for name, number in self.robot_names.items()}
-        kept = 1.0 - self.open_share(natural).mean(axis=0)
-        for axis in self.gaps:
+        kept = self.stiffness_ratio(natural).mean(axis=0)
+        for axis in self.changing:
             for name in _drive(robot, axis):
                 known[name] = known.get(name, robot.value(name)) * float(kept[axis])
         payload = self.payload
@@ -56,20 +59,33 @@ class PoseModel:
             known["payload.mass"] = payload
         return known, payload
 
-    def open_share(self, natural: np.ndarray) -> np.ndarray:
-        """Share (phases, E) of stiffness and damping that every drive lacks along the reference motion."""
-        softer = self._softer(natural)
-        return softer / (1.0 + softer)
+    @property
+    def changing(self) -> tuple[int, ...]:
+        """The axes whose drive changes its stiffness along the reference motion."""
+        return tuple(sorted({*self.gaps, *self.hardening}))
 
-    def softening_slope(self, natural: np.ndarray) -> np.ndarray:
-        """Derivative (E,) of the logarithm of each drive's mean stiffness and damping by its half gap, 1/rad."""
-        lost = np.mean(self.gap_compliance / (1.0 + self._softer(natural)) ** 2, axis=0)
-        return -lost / (1.0 - self.open_share(natural).mean(axis=0))
+    def stiffness_ratio(self, natural: np.ndarray) -> np.ndarray:
+        """Stiffness and damping (phases, E) of every drive along the reference motion over those at no load with its gap closed."""
+        return self._harder(natural) / self._softer(natural)
+
+    def slopes(self, natural: np.ndarray) -> list[tuple[int, int, float]]:
+        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by it: gaps, hardening."""
+        harder, softer = self._harder(natural), self._softer(natural)
+        mean = np.mean(harder / softer, axis=0)
+        by_gap = -np.mean(harder * self.gap_compliance / softer**2, axis=0) / mean
+        by_hardening = np.mean(self.hardening_stiffness / softer, axis=0) / mean
+        return [
+            (axis, number, float(slope[axis]))
+            for numbers, slope in ((self.gaps, by_gap), (self.hardening, by_hardening))
+            for axis, number in numbers.items()
+        ]
 
     def _softer(self, natural: np.ndarray) -> np.ndarray:
-        half_gap = np.zeros(self.gap_compliance.shape[1])
-        half_gap[list(self.gaps)] = natural[list(self.gaps.values())]
-        return self.gap_compliance * half_gap
+        return 1.0 + self.gap_compliance * _by_axis(self.gaps, natural, self.gap_compliance.shape[1])
+
+    def _harder(self, natural: np.ndarray) -> np.ndarray:
+        axes = self.hardening_stiffness.shape[1]
+        return 1.0 + self.hardening_stiffness * _by_axis(self.hardening, natural, axes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,7 +93,8 @@ class ResponseModel:
     """Predicts every pose at estimation coordinates x (p,); what `parameters` do not hold stays at the value of `robot`.
 
     The linearisation point is the measured mean motor position; the rest position of the arm follows the parameters. The delay of
-    an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j). Gaps count as closed until `with_open_gaps`.
+    an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j). Gaps count as closed and drives as linear until
+    `with_loaded_drives`.
     """
 
     robot: RobotModel
@@ -88,7 +105,8 @@ class ResponseModel:
     def of(
         cls, robot: RobotModel, responses: Sequence[FrequencyResponse], parameters: Parameters
     ) -> ResponseModel:
-        """For the poses and lines of measured responses."""
+        """For the poses and lines of measured responses; hardening is a parameter's or none."""
+        robot = replace(robot, hardening=np.zeros(robot.n))
         labels = pose_labels(responses)
         own = {
             viscous_name(joint.name, label): (f"{joint.name}.viscous", label)
@@ -100,12 +118,17 @@ class ResponseModel:
             for axis, joint in enumerate(robot.driven)
             if half_gap_name(joint.name) in parameters
         }
-        poses = []
+        hardening = {
+            axis: parameters.index(hardening_name(joint.name))
+            for axis, joint in enumerate(robot.driven)
+            if hardening_name(joint.name) in parameters
+        }
+        poses, unchanged = [], np.zeros((1, len(robot.driven)))
         for response, label in zip(responses, labels, strict=True):
             names: dict[str, int] = {}
             for number, name in enumerate(parameters.names):
                 target, only = own.get(name, (name, label))
-                if only == label and target in robot.values and not name.endswith(".delay"):
+                if only == label and target in robot.values and not name.endswith((".delay", ".hardening")):
                     names[target] = number
             if response.payload == 0:
                 names.pop("payload.mass", None)
@@ -118,22 +141,31 @@ class ResponseModel:
                     response.payload,
                     names,
                     gaps,
-                    np.zeros((1, len(robot.driven))),
+                    unchanged,
+                    hardening,
+                    unchanged,
                     at,
                 )
             )
         return cls(robot, parameters, tuple(poses))
 
-    def with_open_gaps(self, x: np.ndarray, plan: MultisinePlan) -> ResponseModel:
-        """Gaps stand open as the plan's torques have it at the coordinates x (p,)."""
+    def with_loaded_drives(self, x: np.ndarray, plan: MultisinePlan) -> ResponseModel:
+        """Gaps stand open and drives harden as the plan's torques have it at the coordinates x (p,)."""
         natural = self.parameters.natural(x)
         poses = []
         for pose in self.poses:
             known, payload = pose.values(self.robot, natural)
-            softened = self.robot.with_values(known)
-            kept = 1.0 - pose.open_share(natural).mean(axis=0)
-            compliance = gap_compliance(softened, pose.q, payload, plan) / kept  # beside the spring's own
-            poses.append(replace(pose, gap_compliance=compliance))
+            loaded = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan)
+            mean = pose.stiffness_ratio(natural).mean(axis=0)
+            loaded = replace(loaded, stiffness=loaded.stiffness / mean)  # at no load
+            hardening = _by_axis(pose.hardening, natural, len(mean))
+            poses.append(
+                replace(
+                    pose,
+                    gap_compliance=loaded.gap_compliance(),
+                    hardening_stiffness=loaded.hardening_stiffness(hardening),
+                )
+            )
         return replace(self, poses=tuple(poses))
 
     def predict(self, x: np.ndarray) -> list[Prediction]:
@@ -151,7 +183,7 @@ class ResponseModel:
     ) -> Prediction:
         known, payload = pose.values(self.robot, values)
         robot = self.robot.with_values(known)
-        softened = {name: axis for axis in pose.gaps for name in _drive(robot, axis)}
+        softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
         names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
         system = linearise(robot, pose.q, payload, derivatives=names)
         s = 2j * np.pi * pose.frequencies_hz
@@ -163,8 +195,7 @@ class ResponseModel:
         if not derivatives:
             return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
         change = change * phase[..., None]
-        lost = pose.softening_slope(values)
-        gap_changes = {axis: np.zeros_like(response) for axis in pose.gaps}
+        drive_changes = {axis: np.zeros_like(response) for axis in pose.changing}
         numbers, blocks = [], []
         for k, name in enumerate(names):
             slope = known[name]  # ∂/∂ log of it
@@ -173,16 +204,23 @@ class ResponseModel:
                 log = self.parameters[numbers[-1]].scale == "log"
                 blocks.append(change[..., k] * (slope if log else 1.0))
             if name in softened:
-                gap_changes[softened[name]] += change[..., k] * slope * lost[softened[name]]
-        for axis, gap_change in gap_changes.items():
-            numbers.append(pose.gaps[axis])
-            blocks.append(gap_change)
+                drive_changes[softened[name]] += change[..., k] * slope
+        for axis, number, by_parameter in pose.slopes(values):
+            numbers.append(number)
+            blocks.append(drive_changes[axis] * by_parameter)
         for axis in np.flatnonzero(pose.delays >= 0):
             numbers.append(pose.delays[axis])
             late = np.zeros_like(response)
             late[:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[numbers[-1]]
             blocks.append(late)
         return Prediction(response, np.stack(blocks, axis=-1), np.array(numbers))
+
+
+def _by_axis(numbers: dict[int, int], natural: np.ndarray, axes: int) -> np.ndarray:
+    """Natural values (axes,) of one parameter an axis, 0 where an axis has none."""
+    values = np.zeros(axes)
+    values[list(numbers)] = natural[list(numbers.values())]
+    return values
 
 
 def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:

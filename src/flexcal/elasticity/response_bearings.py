@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from flexcal.elasticity.fit import ResponseData, ResponseFit, first_fit
+from flexcal.elasticity.fit import ResponseData, ResponseFit, first_fit, fit_responses
 from flexcal.errors import FlexcalError
 from flexcal.estimation.vuong import vuong_statistic
 from flexcal.model import RobotModel
@@ -67,8 +67,8 @@ def with_fitting_bearings(
 ) -> tuple[RobotModel, ResponseFit, ResponseBearings | None]:
     """What `complete` makes of a robot's `first` fit, or of a first fit with the other bearings where these are taken; and why.
 
-    Where completing the better one adds springs, bearings were not all that was missing: both are then completed before they are
-    compared. The last is None for a robot without bearings, or where one with the others has no fit.
+    Where completing the better one adds springs, bearings were not all that was missing: the other is then fitted with the same springs,
+    from there, before they are compared. The last is None for a robot without bearings, or where one with the others has no fit.
     """
     if not model.has_bearings:
         return *complete(model, first), None
@@ -84,9 +84,14 @@ def with_fitting_bearings(
         return *complete(model, first), None
     found = compared(first, begun[other.bearings][1])
     better = found.preferred or model.bearings
-    ended = {better: complete(*begun[better])}
-    if ended[better][0] is not begun[better][0]:
-        ended = {bearings: ended.get(bearings) or complete(*begun[bearings]) for bearings in begun}
+    robot, fit = complete(*begun[better])
+    ended = {better: (robot, fit)}
+    if robot.braked != model.braked:
+        worse: Bearings = "before" if better == "after" else "after"
+        robot = robot.with_bearings(worse)
+        try:
+            ended[worse] = robot, fit_responses(robot, data, fit.x)
+        except FlexcalError:
+            return *ended[better], found
         found = compared(ended[model.bearings][1], ended[other.bearings][1])
-    robot, fit = ended.get(found.taken) or complete(*begun[found.taken])
-    return robot, fit, found
+    return *(ended.get(found.taken) or complete(*begun[found.taken])), found

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection
 
+import numpy as np
+
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter
 from flexcal.model.names import GEOMETRY, spring_names, unit_of
@@ -21,6 +23,9 @@ SPRING_LOG_STD = 1.5
 posterior proper."""
 FURTHER_SPRING_LOG_STD = 2.0
 """The same for a spring that robot.yaml does not declare and the responses ask for, about a mode at the highest line."""
+SOFTEST_FURTHER_SPRING = 16.0
+"""How much softer it may be at most: with a mode at a quarter of the highest line. Softer ones would be seen by eye, and imitate
+friction."""
 FRICTION_LOG_STD = 1.5
 """Prior of the motor's viscous coefficient in one pose of a frequency response, 1σ of the logarithm about what is seen or predicted."""
 FRICTION_TOLERANCE = 0.05
@@ -61,14 +66,13 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
             raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")
     declared_joints = {entry.joint for entry in model.config.elastic}
 
-    def width(name: str) -> float:
-        return SPRING_LOG_STD if name.split(".")[0] in declared_joints else FURTHER_SPRING_LOG_STD
+    def spring(name: str) -> Parameter:
+        value, known = model.value(name), name.split(".")[0] in declared_joints
+        softest = -np.inf if known or name.endswith(".damping") else value / SOFTEST_FURTHER_SPRING
+        width = SPRING_LOG_STD if known else FURTHER_SPRING_LOG_STD
+        return Parameter(name, unit_of(name), value, lower=softest, prior_std=width, scale="log")
 
-    springs = (
-        Parameter(name, unit_of(name), model.value(name), prior_std=width(name), scale="log")
-        for name in names
-    )
-    return (*springs, *(declared(model, name) for name in rotors))
+    return (*map(spring, names), *(declared(model, name) for name in rotors))
 
 
 def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
@@ -96,7 +100,8 @@ def declared(model: RobotModel, name: str) -> Parameter:
     value, key = model.value(name), name.rpartition(".")[2]
     std = _std(model, name, key)
     scale = "log" if key in _POSITIVE else "linear"
-    return Parameter(name, unit_of(name), value, prior_std=std, scale=scale)
+    lower = 0.0 if key == "hardening" else -np.inf
+    return Parameter(name, unit_of(name), value, lower=lower, prior_std=std, scale=scale)
 
 
 def _std(model: RobotModel, name: str, key: str) -> float:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.model.hardening import tangent_ratio, twist_of
 from flexcal.model.kinematics import joint_batch
 from flexcal.model.lateral_compliance import lateral_axes
 from flexcal.model.robot_model import RobotModel
@@ -178,7 +179,8 @@ def static_equilibrium(
     overrides the sign of the drive torque that places the arm in the backlash (q_arm = q_M - τ/c - b sign τ, b half the gap); it is that
     of the torque at rest itself, but for an arm that hangs within its gap, where either sign would pull it across: there one of the
     two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Lateral compliance tilts
-    axes without a change of the load on springs, some 1e-3 of it. Raises `FlexcalError` where springs cannot carry the arm.
+    axes without a change of the load on springs, some 1e-3 of it; what drives twist less because they harden is that of the undeflected
+    arm's load. Raises `FlexcalError` where springs cannot carry the arm.
     """
     q = joint_batch(model, q)
     masses = payload_batch(model, payload, len(q))
@@ -192,6 +194,12 @@ def static_equilibrium(
     free = transmission_error(model, q) - load * model.gravity_compliance
     loose = model.backlash > 0
     sprung = [i for i, component in axes if component == 2]
+    hardening, softer = model.hardening[sprung], np.ones((len(q), len(sprung)))
+    if hardening.any():
+        linear = load[:, sprung] / model.stiffness[sprung, 2]
+        twist = twist_of(load[:, sprung], model.stiffness[sprung, 2], hardening)
+        free[:, sprung] += linear - twist
+        softer = 1 / tangent_ratio(twist, hardening)
     rest = np.sign(load) if flank is None else flank
     for last in (False,) * (_FLANK_PASSES - 1) + (True,):
         slack = free - rest * model.backlash
@@ -208,6 +216,10 @@ def static_equilibrium(
     if model.lateral_compliance.any():
         slopes = lateral_slopes(model, q, masses)
         deflection[:, :, :2] += np.matmul(model.lateral_compliance[:, None, :], slopes)[:, :, 0]
+    if sensitivities and hardening.any():
+        derivatives[0][:, [k for k, (_, component) in enumerate(axes) if component == 2]] *= softer[
+            :, :, None
+        ]
     has_backlash = np.zeros(model.n)
     has_backlash[list(model.backlash_joints)] = 1.0
     return Equilibrium(

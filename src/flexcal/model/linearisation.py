@@ -10,6 +10,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.elastic_arm import ElasticArm, moved_inertia
 from flexcal.model.equilibrium import Equilibrium, elastic_axes, static_equilibrium
+from flexcal.model.hardening import tangent_ratio, twist_of
 from flexcal.model.names import SPRINGS
 from flexcal.model.robot_model import RobotModel
 
@@ -67,22 +68,25 @@ def linearise(
     for k, (joint, component) in enumerate(axes):
         if component == 2 and joint in robot.braked:
             mass[count + k, count + k] += robot.held_inertia[joint]
-    for pattern, k, c in _springs(robot, axes).values():
+    springs = _springs(robot, axes, rest)
+    for pattern, k, c in springs.values():
         stiffness += k * pattern
         damping += c * pattern
     result: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
     if derivatives:
-        result = _derivatives(robot, arm, at, rest, axes, derivatives)
+        result = _derivatives(robot, arm, at, rest, axes, springs, derivatives)
     return Linearisation(tuple(e.name for e in robot.driven), mass, damping, stiffness, result)
 
 
 def _springs(
-    robot: RobotModel, axes: list[tuple[int, int]]
+    robot: RobotModel, axes: list[tuple[int, int]], rest: Equilibrium
 ) -> dict[tuple[int, int], tuple[np.ndarray, float, float]]:
     """Each spring's pattern (E + d, E + d), stiffness and damping, by its axis: a drive spring couples rotor and twist.
 
-    A braked rotor does not move, so its spring holds the twist against the ground.
+    A braked rotor does not move, so its spring holds the twist against the ground. The pattern of a drive that hardens is larger by its
+    tangent stiffness at rest.
     """
+    steeper = tangent_ratio(_twists(robot, rest), robot.hardening)
     count = len(robot.driven)
     rotor = {e.index: r for r, e in enumerate(robot.driven)}
     result = {}
@@ -91,7 +95,7 @@ def _springs(
         stretch[count + k] = 1.0
         if component == 2 and joint in rotor:
             stretch[rotor[joint]] = -1.0
-        pattern = np.outer(stretch, stretch)
+        pattern = np.outer(stretch, stretch) * (steeper[joint] if component == 2 else 1.0)
         result[joint, component] = (
             pattern,
             robot.stiffness[joint, component],
@@ -106,13 +110,13 @@ def _derivatives(
     at: np.ndarray,
     rest: Equilibrium,
     axes: list[tuple[int, int]],
+    springs: dict[tuple[int, int], tuple[np.ndarray, float, float]],
     names: Sequence[str],
 ) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     count, d = len(robot.driven), len(axes)
     size = count + d
     by_motion_mass = arm.mass_matrix_derivatives(at)
     by_motion_stiffness = arm.gravity_stiffness_derivatives(at)
-    springs = _springs(robot, axes)
     zero = np.zeros((size, size))
 
     def widened(block: np.ndarray) -> np.ndarray:
@@ -155,6 +159,13 @@ def _derivatives(
         else:
             raise FlexcalError(f"the linearised robot has no derivative with respect to '{name}'.")
     return result
+
+
+def _twists(robot: RobotModel, rest: Equilibrium) -> np.ndarray:
+    """Twist (n,) of the drive springs at rest, rad; 0 for rigid joints."""
+    twist, sprung = np.zeros(robot.n), [e.index for e in robot.elastic]
+    twist[sprung] = -twist_of(rest.torque[0, sprung], robot.stiffness[sprung, 2], robot.hardening[sprung])
+    return twist
 
 
 def _stretch(robot: RobotModel, rest: Equilibrium, axis: tuple[int, int]) -> float:

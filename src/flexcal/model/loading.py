@@ -96,6 +96,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         transmission=np.zeros((n, len(HARMONICS), 2)),
         stiffness=stiffness,
         damping=damping,
+        hardening=np.zeros(n),
         held_inertia=np.zeros(n),
         rotor_inertia=_per_joint(file, config, "rotor_inertia", n),
         viscous=_per_joint(file, config, "viscous", n),

@@ -58,6 +58,7 @@ class RobotModel:
     transmission: np.ndarray
     stiffness: np.ndarray
     damping: np.ndarray
+    hardening: np.ndarray
     held_inertia: np.ndarray
     rotor_inertia: np.ndarray
     viscous: np.ndarray

@@ -78,7 +78,8 @@ def run_two_stage(
     `seed`, or taken from the file `truth`; it is written to `out`/truth.yaml and read back only after everything has been identified and
     stored. `inertias_known` gives the identification the true link inertias, to see what CAD costs. The plans `designed` and `quick` are
     chosen for the robot as stage 0 left it; `quick` takes half the time, and 25 calibration poses instead of 40. The robot of the hard
-    `cell` has other parameters than the model: truth.yaml holds those that have a counterpart.
+    `cell` has other parameters than the model: truth.yaml holds those that have a counterpart. What CAD alone would have found is told for
+    the virtual cell.
 
     Raises `FlexcalError` for files that do not fit.
     """
@@ -188,7 +189,7 @@ def run_two_stage(
             command=command,
         )
         progress("verification", 1.0)
-    if dynamics is not None:
+    if dynamics is not None and cell == "virtual":
         with watch.stage("cad_alone"):
             springs = stage_one(nominal, "cad_alone")
             fitted = calibrate(springs.robot(nominal), measured)

@@ -1,0 +1,62 @@
+"""The torque that drives carry in a frequency experiment, and how gaps and hardening change their stiffness by it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data import MultisinePlan
+from flexcal.elasticity.reference_motion import ReferenceMotion
+from flexcal.model import RobotModel
+from flexcal.model.closed_loop import multisine_torque
+from flexcal.model.elastic_arm import ElasticArm
+from flexcal.model.hardening import twist_of
+from flexcal.model.linearisation import linearise
+
+PHASES = 64
+"""Instants of the reference motion at which the torque is looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class DriveTorque:
+    """Torque of the E elastic drives: `slow` (phases, E) N m of gravity and reference motion, `size` (E,) the multisine's 1σ on top of it,
+    close to Gaussian; `stiffness` (E,) N m/rad of their springs at no load."""
+
+    slow: np.ndarray
+    size: np.ndarray
+    stiffness: np.ndarray
+
+    @classmethod
+    def of(cls, robot: RobotModel, q: np.ndarray, payload: float | None, plan: MultisinePlan) -> DriveTorque:
+        """For the mean motor position `q` (n,) rad and `payload` in kg."""
+        import pinocchio as pin
+
+        arm = ElasticArm(robot, payload)
+        axes = arm.joint_velocity[[joint.index for joint in robot.driven]]
+        motion = ReferenceMotion.of(plan)
+        states = motion.states(robot, arm, q, PHASES)
+        slow = np.array(
+            [pin.rnea(arm.model, arm.data, s.configuration, s.velocity, s.acceleration)[axes] for s in states]
+        )
+        system = linearise(robot, q, payload)
+        size = multisine_torque(robot, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
+        return cls(slow, size, np.array([joint.stiffness[2] for joint in robot.driven]))
+
+    def gap_compliance(self) -> np.ndarray:
+        """What a gap adds to the compliance of each drive along the reference motion, relative, per rad of half gap, (phases, E).
+
+        A gap ± b twists by b sgn(torque), whose equivalent gain for a Gaussian torque is 2 b times the density of the torque at zero
+        (Bussgang 1952), in series with the spring's 1/k.
+        """
+        density = np.exp(-0.5 * (self.slow / self.size) ** 2) / (np.sqrt(2 * np.pi) * self.size)
+        return 2 * self.stiffness * density
+
+    def hardening_stiffness(self, hardening: np.ndarray) -> np.ndarray:
+        """What hardening adds to the stiffness of each drive along the reference motion, relative, per 1/rad², (phases, E).
+
+        The torque k (θ + a θ³) of a twist with the mean θ̄ and Gaussian about it, 1σ s, has the equivalent stiffness
+        k (1 + 3 a (θ̄² + s²)) (Bussgang 1952). θ̄ is the twist that drives of `hardening` a (E,) have under the slow torque.
+        """
+        twist = twist_of(self.slow, self.stiffness, hardening)
+        return 3 * (twist**2 + (self.size / self.stiffness) ** 2)
