@@ -171,6 +171,35 @@ def test_a_joint_that_hardly_moves_is_named(tmp_path: Path) -> None:
     assert error_scale(seen, covariance).ratio_low < 1.35
 
 
+@pytest.mark.parametrize(
+    "terms", [("gravity_compliance", "transmission_1"), ("transmission_1", "transmission_2")]
+)
+def test_terms_that_poses_do_not_tell_stay_plausible(tmp_path: Path, terms: tuple[str, ...]) -> None:
+    """Poses of a few degrees: without a plausible size of the terms, points elsewhere were off by decimetres, or not a number."""
+    case = Measured.drawn(tmp_path, 72)
+    q = case.arm.postures(40, case.rng, spread=0.02)
+    measured = case.poses(q, case.arm.measured(q, case.rng), 2e-5)
+    found = calibrate(case.model, measured, terms=("kinematic", *terms))
+    assert {u.name.rpartition(".")[2].rpartition("_")[0] for u in found.undetermined} >= {"transmission_1"}
+    seen, covariance = verify_jointly(found.model, case.fresh(60))
+    assert seen.all.max < 0.01 and seen.parameter_rms.max() < 0.015
+    assert error_scale(seen, covariance).inside > 0.9
+
+
+def test_the_rotation_of_a_station_is_the_first_joints(tmp_path: Path) -> None:
+    """Points of one joint hardly tell how the instrument is turned about them; the first joint's errors have to take that up."""
+    ratios, errors = [], []
+    for seed in range(80, 92):
+        case = Measured.drawn(tmp_path, seed)
+        q = case.arm.postures(1, case.rng) + 2e-3 * case.rng.uniform(-1, 1, (40, 6))
+        q[:, 3] += case.rng.uniform(-0.8, 0.8, 40)
+        found = case.calibrated(q, case.arm.measured(q, case.rng), 2e-5)
+        seen, covariance = verify_jointly(found.model, case.fresh(60))
+        ratios.append(error_scale(seen, covariance).ratio)
+        errors.append(seen.all.mean)
+    assert np.sqrt(np.mean(np.square(ratios))) < 2 and max(errors) < 0.02
+
+
 def test_points_of_a_plane_predict_the_space(tmp_path: Path) -> None:
     case = Measured.drawn(tmp_path, 69)
     xyz, base, found = np.append(case.arm.declared_xyz, 1.0), case.arm.postures(1, case.rng, 0.0)[0], []

@@ -101,7 +101,6 @@ def test_chi2_is_judged(study: TwoStageStudy) -> None:
     }
     assert by_size == {0.2: "care", 1.0: "good", 2.0: "care", 9.0: "bad"}
     assert check_residual("q", replace(estimate, status="stalled", message="no descent")).status == "bad"
-    assert check_residual("q", estimate, sigma_given=False).status == "unknown"
 
 
 def test_a_drift_is_flagged(simulated: TwoStageRun) -> None:

@@ -6,12 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.stats import chi2
 
 from flexcal.design.skeleton import joint_origins
 from flexcal.model import RobotModel
 from flexcal.report import TwoStageStudy
-from flexcal.report.checks import BOUND_95
 from flexcal.report.figures.arm_poses import skeletons
 from flexcal.report.figures.canvas import decades
 from flexcal.report.figures.error_components import error_components
@@ -37,10 +35,6 @@ def test_expected_quantiles_are_those_of_a_simulation(rng: np.random.Generator) 
     draws = np.linalg.norm(std[:, None, None] / np.sqrt(3.0) * rng.normal(size=(400, 500, 3)), axis=2)
     middle = (np.arange(400) + 0.5) / 400
     np.testing.assert_allclose(expected_quantiles(std), np.quantile(draws, middle), rtol=0.03, atol=0.03)
-
-
-def test_bound_contains_95_percent_of_errors_alike_in_three_directions() -> None:
-    assert pytest.approx(np.sqrt(chi2.ppf(0.95, 3) / 3), rel=1e-4) == BOUND_95
 
 
 def test_quantiles_leave_out_uncertain_flanks(study: TwoStageStudy) -> None:

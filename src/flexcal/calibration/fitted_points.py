@@ -18,7 +18,7 @@ from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.registration import register
 from flexcal.calibration.scatter import Scatter, joint_turns, whitened
 from flexcal.calibration.structure import kinematic_identifiability, random_identifiability, require_enough
-from flexcal.calibration.terms import geometric_parameters, plausible_size, tolerances
+from flexcal.calibration.terms import geometric_parameters, plausible_size
 from flexcal.calibration.variance_components import LinearFit
 from flexcal.data import PoseSet
 from flexcal.estimation import Estimate, Identifiability, Loss, Parameter, Parameters
@@ -79,7 +79,6 @@ class PointFit:
         if structural.rank > seen.rank:
             # these poses hide something: what may be off most, as the place of the instrument, is to take it up
             sizes = np.array([plausible_size(start, name) for name in geometric.names])
-            sizes = np.where(np.isfinite(sizes), sizes, tolerances(geometric))
             seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)

@@ -43,10 +43,8 @@ def undetermined(
     start, poses = at.model, at.poses
     sizes = np.array([plausible_size(start, name) for name in kept.names])
     columns = whitened(whitening, at.jacobian(kept.names))
-    preferred = [item.name for item, size in zip(kept, sizes, strict=True) if not np.isfinite(size)]
-    scale = np.where(np.isfinite(sizes), sizes, 1.0)
-    largest = np.linalg.norm(columns * scale, axis=0).max()
-    found = analyse(columns, kept.names, scale=scale, prefer=preferred, tolerance=1 / max(largest, 1.0))
+    largest = np.linalg.norm(columns * sizes, axis=0).max()
+    found = analyse(columns, kept.names, scale=sizes, tolerance=1 / max(largest, 1.0))
     lost = [item.name for item in found.dropped]
     lost += hidden
     partners = {item.name: item.absorbed_by for item in found.dropped}

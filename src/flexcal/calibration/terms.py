@@ -112,15 +112,17 @@ def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Paramete
     return Parameter(name, unit_of(name), model.value(name), lower=lower, prior_std=std)
 
 
-_PLAUSIBLE = {"offset": 5e-3, "misalignment_1": 2e-3, "misalignment_2": 2e-3}
+_PLAUSIBLE = {"offset": 5e-3, "misalignment_1": 2e-3, "misalignment_2": 2e-3, "backlash": 1e-3}
 _PLAUSIBLE_LENGTH, _PLAUSIBLE_POINT, _PLAUSIBLE_STATION = 1e-3, 1e-2, 1.0
+_PLAUSIBLE_COMPLIANCE, _PLAUSIBLE_TRANSMISSION = 1e-4, 1e-3
 
 
 def plausible_size(model: RobotModel, name: str) -> float:
-    """How far a geometric parameter may plausibly be from its nominal value (1σ, natural units); inf for terms beyond kinematics.
+    """How far a geometric parameter may plausibly be from its nominal value (1σ, natural units).
 
     What robot.yaml declares under `prior:` comes first; else joint offsets 5 mrad, misalignments 2 mrad, lengths 1 mm, the place of a
-    reflector on the tool 10 mm, the instrument 1 m or rad.
+    reflector on the tool 10 mm, the instrument 1 m or rad, and so the rotations of a joint at the base, which take up that of the first
+    station; half a backlash and a wave of a transmission error 1 mrad, compliances 0.1 mrad/(N m), the softest of small arms.
     """
     declared = declared_size(model, name)
     if declared is not None:
@@ -130,7 +132,14 @@ def plausible_size(model: RobotModel, name: str) -> float:
         return _PLAUSIBLE_STATION
     if owner.startswith("point.") or (owner == "tool" and key.startswith("length")):
         return _PLAUSIBLE_POINT
-    return _PLAUSIBLE_LENGTH if key.startswith("length") else _PLAUSIBLE.get(key, np.inf)
+    if key.startswith("transmission_"):
+        return _PLAUSIBLE_TRANSMISSION
+    if key.startswith("gravity_compliance"):
+        return _PLAUSIBLE_COMPLIANCE
+    if key.startswith("length"):
+        return _PLAUSIBLE_LENGTH
+    at_base = owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
+    return _PLAUSIBLE_STATION if at_base and key != "backlash" else _PLAUSIBLE[key]
 
 
 def declared_size(model: RobotModel, name: str) -> float | None:

@@ -12,9 +12,6 @@ from flexcal.estimation import Estimate
 from flexcal.report.notation import document_millimetres, millimetres, p_value
 from flexcal.report.page import Check
 
-BOUND_95 = 1.6140
-"""Distance in standard deviations (of the distance) that 95 % of errors stay below when they are alike in three directions."""
-
 CHANCE, MISSING = 1.35, 2.0
 """Observed over predicted size of errors that chance exceeds once in a hundred robots, and from which the model must lack something.
 
@@ -128,16 +125,10 @@ def check_error_budget(
     return Check(question, f"Yes. {answer}", "good")
 
 
-def check_residual(question: str, estimate: Estimate, *, sigma_given: bool = True) -> Check:
+def check_residual(question: str, estimate: Estimate) -> Check:
     """Whether what the fit leaves is what the measurement noise explains."""
     if estimate.status != "converged":
         return Check(question, f"The fit did not end well: {estimate.message}.", "bad")
-    if not sigma_given:
-        return Check(
-            question,
-            "The files state no measurement noise, so the scatter about the fit stands for it and this cannot be judged.",
-            "unknown",
-        )
     value = estimate.reduced_chi2
     answer = (
         f"χ² per degree of freedom is {value:.2f}; one means that noise explains everything that is left."
