@@ -1,7 +1,8 @@
-"""What measured points say of robot.yaml's `bearings:`."""
+"""What measurements say of robot.yaml's `bearings:`."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -15,50 +16,58 @@ _AXES = {"before": "fixed to the parent link", "after": "that turn with the chil
 
 def bearing_remarks(axes: BearingAxes | None, fit: Calibration) -> tuple[str, ...]:
     """A sentence where the points of a `fit` decided on the bearing axes, or contradict the declared ones."""
-    if axes is None or axes.preferred is None or axes.preferred == axes.declared:
+    if axes is None:
         return ()
-    other = "after" if axes.preferred == "before" else "before"
-    better, worse = (f"{axes.errors[key].mean / MILLIMETRE:.3f} mm" for key in (axes.preferred, other))
-    found = f"the points fit bearing axes {_AXES[axes.preferred]} better (mean error {better}) than axes {_AXES[other]} ({worse})"
-    if axes.declared is None:
-        return (f"{found}: these were taken; `bearings: {axes.preferred}` in robot.yaml declares them",)
     springs = (p for p in fit.prior.parameters if p.name.endswith(".stiffness"))
     identified = any(np.isinf(spring.prior_std) for spring in springs)  # by stage 1, with the declared ones
-    again = ", run 'flexcal identify stiffness' again" if identified else ""
-    return (f"{found}: write `bearings: {axes.preferred}` in robot.yaml{again} and calibrate again",)
+    again = (
+        ", run 'flexcal identify stiffness' again and calibrate again"
+        if identified
+        else " and calibrate again"
+    )
+    errors = {key: f"mean error {own.mean / MILLIMETRE:.3f} mm" for key, own in axes.errors.items()}
+    return _remarks("points", axes, errors, again)
+
+
+def response_bearings_remarks(bearings: ResponseBearings | None) -> tuple[str, ...]:
+    """A sentence where frequency responses decided on the bearing axes, or contradict the declared ones."""
+    if bearings is None:
+        return ()
+    chi2 = {key: f"reduced chi-square {own:.2f}" for key, own in bearings.reduced_chi2.items()}
+    return _remarks("responses", bearings, chi2, " and identify again")
+
+
+def _remarks(
+    what: str, bearings: BearingAxes | ResponseBearings, figures: Mapping[str, str], again: str
+) -> tuple[str, ...]:
+    better = bearings.preferred
+    if better is None or better == bearings.declared:
+        return ()
+    other = "after" if better == "before" else "before"
+    found = (
+        f"the {what} fit bearing axes {_AXES[better]} better ({figures[better]}) "
+        f"than axes {_AXES[other]} ({figures[other]})"
+    )
+    if bearings.declared is None:
+        return (f"{found}: these were taken; `bearings: {better}` in robot.yaml declares them",)
+    return (f"{found}: write `bearings: {better}` in robot.yaml{again}",)
 
 
 def bearings_block(axes: BearingAxes | None) -> dict[str, Any] | None:
     """As results.json has it."""
     if axes is None:
         return None
-    return {
-        "declared": axes.declared,
-        "preferred": axes.preferred,
-        "statistic": axes.statistic,
-        "errors": {bearings: errors.in_millimetres() for bearings, errors in axes.errors.items()},
-    }
+    return _block(axes) | {"errors": {key: errors.in_millimetres() for key, errors in axes.errors.items()}}
 
 
 def response_bearings_block(bearings: ResponseBearings | None) -> dict[str, Any] | None:
     """As results.json of stage 1 has it."""
-    if bearings is None:
-        return None
+    return None if bearings is None else _block(bearings) | {"reduced_chi2": dict(bearings.reduced_chi2)}
+
+
+def _block(bearings: BearingAxes | ResponseBearings) -> dict[str, Any]:
     return {
         "declared": bearings.declared,
         "preferred": bearings.preferred,
         "statistic": bearings.statistic,
-        "reduced_chi2": dict(bearings.reduced_chi2),
     }
-
-
-def response_bearings_remarks(bearings: ResponseBearings | None) -> tuple[str, ...]:
-    """A sentence where frequency responses decided on the bearing axes, or contradict the declared ones."""
-    if bearings is None or bearings.preferred is None or bearings.preferred == bearings.declared:
-        return ()
-    better, other = bearings.preferred, "after" if bearings.preferred == "before" else "before"
-    chi2 = bearings.reduced_chi2
-    found = f"the responses fit bearing axes {_AXES[better]} better (reduced chi-square {chi2[better]:.2f}, else {chi2[other]:.2f})"
-    if bearings.contradicted:
-        return (f"{found}: write `bearings: {better}` in robot.yaml and identify again",)
-    return (f"{found}: these were taken; `bearings: {better}` in robot.yaml declares them",)

@@ -119,6 +119,8 @@ class RobotCalibration:
     def _numbers(self) -> dict[str, Any]:
         selected, chosen, before = self.selected, self.selection, self.before.document()
         found, drift = selected.identifiability, Drift.of(selected)
+        bearings = bearing_remarks(self.bearings, selected)
+        blamed = self.bearings is not None and self.bearings.contradicted
         misfit = None if self.stiffness is None else self.stiffness.misfit
         return {
             "robot": selected.model.name,
@@ -157,8 +159,8 @@ class RobotCalibration:
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
                 *([chosen.remark] if chosen and chosen.remark else []),
-                *calibration_remarks(selected),
-                *bearing_remarks(self.bearings, selected),
+                *calibration_remarks(selected, bearings if blamed else ()),
+                *(() if blamed else bearings),
                 *(
                     []
                     if misfit is None

@@ -38,8 +38,8 @@ def outliers_of(fit: Calibration) -> tuple[Outlier, ...]:
     return tuple(Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows)
 
 
-def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
-    """One sentence each, the most important last."""
+def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[str, ...]:
+    """One sentence each, the most important last; a `cause` of a bad fit that was found stands before what it led to."""
     remarks = [*unused_columns(fit.poses), *_nominal_springs(fit)]
     if fit.ambiguous.any():
         remarks.append(f"{fit.ambiguous.sum()} poses do not surely rest on one flank of a backlash")
@@ -54,12 +54,13 @@ def calibration_remarks(fit: Calibration) -> tuple[str, ...]:
             f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "
             "robot or instrument warmed up or settled, or place and order are correlated"
         )
+    remarks += cause
     far = moved_far(fit)
     if far:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
         more = f" and {len(far) - _SHOWN} others" if len(far) > _SHOWN else ""
         remarks.append(f"implausibly far from where the fit began: {', '.join(named)}{more}")
-    if hardly_fits(fit):
+    if hardly_fits(fit) and not cause:
         remarks.append(_LOOK)
     if not fit.estimate.converged:
         remarks.append(f"the fit has not converged ({fit.estimate.status}); do not trust it")
