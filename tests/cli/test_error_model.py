@@ -14,6 +14,7 @@ from stranger_arm import PANDA, SIX, StrangerArm
 from flexcal.calibration import Calibration, calibrate, error_scale, hardly_fits, verify, verify_jointly
 from flexcal.data import PoseSet, read_poses
 from flexcal.model import RobotModel
+from flexcal.workflow.calibration_remarks import calibration_remarks
 
 TRACKER = 1.5e-5
 
@@ -276,6 +277,15 @@ def test_wrong_data_are_told_from_noise(tmp_path: Path) -> None:
 @pytest.mark.slow
 def test_wrong_data_are_told_from_noise_in_a_hundred_robots(tmp_path: Path) -> None:
     assert [alarms(tmp_path, seed) for seed in range(1000, 1100)] == [(False, True)] * 100
+
+
+def test_a_cause_that_is_known_stands_in_place_of_where_to_look(tmp_path: Path) -> None:
+    case = Measured.drawn(tmp_path, 73)
+    q = case.arm.postures(60, case.rng)
+    wrong = case.calibrated(*spoiled("sign", q, case.arm.measured(q, case.rng), case.rng), 2e-5)
+    far, look = calibration_remarks(wrong)[-2:]
+    assert far.startswith("implausibly far") and look.startswith("these data hardly fit this robot: look")
+    assert calibration_remarks(wrong, ("the cause",))[-2:] == ("the cause", far)
 
 
 def test_a_declared_prior_holds_what_points_do_not_tell(tmp_path: Path) -> None:
