@@ -1,12 +1,10 @@
 #include "closed_loop.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <stdexcept>
+
+#include "arrays.hpp"
+#include "bindings.hpp"
 
 namespace nb = nanobind;
 
@@ -37,39 +35,31 @@ double Friction::torque(double rate) const {
 
 std::size_t closed_loop(const SteppedPlant& plant, std::vector<Spring>& springs,
                         const std::vector<Friction>& frictions, const std::vector<std::size_t>& motors,
-                        const std::vector<std::ptrdiff_t>& twists, const Controller& controller,
-                        const LoopSignals& signals) {
+                        const std::vector<std::ptrdiff_t>& twists, std::vector<MotorController>& controllers,
+                        const Sampling& sampling, std::size_t substeps, const LoopSignals& signals) {
     const std::size_t dofs = plant.dofs;
     const std::size_t count = motors.size();
-    const double step = controller.tick / static_cast<double>(controller.substeps);
+    const double step = sampling.tick / static_cast<double>(substeps);
     std::vector<double> before(plant.velocity, plant.velocity + dofs), earlier(before), rate(dofs);
-    std::vector<double> torque(count), held(count), seen(count), filtered(count);
+    std::vector<double> torque(count), held(count);
     for (std::size_t i = 0; i < dofs; ++i) springs[i].last = plant.position[i];
 
     for (std::size_t k = 0; k < signals.ticks; ++k) {
         const std::size_t row = k * count;
         for (std::size_t m = 0; m < count; ++m) {
-            const double true_position = plant.position[motors[m]];
-            const double resolution = controller.encoder_resolution;
-            const double encoder =
-                resolution > 0.0 ? resolution * std::nearbyint(true_position / resolution) : true_position;
-            if (k == 0) {
-                filtered[m] = plant.velocity[motors[m]];
-            } else {
-                filtered[m] += controller.rate_filter * ((encoder - seen[m]) / controller.tick - filtered[m]);
-            }
-            seen[m] = encoder;
-            torque[m] = signals.feed_forward[row + m] +
-                        controller.proportional[m] * (signals.reference[row + m] - encoder) +
-                        controller.derivative[m] * (signals.reference_rate[row + m] - filtered[m]);
-            signals.position[row + m] = encoder;
+            MotorController& controller = controllers[m];
+            const double position = plant.position[motors[m]];
+            controller.read(sampling, position, plant.velocity[motors[m]], k == 0);
+            torque[m] = controller.torque(signals.feed_forward[row + m], signals.reference[row + m],
+                                          signals.reference_rate[row + m]);
+            signals.position[row + m] = controller.seen;
             signals.torque[row + m] = torque[m];
             if (signals.arm) {
-                signals.arm[row + m] = true_position + (twists[m] >= 0 ? plant.position[twists[m]] : 0.0);
+                signals.arm[row + m] = position + (twists[m] >= 0 ? plant.position[twists[m]] : 0.0);
             }
         }
         if (k == 0) held = torque;
-        for (std::size_t s = 0; s < controller.substeps; ++s) {
+        for (std::size_t s = 0; s < substeps; ++s) {
             // MuJoCo's Euler step is a kick and a drift, M (q+ - 2 q + q-)/h² = force, and its velocity lies half a
             // step back. What belongs on the right is the force averaged over (-h, h) with triangular weights: the held
             // torque's at its jump is the mean of both sides, a spring's is that at q + h² q''/12 (Numerov) with q''
@@ -96,18 +86,6 @@ std::size_t closed_loop(const SteppedPlant& plant, std::vector<Spring>& springs,
 
 namespace {
 
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using State = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Log = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
-template <typename Array>
-void require_shape(const Array& array, std::size_t rows, std::size_t columns, const char* name) {
-    if (array.shape(0) != rows || array.shape(1) != columns)
-        throw std::invalid_argument(std::string(name) + " has the wrong shape");
-}
-
 std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, State position,
                                 State velocity, State force, Table springs, Table frictions, Indices motors,
                                 Indices twists, Vector proportional, Vector derivative, double tick,
@@ -132,6 +110,7 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
     std::vector<Friction> friction(count);
     std::vector<std::size_t> motor(count);
     std::vector<std::ptrdiff_t> twist(count);
+    std::vector<MotorController> controllers(count);
     for (std::size_t m = 0; m < count; ++m) {
         friction[m] = {frictions(m, 0), frictions(m, 1), frictions(m, 2), frictions(m, 3), frictions(m, 4)};
         if (motors(m) < 0 || motors(m) >= static_cast<std::int64_t>(dofs) ||
@@ -139,20 +118,11 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
             throw std::invalid_argument("a motor or twist lies outside the plant's coordinates");
         motor[m] = static_cast<std::size_t>(motors(m));
         twist[m] = static_cast<std::ptrdiff_t>(twists(m));
+        controllers[m] = {proportional(m), derivative(m)};
     }
-    const SteppedPlant plant{reinterpret_cast<void (*)(const void*, void*)>(step),
-                             reinterpret_cast<const void*>(model),
-                             reinterpret_cast<void*>(data),
-                             position.data(),
-                             velocity.data(),
-                             force.data(),
-                             dofs};
-    const Controller controller{tick,
-                                substeps,
-                                encoder_resolution,
-                                rate_filter,
-                                {proportional.data(), proportional.data() + count},
-                                {derivative.data(), derivative.data() + count}};
+    const SteppedPlant plant =
+        SteppedPlant::at(step, model, data, position.data(), velocity.data(), force.data(), dofs);
+    const Sampling sampling{tick, encoder_resolution, rate_filter};
     const LoopSignals signals{ticks,
                               feed_forward.data(),
                               reference.data(),
@@ -161,7 +131,7 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
                               torque_log.data(),
                               arm_log.data()};
     nb::gil_scoped_release release;
-    return closed_loop(plant, spring, friction, motor, twist, controller, signals);
+    return closed_loop(plant, spring, friction, motor, twist, controllers, sampling, substeps, signals);
 }
 
 }  // namespace

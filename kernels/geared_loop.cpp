@@ -1,14 +1,12 @@
 #include "geared_loop.hpp"
 
-#include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstdint>
-#include <stdexcept>
+#include <vector>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
+#include "stepped_plant.hpp"
 
 namespace nb = nanobind;
 
@@ -56,40 +54,30 @@ double TransmissionError::slope(double motor) const {
 
 namespace {
 
-using Vector = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Table = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using State = nb::ndarray<double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Log = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Indices = nb::ndarray<const std::int64_t, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-
 struct Axis {
     std::size_t motor;
     std::ptrdiff_t twist;  // -1: a rigid gear
-    double torque_gain, proportional, derivative;
+    double torque_gain;
+    MotorController controller;
     BristleFriction friction;
     TransmissionError error;
-    double seen = 0.0, rate = 0.0, held = 0.0, asked = 0.0;
+    double held = 0.0, asked = 0.0;
 };
-
-void require(bool fits, const char* what) {
-    if (!fits) throw std::invalid_argument(std::string(what) + " has the wrong shape");
-}
 
 std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, State angle, State velocity,
                         State applied, Table hinges, Indices motors, Indices twists, Table frictions, Table errors,
                         Table gains, double tick, std::size_t substeps, double count, double filter, Table torque,
                         Table reference, Table reference_rate, Log angle_log, Log torque_log) {
     const std::size_t size = angle.shape(0), axes = motors.shape(0), ticks = torque.shape(0);
-    require(velocity.shape(0) == size && applied.shape(0) == size, "velocity or applied");
-    require(hinges.shape(0) == size && hinges.shape(1) == 6, "hinges");
-    require(twists.shape(0) == axes, "twists");
-    require(frictions.shape(0) == axes && frictions.shape(1) == 7, "frictions");
-    require(errors.shape(0) == axes && errors.shape(1) == 9, "errors");
-    require(gains.shape(0) == axes && gains.shape(1) == 3, "gains");
-    for (const Table* table : {&torque, &reference, &reference_rate})
-        require(table->shape(0) == ticks && table->shape(1) == axes, "a signal");
-    for (const Log* log : {&angle_log, &torque_log})
-        require(log->shape(0) == ticks && log->shape(1) == axes, "a log");
+    if (velocity.shape(0) != size || applied.shape(0) != size)
+        throw std::invalid_argument("every coordinate of the arm must be a hinge");
+    if (twists.shape(0) != axes) throw std::invalid_argument("one twist is needed per motor");
+    require_shape(hinges, size, 6, "hinges");
+    require_shape(frictions, axes, 7, "frictions");
+    require_shape(errors, axes, 9, "errors");
+    require_shape(gains, axes, 3, "gains");
+    for (const Table* table : {&torque, &reference, &reference_rate}) require_shape(*table, ticks, axes, "a signal");
+    for (const Log* log : {&angle_log, &torque_log}) require_shape(*log, ticks, axes, "a log");
     if (substeps == 0 || !(tick > 0.0)) throw std::invalid_argument("tick and substeps must be positive");
 
     std::vector<ElasticHinge> springs(size);
@@ -103,8 +91,7 @@ std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_
         axis[m].motor = static_cast<std::size_t>(motors(m));
         axis[m].twist = static_cast<std::ptrdiff_t>(twists(m));
         axis[m].torque_gain = gains(m, 0);
-        axis[m].proportional = gains(m, 1);
-        axis[m].derivative = gains(m, 2);
+        axis[m].controller = {gains(m, 1), gains(m, 2)};
         axis[m].friction = {frictions(m, 0), frictions(m, 1), frictions(m, 2), frictions(m, 3),
                             frictions(m, 4), frictions(m, 5), frictions(m, 6)};
         axis[m].error.ratio = errors(m, 0);
@@ -113,31 +100,23 @@ std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_
             axis[m].error.phase[k] = errors(m, 5 + k);
         }
     }
-    const HingedArm arm{reinterpret_cast<void (*)(const void*, void*)>(step),
-                        reinterpret_cast<const void*>(model),
-                        reinterpret_cast<void*>(data),
-                        angle.data(),
-                        velocity.data(),
-                        applied.data(),
-                        size};
+    const SteppedPlant arm =
+        SteppedPlant::at(step, model, data, angle.data(), velocity.data(), applied.data(), size);
+    const Sampling sampling{tick, count, filter};
 
     nb::gil_scoped_release release;
     const double h = tick / static_cast<double>(substeps);
     std::vector<double> free_twist(size, 0.0), rate(size), last(arm.velocity, arm.velocity + size);
     for (const Axis& a : axis)
-        if (a.twist >= 0) free_twist[a.twist] = a.error.angle(arm.angle[a.motor]);
-    for (std::size_t i = 0; i < size; ++i) springs[i].last_twist = arm.angle[i] - free_twist[i];
+        if (a.twist >= 0) free_twist[a.twist] = a.error.angle(arm.position[a.motor]);
+    for (std::size_t i = 0; i < size; ++i) springs[i].last_twist = arm.position[i] - free_twist[i];
 
     for (std::size_t k = 0; k < ticks; ++k) {
         for (std::size_t m = 0; m < axes; ++m) {
             Axis& a = axis[m];
-            const double exact = arm.angle[a.motor];
-            const double counted = count > 0.0 ? count * std::nearbyint(exact / count) : exact;
-            a.rate = k == 0 ? arm.velocity[a.motor] : a.rate + filter * ((counted - a.seen) / tick - a.rate);
-            a.seen = counted;
-            a.asked = torque(k, m) + a.proportional * (reference(k, m) - counted) +
-                      a.derivative * (reference_rate(k, m) - a.rate);
-            angle_log(k, m) = counted;
+            a.controller.read(sampling, arm.position[a.motor], arm.velocity[a.motor], k == 0);
+            a.asked = a.controller.torque(torque(k, m), reference(k, m), reference_rate(k, m));
+            angle_log(k, m) = a.controller.seen;
             torque_log(k, m) = a.asked;
             if (k == 0) a.held = a.asked;
         }
@@ -151,14 +130,14 @@ std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_
                 last[i] = newest;
             }
             for (const Axis& a : axis)
-                if (a.twist >= 0) free_twist[a.twist] = a.error.angle(arm.angle[a.motor]);
+                if (a.twist >= 0) free_twist[a.twist] = a.error.angle(arm.position[a.motor]);
             for (std::size_t i = 0; i < size; ++i)
-                arm.applied[i] = springs[i].torque(arm.angle[i] - free_twist[i], rate[i]);
+                arm.force[i] = springs[i].torque(arm.position[i] - free_twist[i], rate[i]);
             for (Axis& a : axis) {
-                const double load = a.twist >= 0 ? arm.applied[a.twist] : 0.0;
+                const double load = a.twist >= 0 ? arm.force[a.twist] : 0.0;
                 const double drive = a.torque_gain * (s == 0 ? 0.5 * (a.held + a.asked) : a.asked);
-                arm.applied[a.motor] += drive - a.friction.torque(rate[a.motor], load, h) -
-                                        a.error.slope(arm.angle[a.motor]) * load;
+                arm.force[a.motor] += drive - a.friction.torque(rate[a.motor], load, h) -
+                                        a.error.slope(arm.position[a.motor]) * load;
             }
             arm.step(arm.model, arm.data);
         }

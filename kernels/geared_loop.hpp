@@ -1,24 +1,11 @@
 // The hard cell's inner loop: a sampled controller, gears with transmission error, bristle friction, MuJoCo's step.
 //
-// It shares no law with closed_loop.hpp, so that what both cells teach about the identification is taught twice.
+// It shares no law of the arm with closed_loop.hpp, so that what both cells teach about the identification is taught twice.
 #pragma once
 
 #include <array>
-#include <cstddef>
-#include <vector>
 
 namespace flexcal {
-
-// A MuJoCo arm whose coordinates are all hinges; positions and velocities number `hinges`.
-struct HingedArm {
-    void (*step)(const void* model, void* data);
-    const void* model;
-    void* data;
-    const double* angle;     // qpos
-    const double* velocity;  // qvel, half a step behind
-    double* applied;         // qfrc_applied
-    std::size_t hinges;
-};
 
 // An elastic hinge: hardening spring with lost motion, a damper, and a Jenkins element (a spring that slips at a twist).
 struct ElasticHinge {
