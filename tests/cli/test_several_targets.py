@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from stranger_arm import SIX, StrangerArm
 
-from flexcal.calibration import Calibration, calibrate, verify
+from flexcal.calibration import Calibration, calibrate, error_scale, verify, verify_jointly
 from flexcal.data import read_poses
 from flexcal.model import RobotModel
 
@@ -63,6 +63,22 @@ def test_intervals_hold_with_several_reflectors(tmp_path: Path, kind: str) -> No
     """Where the scatter is common to a pose, and where it is not, as of reflectors that were measured one after the other."""
     squares = [calibrated(tmp_path, seed, kind)[1] for seed in range(10)]
     assert 0.7 < np.mean(squares) < 1.4
+
+
+@pytest.mark.parametrize("kind", ["common", "joints", "alone"])
+def test_verification_counts_poses_rather_than_points(tmp_path: Path, kind: str) -> None:
+    """Observed over predicted errors of 15 fresh poses with three reflectors: their 95 % intervals have 1 in them."""
+    covered, freedom = [], []
+    for seed in range(20):
+        found, _ = calibrated(tmp_path, seed, kind)
+        rng = np.random.default_rng([seed, 9])
+        arm = robot_with_reflectors(tmp_path, seed)
+        file = write_reflectors(tmp_path / "fresh.csv", arm, arm.postures(15, rng), rng, kind)
+        scale = error_scale(*verify_jointly(found.model, read_poses(file, found.model)))
+        covered.append(scale.ratio_low < 1 < scale.ratio_high)
+        freedom.append(scale.freedom)
+    assert sum(covered) >= 17
+    assert (np.mean(freedom) < 60) == (kind != "alone")
 
 
 def test_the_common_scatter_is_found(tmp_path: Path) -> None:

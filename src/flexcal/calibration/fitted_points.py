@@ -325,8 +325,9 @@ class FittedPoints:
         instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma**2)))
         robot, robot_std = self._together("robot", "pose")
         model, model_std = self._together("workspace", "order", "command")
-        values = (instrument, scatter.share, robot, scatter.angular, model)
-        known = np.array([0.0, 0.0, robot_std, self.spread.get("angular", 0.0), model_std])
+        values = (instrument, scatter.share, robot, scatter.angular, model, scatter.pose)
+        angular_std, pose_std = (self.spread.get(name, 0.0) for name in ("angular", "pose"))
+        known = np.array([0.0, 0.0, robot_std, angular_std, model_std, pose_std])
         items = (
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
             for key, value in zip(SCATTER, values, strict=True)

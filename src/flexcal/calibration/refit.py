@@ -83,7 +83,7 @@ def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitt
         scatter_rms=np.sqrt(scatter),
         ambiguous=standing.ambiguous,
     )
-    found = replace(covariance, roots=roots, independent=independent)
+    found = replace(covariance, roots=roots, independent=independent, visit=None, common=None)
     return Refitted(tuple(what), placed, basis.shape[1], result, found)
 
 

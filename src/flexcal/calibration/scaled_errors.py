@@ -78,15 +78,14 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
             f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; measure two or more that have."
         )
     roots, errors = covariance.roots[clear], verification.errors[clear]
-    known = covariance.independent is not None
-    independent = covariance.independent[clear] if known else np.zeros((len(errors), 3, 3))  # pyright: ignore[reportOptionalSubscript]
     stacked = roots.reshape(-1, roots.shape[2])
     gram = stacked.T @ stacked
+    visits, independent = covariance.by_visits(clear)
     from_parameters = float(np.trace(gram))
     from_noise = float(np.trace(independent, axis1=1, axis2=2).sum())
     if from_parameters + from_noise <= 0:
         raise FlexcalError("nothing was estimated that predicts an error; calibrate the robot first.")
-    mixed = float(np.sum(roots * np.matmul(independent, roots)))
+    mixed = float(np.sum(visits * np.matmul(independent, visits)))
     total = float((errors**2).sum())
 
     def mean_and_freedom(square: float) -> tuple[float, float]:
@@ -97,7 +96,9 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
     factor = np.sqrt(max(total - from_noise, 0.0) / max(from_parameters, 1e-30))
     predicted, freedom = mean_and_freedom(1.0)
     size = np.linalg.norm(errors, axis=1)
-    whole = roots @ np.swapaxes(roots, 1, 2) + independent
+    whole = roots @ np.swapaxes(roots, 1, 2)
+    if covariance.independent is not None:
+        whole = whole + covariance.independent[clear]
     # both sizes have their chance: observed over predicted mean squares are F distributed
     low, high = (float(fdtri(freedom, min(covariance.freedom, 1e9), share)) for share in (0.975, 0.025))
     return ErrorScale(
@@ -109,7 +110,7 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
         ratio_high=float(np.sqrt(total / predicted / high)),
         freedom=mean_and_freedom(max(factor**2, 1e-12))[1],
         probability=distance_probability(size, principal_variances(whole)),
-        noise_known=known,
+        noise_known=covariance.independent is not None,
     )
 
 

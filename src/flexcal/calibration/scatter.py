@@ -61,8 +61,13 @@ class Scatter:
         """
         diagonal = cells.gathered((self.share * sigma) ** 2 + self.robot**2 + _SMALLEST**2)
         single = np.where(diagonal > 0, diagonal, 1.0)[:, :, None] * np.eye(diagonal.shape[1])
-        turned = cells.gathered(turns)
-        return single + self.pose**2 * cells.common + self.angular**2 * turned @ np.swapaxes(turned, 1, 2)
+        common = cells.gathered(self.common(turns))
+        return single + common @ np.swapaxes(common, 1, 2)
+
+    def common(self, turns: np.ndarray) -> np.ndarray:
+        """Columns (N, 3, 3 + r) m of the repeatability that the points of a visit share, each times a standard normal number."""
+        moved = np.broadcast_to(self.pose * np.eye(3), (len(turns), 3, 3))
+        return np.concatenate([moved, self.angular * turns], axis=2)
 
     def whitening(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """W (N, 3, 3) 1/m with WᵀW the inverse of the sum of all variances of single measurements."""
@@ -103,12 +108,13 @@ def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """
-    instrument, share, robot, angular, _ = model.scatter
+    instrument, share, robot, angular, _, pose = model.scatter
     if not model.scatter.any():
         return Scatter(share=1.0, robot=0.0) if stated else None
     if not stated:
         share = 1.0 if instrument > 0 else 0.0
-    return Scatter(share=float(share), robot=float(robot), angular=float(angular))
+    alone = np.sqrt(max(robot**2 - pose**2, 0.0))
+    return Scatter(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
 
 
 def joint_turns(at: Prediction) -> np.ndarray:

@@ -12,7 +12,7 @@ from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
-from flexcal.calibration.scatter import joint_turns, known_scatter
+from flexcal.calibration.scatter import Scatter, joint_turns, known_scatter
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 
@@ -53,7 +53,8 @@ class ErrorCovariance:
     """Covariance of the errors at N poses: between poses i and j `roots`_i `roots`_jᵀ (N, 3, k), m; `independent` (N, 3, 3) m² beside it.
 
     The roots are of the parameters and, the last `shared` of them, of the model error that neighbouring poses have in common; independent
-    are instrument and repeatability, None where neither was estimated nor stated.
+    are instrument and repeatability, None where neither was estimated nor stated. Of these the points of one `visit` (N,) to a pose
+    share the columns `common` (N, 3, c) m; None where a pose has one point.
     `freedom` are the degrees of freedom of the predicted mean square, inf where scatter is known.
     """
 
@@ -61,6 +62,24 @@ class ErrorCovariance:
     shared: int
     independent: np.ndarray | None
     freedom: float = np.inf
+    visit: np.ndarray | None = None
+    common: np.ndarray | None = None
+
+    def by_visits(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Roots (G, 3 T, k) and what is independent of other visits (G, 3 T, 3 T) of the points of a mask `rows` (N,), visit by visit."""
+        roots = self.roots[rows]
+        size = len(roots)
+        own = np.zeros((size, 3, 3)) if self.independent is None else self.independent[rows]
+        if self.visit is None or self.common is None:
+            return roots, own
+        visits = ErrorCells(self.visit).subset(rows)
+        common = visits.gathered(self.common[rows])
+        together = common @ np.swapaxes(common, 1, 2)
+        places = together.shape[1] // 3
+        blocks, single = together.reshape(-1, places, 3, places, 3), visits.gathered(own)
+        for k in range(places):
+            blocks[:, k, :, k] = single[:, 3 * k : 3 * k + 3]
+        return visits.gathered(roots), together
 
 
 def verify(
@@ -82,8 +101,11 @@ def verify_jointly(
     at = predict(model, poses, elastic=elastic, jacobians=True)
     used = moving_parameters(model, elastic=elastic)
     roots = at.jacobian(used) @ covariance_root(model, used)
-    shared = _shared_errors(model, poses)
-    independent = None if noise_free else _independent(model, at, poses)
+    cells = ErrorCells.of(poses)
+    shared = _shared_errors(model, cells)
+    scatter = None if noise_free else known_scatter(model, stated=poses.sigma_given)
+    independent = None if scatter is None else _independent(model, scatter, at, poses)
+    common = scatter.common(joint_turns(at)) if scatter is not None and cells.several else None
     squares = (shared**2).sum(axis=(1, 2))
     if independent is not None:
         squares = squares + np.trace(independent, axis1=1, axis2=2)
@@ -96,7 +118,12 @@ def verify_jointly(
     )
     freedom = np.inf if noise_free else _freedom(model, at, float(np.sum(found.expected_rms**2)))
     return found, ErrorCovariance(
-        np.concatenate([roots, shared], axis=2), shared.shape[2], independent, freedom
+        np.concatenate([roots, shared], axis=2),
+        shared.shape[2],
+        independent,
+        freedom,
+        None if common is None else cells.pose,
+        common,
     )
 
 
@@ -114,18 +141,15 @@ def _freedom(model: RobotModel, at: Prediction, predicted: float) -> float:
     return 2 * predicted**2 / variance if variance > 0 else np.inf
 
 
-def _shared_errors(model: RobotModel, poses: PoseSet) -> np.ndarray:
+def _shared_errors(model: RobotModel, cells: ErrorCells) -> np.ndarray:
     """Columns (N, 3, k) m of the model error, common to the poses of a cell of the workspace."""
-    cells = ErrorCells.of(poses).workspace
-    labels = np.arange(len(poses)) if cells is None else cells
-    return model.value("scatter.model") * block_columns(labels)
+    return model.value("scatter.model") * block_columns(
+        cells.pose if cells.workspace is None else cells.workspace
+    )
 
 
-def _independent(model: RobotModel, at: Prediction, poses: PoseSet) -> np.ndarray | None:
-    """Covariance (N, 3, 3) m² of instrument and repeatability; None where neither is known."""
-    scatter = known_scatter(model, stated=poses.sigma_given)
-    if scatter is None:
-        return None
+def _independent(model: RobotModel, scatter: Scatter, at: Prediction, poses: PoseSet) -> np.ndarray:
+    """Covariance (N, 3, 3) m² of instrument and repeatability."""
     sigma = (
         poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))
     )
