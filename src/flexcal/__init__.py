@@ -1,4 +1,4 @@
-"""flexcal makes industrial robots accurate: the public names, each imported when it is first asked for."""
+"""Calibration of industrial robots: public names, imported on first use."""
 
 from typing import Any
 

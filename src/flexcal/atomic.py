@@ -1,4 +1,4 @@
-"""Files appear whole or not at all: written beside their place under a temporary name, then renamed."""
+"""Atomic writing of files: written under a temporary name, then renamed."""
 
 import os
 import tempfile

@@ -2,7 +2,7 @@
 
 
 class FlexcalError(Exception):
-    """Anything that went wrong for a reason the user can act on; the message is one sentence that says what, where and what to do."""
+    """An error that the user can correct; the message is one sentence that says what is wrong, where, and what to do."""
 
 
 class InputError(FlexcalError):

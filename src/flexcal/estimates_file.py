@@ -1,4 +1,4 @@
-"""`estimates.yaml` with `estimates.npz` beside it: what identifications found, one block each.
+"""Reading and writing of `estimates.yaml` and `estimates.npz`, one block per identification.
 
 The YAML has for every block the named values with unit, standard deviation and 95 % interval, what could not be told
 apart, the fit and the provenance; the npz has `<block>.names` (p,) and `<block>.covariance` (p, p), in estimation

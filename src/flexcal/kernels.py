@@ -1,4 +1,4 @@
-"""The C++ kernels in the build that runs fastest on this processor; every build gives the same numbers, bit by bit."""
+"""The C++ kernels, in the build for this processor; all builds give bitwise identical results."""
 
 from __future__ import annotations
 

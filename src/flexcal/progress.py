@@ -1,4 +1,4 @@
-"""How long work says what it is doing."""
+"""Progress reports of long computations."""
 
 from collections.abc import Callable
 

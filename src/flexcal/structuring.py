@@ -1,4 +1,4 @@
-"""Plain data (dicts, lists, texts, numbers) into frozen dataclasses, strictly, by cattrs.
+"""Strict conversion of plain data (dicts, lists, texts, numbers) to frozen dataclasses, by cattrs.
 
 A Boolean or a text is never a number, NaN and infinity are refused, an unknown key is refused with the
 nearest known one. Arrays (`numpy.ndarray`, `NDArray[np.int64]`) are rectangular nested lists of numbers. Of a

@@ -1,4 +1,4 @@
-"""Factors from the units people write to SI, which is all that flexcal computes in."""
+"""Conversion factors to SI."""
 
 from math import pi
 

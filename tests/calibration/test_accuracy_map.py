@@ -160,7 +160,7 @@ def test_random_poses_reach_into_the_box(tx90l: RobotModel, rng: np.random.Gener
 
 
 def test_a_robot_of_which_nothing_was_estimated_has_no_map(tx90l: RobotModel) -> None:
-    with pytest.raises(FlexcalError, match="nothing was estimated of tx90l"):
+    with pytest.raises(FlexcalError, match="no estimated parameter of tx90l"):
         propagation(tx90l)
 
 

@@ -61,8 +61,8 @@ def test_forms(text: str, tx90l: RobotModel, tmp_path: Path, caplog: pytest.LogC
         ("[1, 2]\n", ["line 1", "names and values"]),
         ("\njoint_1.ofset: 1\n", ["line 2", "'joint_1.ofset'", "did you mean 'joint_1.offset'"]),
         ("a:\n  values:\n    link_9.mass: 1\n", ["line 3", "'link_9.mass'"]),
-        ("joint_1.drive.stiffness: -1\n", ["line 1", "no robot has"]),
-        ("joint_2.backlash: -1e-5\n", ["line 1", "no robot has"]),
+        ("joint_1.drive.stiffness: -1\n", ["line 1", "not possible"]),
+        ("joint_2.backlash: -1e-5\n", ["line 1", "not possible"]),
     ],
 )
 def test_what_is_refused(text: str, words: list[str], tx90l: RobotModel, tmp_path: Path) -> None:

@@ -96,7 +96,7 @@ def test_the_found_point_is_said_and_written(run, tmp_path: Path) -> None:
     file = arm.write_poses(tmp_path / "poses.csv", q, arm.measured(q, rng))
     text = robot.read_text()
     done = run("calibrate", robot, file)
-    assert "the point smr was found at [0.05" in done.out and "--write-point writes it" in done.out
+    assert "calibrated position of the point smr: [0.05" in done.out and "--write-point writes it" in done.out
     assert robot.read_text() == text
     before = run("verify", robot, file, "--json").document["verification"]["measured"]
     done = run("calibrate", robot, file, "--write-point", "--json")
@@ -184,5 +184,7 @@ def test_a_tool_that_never_turns_does_not_tell_where_its_point_is(run, tmp_path:
     # either it is said that the place is not told, or it was held near where it was declared
     point = run("calibrate", robot, file, "--json").document["points"]["smr"]
     moved = np.linalg.norm(np.subtract(point["found_xyz_m"], point["declared_xyz_m"]))
-    assert "was found at" not in done.out or moved < 0.015
-    assert (point["std_m"] > 0.002 and "do not tell where the point smr is" in done.out) or moved < 0.015
+    assert "calibrated position of the point" not in done.out or moved < 0.015
+    assert (
+        point["std_m"] > 0.002 and "do not determine the position of the point smr" in done.out
+    ) or moved < 0.015

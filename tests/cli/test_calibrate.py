@@ -207,10 +207,13 @@ def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: P
     rows[:, header.index("q4")] *= -1
     write_csv(some, header, rows)
     wrong = run("calibrate", robot, some, *arguments)
-    assert "flexcal verify" not in wrong.err and f"flexcal import {robot} {some} looks for it" in wrong.err
+    assert (
+        "flexcal verify" not in wrong.err
+        and f"flexcal import {robot} {some} looks for the error" in wrong.err
+    )
     remarks = " ".join(wrong.document["remarks"])
     assert "implausibly far" in remarks and "wrist_1_joint.misalignment_" in remarks
-    assert remarks.count("look for a column with a wrong sign") == 1
+    assert remarks.count("look for a column with wrong sign") == 1
 
 
 def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some: Path) -> None:
@@ -220,10 +223,12 @@ def test_scatter_that_no_instrument_has_is_remarked(run, ur5_folder: Path, some:
     write_csv(some, header, rows)
     arguments = ("calibrate", ur5_folder / "robot.yaml", some, "--terms", "kinematic")
     page = run(*arguments)
-    assert "too much to be noise" in page.out and page.out.count("look for a column") == 1
+    assert "too large for noise" in page.out and page.out.count("look for a column") == 1
     write_csv(some, [*header, "sigma"], np.hstack([rows, np.full((len(rows), 1), 5e-5)]))
     page = run(*arguments)
-    assert "beside the stated sigma of 0.05 mm" in page.out and page.out.count("look for a column") == 1
+    assert (
+        "in addition to the stated sigma of 0.05 mm" in page.out and page.out.count("look for a column") == 1
+    )
 
 
 @pytest.fixture
@@ -254,7 +259,7 @@ def test_what_is_read_and_not_used_is_said(run, tx90l_folder: Path, elastic_pose
 
 def test_nominal_springs_are_said_to_be_nominal(run, tx90l_folder: Path, elastic_poses: Path) -> None:
     robot, estimates = tx90l_folder / "robot.yaml", tx90l_folder / "estimates.yaml"
-    remark = "the stiffness was not identified: the nominal one of robot.yaml is taken to be right to 30%"
+    remark = "the stiffness was not identified: the nominal one of robot.yaml is used with a standard deviation of 30%"
     assert remark in run("calibrate", robot, elastic_poses).out
     model = RobotModel.from_yaml(robot, estimates=False)
     springs = [n for n in model.values if n.endswith("stiffness")]

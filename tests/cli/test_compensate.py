@@ -56,7 +56,7 @@ def test_there_and_back_through_files(run, ur5: Path) -> None:
     assert np.abs(positions(tool) - (at.position + at.orientation @ shift)).max() < 1e-6
     start = [f"{value}" for value in wanted[0]]
     again = run("compensate", robot, ur5 / "tool.parquet", "--out", ur5 / "again.csv", "--start", *start)
-    assert again.status == 0 and "sought from shoulder_pan_joint 0.3015" in again.out
+    assert again.status == 0 and "targets without joint positions: shoulder_pan_joint 0.3015" in again.out
     np.testing.assert_allclose(
         pl.read_csv(ur5 / "again.csv").select(Q).to_numpy(), commands.select(Q).to_numpy(), atol=1e-7
     )
@@ -83,14 +83,14 @@ def test_where_nothing_can_be_reached_nothing_is_written(run, ur5: Path) -> None
     before = snapshot(ur5)
     done = run("compensate", ur5 / "robot.yaml", targets, "--out", ur5 / "none.csv")
     assert done.status == 2 and done.err.count("none of the 1 targets can be compensated") == 1
-    assert "pose 1: out of reach: the tool comes no nearer than 3" in done.err
+    assert "pose 1: out of reach: the smallest distance of the tool to the target is 3" in done.err
     assert snapshot(ur5) == before
 
 
 @pytest.mark.parametrize(
     ("header", "row", "sentence"),
     [
-        (["pose"], [1], "nothing says where the tool is to go; add x, y, z, or q1…q6"),
+        (["pose"], [1], "there are no target positions; add x, y, z, or q1…q6"),
         (["pose", *Q, "qw", "qx", "qy", "qz"], [1] + [0.1] * 6 + [1, 0, 0, 0], "'quaternion' but no x, y, z"),
         (["pose", "x", "y"], [1, 0.1, 0.2], "the column 'z' is missing"),
         (["pose", "x", "y", "z"], [1, 400.0, 200.0, 300.0], "column x: the point lies 538.5 m"),
@@ -150,7 +150,7 @@ def test_starts_that_do_not_fit(run, ur5: Path) -> None:
         ),
         (
             (ur5 / "targets.csv", "--start", *"000000"),
-            "has joint positions, which are where the search starts",
+            "has joint positions, which are the start of the inverse kinematics",
         ),
     ):
         done = run("compensate", ur5 / "robot.yaml", *arguments, "--out", ur5 / "none.csv")

@@ -80,7 +80,7 @@ def test_every_option_is_that_of_the_help(run, verb) -> None:
         (["design", "poses", "r.yaml", "--count"], "missing value for argument '--count'"),
         (["calibrate", "r.yaml", "p.csv", "--secant-scale", "x"], "'x' is no number"),
         (["export", "urdf", "robot.yaml"], "needs --out FILE"),
-        (["report", "a", "b"], "has no place for b"),
+        (["report", "a", "b"], "does not take b"),
         (["completion", "tcsh"], "'bash', 'zsh', 'fish'"),
     ],
 )

@@ -49,7 +49,9 @@ def test_given_poses_have_a_prediction_too(run, tx90l_folder):
     largest = document["largest_stiffness_std"]
     assert largest["name"] == "joint_3.bearing_y.stiffness"  # no payload twists the forearm
     assert largest["std"] > 0.5 and "curve" not in document
-    assert "joint_3 bearing y will not be known" in out.with_suffix(".html").read_text(encoding="utf-8")
+    assert "The stiffness of joint_3 bearing y is not identifiable" in out.with_suffix(".html").read_text(
+        encoding="utf-8"
+    )
 
 
 @pytest.mark.parametrize(
@@ -61,7 +63,7 @@ def test_given_poses_have_a_prediction_too(run, tx90l_folder):
         ),
         (("--choose", "4"), "--choose is for --plan designed or quick without --poses"),
         (("--std", "-1"), "--std is -1; it must be positive"),
-        (("--std", "0.0001"), "0.01 % is not reached however long is measured: 24 realisations leave"),
+        (("--std", "0.0001"), "0.01 % is not reached with any duration: 24 realisations leave"),
         (("--plan", "quick", "--poses", "frequency_poses.csv"), "there is no pose of the plan 'quick'"),
     ],
 )

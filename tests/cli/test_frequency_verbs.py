@@ -408,4 +408,4 @@ def test_a_pose_without_response_is_named(run, recorded: Path, tmp_path: Path) -
     run("identify", "response", robot, recorded / "recorded", "--out", tmp_path / "responses")
     (tmp_path / "responses" / "response_pose_1.npz").unlink()
     done = run("identify", "stiffness", robot, tmp_path / "responses")
-    assert done.status == 0 and "poses without a response, which the fit is without too: 1" in done.out
+    assert done.status == 0 and "poses of the plan without a response, not used in the fit: 1" in done.out

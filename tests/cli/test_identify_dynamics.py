@@ -130,7 +130,7 @@ def test_friction_chosen_inside_the_training_part_predicts_the_rest(
 
 
 def test_every_declared_term_is_in_the_estimate(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Also when it cannot be told from another: then by name."""
+    """Also when it is not identifiable beside another: then by name."""
     friction = (
         "[coulomb, viscous, torque_offset, asymmetric_coulomb, stribeck, presliding, warm_up, load_coulomb]"
     )
@@ -144,9 +144,9 @@ def test_every_declared_term_is_in_the_estimate(tx40: Path, capsys: pytest.Captu
         f"joint_{i}.coulomb_asymmetry" for i in range(1, 7)
     }
     for i in range(1, 7):
-        own = f"no recording tells joint_{i}.coulomb_asymmetry from "
+        own = f"joint_{i}.coulomb_asymmetry is not identifiable beside "
         (remark,) = (text for text in found["remarks"] if text.startswith(own))
-        assert f"joint_{i}.torque_offset" in remark
+        assert f"joint_{i}.torque_offset" in remark and remark.endswith("in any recording")
     assert set(found["friction_shapes"]) == {"stribeck", "presliding", "warm_up"}
 
 
@@ -179,7 +179,9 @@ def test_what_robot_yaml_lacks_is_proposed(
     log = str(tx40 / "exciting.parquet")
     assert main(["identify", "dynamics", str(robot), log, "--hold-out", "last:0.3", "--json"]) == 0
     out, err = capsys.readouterr()
-    assert "proposed from the motion's spectrum, as robot.yaml lacks cutoff_hz and decimation" in err
+    assert (
+        "proposed from the spectrum of the motion, because robot.yaml lacks cutoff_hz and decimation" in err
+    )
     assert json.loads(out)["error_percent"]["held_out"] < 8.5
 
 
@@ -238,10 +240,10 @@ def test_a_log_that_counts_twice(tx40: Path, capsys: pytest.CaptureFixture[str])
     robot, log = str(tx40 / "robot.yaml"), str(tx40 / "exciting.parquet")
     again = str(tx40 / ".." / "tx40" / "exciting.parquet")
     assert "exciting.parquet is given twice" in refusal([robot, log, again], capsys)
-    assert "is fitted and stands under --validate too" in refusal([robot, log, "--validate", again], capsys)
+    assert "is fitted and is given under --validate too" in refusal([robot, log, "--validate", again], capsys)
     copy = str(tx40 / "copy.parquet")
     (tx40 / "copy.parquet").write_bytes((tx40 / "exciting.parquet").read_bytes())
-    assert f"{copy} holds the same as {log}; it would count" in refusal([robot, log, copy], capsys)
+    assert f"{copy} holds the same as {log}; it would be used" in refusal([robot, log, copy], capsys)
     assert f"{copy} holds the same as {log}, which is fitted" in refusal(
         [robot, log, "--validate", copy], capsys
     )
@@ -288,7 +290,7 @@ def test_bodies_that_could_be_built(
     assert told.splitlines()[-1] == f"{again} --estimator sdp --hold-out last:0.3"
     assert main(["identify", "dynamics", *arguments, "--estimator", "sdp"]) == 0
     told = capsys.readouterr().out
-    assert "no body can have" not in told
+    assert "not physically consistent" not in told
     assert told.splitlines()[-1] == f"{again} --validate other.parquet --estimator sdp"
     urdf = tmp_path / "identified.urdf"
     assert main(["export", "urdf", str(tx40 / "robot.yaml"), "--out", str(urdf), "--json"]) == 0
@@ -333,5 +335,5 @@ def test_torques_of_motors_without_their_gears(tx40: Path, capsys: pytest.Captur
     robot = tx40 / "robot.yaml"
     robot.write_text(robot.read_text().replace("    matrix: joint_from_motor_torque.csv\n", ""))
     message = refusal([str(robot), str(tx40 / "exciting.parquet")], capsys)
-    assert "exciting.parquet: the torque of joint_2 follows only" in message and "gear ratios" in message
+    assert "exciting.parquet: the torque of joint_2 is only" in message and "gear ratios" in message
     assert not (tx40 / "estimates.yaml").exists()

@@ -89,11 +89,11 @@ def test_a_recording_that_the_dynamics_were_made_from_tells_no_payload(arm: Path
     robot, loaded = arm / "robot.yaml", arm / "loaded.csv"
     assert run("identify", "dynamics", robot, loaded).status == 0
     done = run("identify", "payload", robot, loaded)
-    assert done.status == 2 and "would count twice" in done.err
+    assert done.status == 2 and "would be used twice" in done.err
 
 
 def test_from_identified_dynamics(arm: Path, run: Run) -> None:
-    """The block in place of recordings without payload; those that it was made from would count twice, others help."""
+    """The block in place of recordings without payload; those that it was made from would be used twice, others help."""
     robot, loaded = arm / "robot.yaml", arm / "loaded.csv"
     declare(arm)
     for name in ("free", "other"):
@@ -105,7 +105,7 @@ def test_from_identified_dynamics(arm: Path, run: Run) -> None:
     both = run("identify", "payload", robot, loaded, "--free", arm / "other.csv", "--json").document
     assert both["parameters"]["payload.mass"]["std"] < alone["parameters"]["payload.mass"]["std"]
     twice = run("identify", "payload", robot, loaded, "--free", arm / "free.csv")
-    assert twice.status == 2 and "would count twice" in twice.err
+    assert twice.status == 2 and "would be used twice" in twice.err
     assert set(read_estimates(arm / "estimates.yaml")) == {"dynamics", "payload"}
     held = RobotModel.from_yaml(robot).payload
     assert held is not None and held.com[1] == 0.07
@@ -126,7 +126,7 @@ def still(table: pl.DataFrame) -> pl.DataFrame:
 @pytest.mark.parametrize(
     ("options", "change", "message"),
     [
-        ([], None, "has no block 'dynamics', so the payload cannot be separated from the robot's own inertia; run 'flexcal identify"),
+        ([], None, "has no block 'dynamics', so payload and robot inertia are not identifiable separately; run 'flexcal identify"),
         (["--free", "loaded.csv"], None, "loaded.csv is given twice"),
         (["--free", "free.csv", "--frame", "hand"], None, "moves a frame 'hand'; name one of shoulder, upper"),
         (["--free", "free.csv", "--frame", "base"], None, "moves a frame 'base'; name one of"),
@@ -135,7 +135,7 @@ def still(table: pl.DataFrame) -> pl.DataFrame:
         (["--free", "free.csv"], lambda t: t.drop("q2", "tau2"), "q2"),
         (["--free", "free.csv"], lambda t: t.drop("tau1", "tau2"), "tau"),
         (["--free", "free.csv"], lambda t: t.with_columns(q3=pl.lit(0.0)), "q3"),
-        (["--free", "free.csv"], lambda t: t.with_columns(tau1=-pl.col("tau1"), tau2=-pl.col("tau2")), "turn its sign"),
+        (["--free", "free.csv"], lambda t: t.with_columns(tau1=-pl.col("tau1"), tau2=-pl.col("tau2")), "change its sign"),
         (["--free", "free.csv"], lambda t: t.head(40), "loaded.csv"),
     ],
 )  # fmt: skip
@@ -152,7 +152,7 @@ def test_what_is_refused(arm: Path, run: Run, options: list[str], change: object
 
 def test_columns_of_payload_are_believed(arm: Path, run: Run) -> None:
     for name, mass, message in (
-        ("loaded", 0.0, "says that the robot held nothing"),
+        ("loaded", 0.0, "states that the robot held no payload"),
         ("free", 4.0, "recorded with a payload of 4 kg, but --free takes recordings without"),
     ):
         with_column(arm / f"{name}.csv", mass)
@@ -173,4 +173,4 @@ def test_a_frame_beside_a_declared_one(arm: Path, run: Run) -> None:
 
 def test_nothing_in_the_hand(arm: Path, run: Run) -> None:
     outcome = run("identify", "payload", arm / "robot.yaml", arm / "other.csv", "--free", arm / "free.csv")
-    assert outcome.status == 2 and "the torques show no payload" in outcome.err
+    assert outcome.status == 2 and "the torques contain no payload" in outcome.err

@@ -29,7 +29,7 @@ def test_a_wrong_sign_is_found_and_mapped(run, ur5_folder: Path, foreign: Path) 
     before = snapshot(ur5_folder)
     refused = run("import", robot, foreign, "--out", out)
     assert refused.status == 2 and snapshot(ur5_folder) == before
-    assert "elbow_joint seems to be counted the other way: --map 'q3=-axis 3[deg]'" in refused.err
+    assert "elbow_joint seems to have the opposite sign: --map 'q3=-axis 3[deg]'" in refused.err
     assert run("import", robot, foreign, "--out", out, "--map", "q3=-axis 3[deg]").status == 0
     model = RobotModel.from_yaml(robot, estimates=False)
     poses, published = read_poses(out, model), read_poses(ur5_folder / "grid.csv", model)
@@ -110,14 +110,14 @@ def test_points_that_are_left_out_are_named(run, ur5_folder: Path, foreign: Path
 def test_the_instruments_noise_is_stated_where_the_file_does_not(run, ur5_folder: Path) -> None:
     robot, grid, out = ur5_folder / "robot.yaml", ur5_folder / "grid.csv", ur5_folder / "poses.csv"
     plan = write_csv(ur5_folder / "plan.csv", ["pose", *(f"q{i}" for i in range(1, 7))], np.eye(7))
-    assert "say it with --sigma MM" in run("import", robot, grid).out
+    assert "give it with --sigma MM" in run("import", robot, grid).out
     page = run("import", robot, grid, "--sigma", "0.03", "--out", out)
-    assert page.status == 0 and "say it with" not in page.out
+    assert page.status == 0 and "give it with" not in page.out
     poses = read_poses(out, RobotModel.from_yaml(robot, estimates=False))
     assert poses.sigma_given
     np.testing.assert_allclose(poses.sigma, 3e-5)
     for file, sigma, words in (
-        (out, "0.03", "says sigma itself"),
+        (out, "0.03", "contains sigma"),
         (grid, "0", "must be positive"),
         (grid, "nan", "must be positive"),
         (plan, "0.03", "has none"),

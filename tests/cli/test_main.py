@@ -147,7 +147,7 @@ def test_known_error_is_one_line_without_traceback(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["calibrate", "--help"], "Relative 1sigma by which"),
+        (["calibrate", "--help"], "Relative 1sigma of the ratio"),
         (["export", "urdf", "robot.yaml", "--out", "köln.urdf"], "wrote koln.urdf"),
         (["design", "frequency", "robot.yaml", "--out", "köln.yaml", "--json"], r'"plan": "k\u00f6ln.yaml"'),
         (["verify", "köln.csv", "o.csv"], "koln.csv is no robot.yaml"),

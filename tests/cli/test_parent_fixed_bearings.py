@@ -47,7 +47,7 @@ def test_not_declared_they_are_found(run, tmp_path: Path) -> None:
     calibrated = run("calibrate", robot, tmp_path / "fit.csv", "--terms", "kinematic", "--json").document
     assert calibrated["bearings"]["declared"] is None and calibrated["bearings"]["preferred"] == "before"
     assert any(
-        "these were taken; `bearings: before` in robot.yaml" in remark for remark in calibrated["remarks"]
+        "these were used; `bearings: before` in robot.yaml" in remark for remark in calibrated["remarks"]
     )
     assert "bearings" not in calibrated["verdict"]["reasons"]
     verified = run("verify", robot, tmp_path / "fresh.csv", "--json").document

@@ -91,7 +91,7 @@ def test_the_reflector_is_turned_towards_the_instrument(run, tx90l_folder: Path)
         (["--working=nowhere.csv"], "nowhere.csv cannot be read"),
         (["--wanted", "0"], "--wanted is 0"),
         (["--count", "9"], "9 poses cannot determine 29 geometric parameters"),
-        (["--random", "--measured", "poses.csv"], "--random draws poses and --measured"),
+        (["--random", "--measured", "poses.csv"], "--random and --measured exclude each other"),
     ],
 )
 def test_bad_options(run, tx90l_folder: Path, options: list[str], sentence: str) -> None:
@@ -106,7 +106,7 @@ def test_a_pool_in_which_no_pose_is_seen(run, tx90l_folder: Path) -> None:
     rows = np.column_stack([np.arange(50), np.random.default_rng(1).uniform(-1, 1, (50, 6))])
     file = write_csv(tx90l_folder / "taught.csv", ["pose", *(f"q{i}" for i in range(1, 7))], rows)
     arguments = ("design", "poses", robot, "--from", file, "--out", tx90l_folder / "plan.yaml")
-    assert "the instrument sees none of the 50 poses" in refused(run, tx90l_folder, *arguments)
+    assert "the instrument can measure none of the 50 poses" in refused(run, tx90l_folder, *arguments)
     drawn = ("design", "poses", robot, "--candidates", 20, "--out", tx90l_folder / "plan.yaml")
     assert "visibility threw out" in refused(run, tx90l_folder, *drawn)
 

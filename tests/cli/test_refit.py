@@ -76,11 +76,11 @@ def rigid_start(at: np.ndarray, seen: np.ndarray) -> np.ndarray:
 def test_a_moved_tracker_is_said_and_refitted(run, robot: Path, arm: StrangerArm, tmp_path: Path) -> None:
     file = fresh(arm, tmp_path / "moved.csv", tracker=moved())
     done = run("verify", robot, file)
-    assert done.status == 0 and "after placing the station again 0.0" in done.out
-    assert "--refit station verifies the geometry alone, at the price of 2 poses" in done.out
+    assert done.status == 0 and "after a refit of the station 0.0" in done.out
+    assert "--refit station verifies the geometry alone, and costs 2 poses" in done.out
     assert "Trusted: no" in done.out
     mapped = run("map", robot, "--verification", file, "--count", "50", "--out", tmp_path / "map.html")
-    assert mapped.status == 2 and "after placing the station again" in mapped.err
+    assert mapped.status == 2 and "after a refit of the station" in mapped.err
     plain = run("verify", robot, file, "--json").document
     assert plain["verification"]["measured"]["mean_mm"] > 100 and plain["refit"] is None
     assert plain["refit_proposed"]["what"] == ["station"]
@@ -97,7 +97,7 @@ def test_a_moved_tracker_is_said_and_refitted(run, robot: Path, arm: StrangerArm
 def test_another_reflector_is_said_and_refitted(run, robot: Path, arm: StrangerArm, tmp_path: Path) -> None:
     file = fresh(arm, tmp_path / "other.csv", xyz=arm.true_xyz + np.array([0.03, -0.02, 0.01]))
     done = run("verify", robot, file)
-    assert "after finding the point again 0.0" in done.out and "--refit point" in done.out
+    assert "after a refit of the point 0.0" in done.out and "--refit point" in done.out
     document = run("verify", robot, file, "--refit", "point", "--json").document
     assert document["refit"]["parameters"] == 3 and document["verification"]["measured"]["mean_mm"] < 0.06
     both = fresh(
@@ -121,7 +121,7 @@ def test_nothing_is_proposed_where_nothing_moved(run, robot: Path, arm: Stranger
 def test_too_few_poses_to_refit(run, robot: Path, arm: StrangerArm, tmp_path: Path) -> None:
     file = fresh(arm, tmp_path / "few.csv", 3, tracker=moved())
     done = run("verify", robot, file, "--refit", "station", "point")
-    assert done.status == 2 and "too few to place the instrument and the measured point again" in done.err
+    assert done.status == 2 and "too few to refit the instrument and the measured point" in done.err
 
 
 def test_an_uncalibrated_point_is_never_silent(run, tmp_path: Path, arm: StrangerArm) -> None:

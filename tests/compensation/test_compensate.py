@@ -216,7 +216,7 @@ def test_a_stretched_arm_that_is_too_short_is_named(tx90l: RobotModel, real: Rob
     q = np.array([0.3, 0.5, 0.0, 0.4, 0.9, -0.5])
     found = compensate(short, tx90l, targets_at(q))
     assert found.reason[0].startswith("singular: joint_2, joint_3")
-    assert "the tool comes no nearer than " in found.reason[0]
+    assert "the smallest distance of the tool to the target is " in found.reason[0]
 
 
 def test_points_alone(tx90l: RobotModel, real: RobotModel, rng: np.random.Generator) -> None:
@@ -226,7 +226,9 @@ def test_points_alone(tx90l: RobotModel, real: RobotModel, rng: np.random.Genera
     targets = ToolTargets(pose=np.arange(31), target=np.full(31, "smr"), position=position)
     found = compensate(real, tx90l, targets, start=EASY)
     assert found.found.tolist() == [True] * 30 + [False] and not found.elsewhere[:30].any()
-    assert re.fullmatch(r"out of reach: the tool comes no nearer than 3\d{3} mm", found.reason[30])
+    assert re.fullmatch(
+        r"out of reach: the smallest distance of the tool to the target is 3\d{3} mm", found.reason[30]
+    )
     sure = np.flatnonzero(found.unambiguous)
     at = seen_in_base(real, found.q[sure], None)
     assert len(sure) > 20 and np.abs(at - position[sure]).max() < MICROMETRE

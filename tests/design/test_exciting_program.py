@@ -171,5 +171,5 @@ def test_what_is_known_already_is_not_sought_again(tx90l: RobotModel) -> None:
 
 def test_a_robot_too_weak_to_stand_is_told_its_joint(tx90l: RobotModel) -> None:
     weak = tuple(replace(j, effort=33.0) if j.name == "joint_2" else j for j in tx90l.joints)
-    with pytest.raises(FlexcalError, match=r"can stand nowhere.* joint_2 needs .* N m to stand"):
+    with pytest.raises(FlexcalError, match=r"has no feasible posture.* joint_2 needs .* N m at rest"):
         design_trajectories(replace(tx90l, joints=weak))

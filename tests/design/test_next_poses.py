@@ -87,7 +87,7 @@ def test_payloads_and_unknown_noise(tx90l, found, measured, rng):
 
 
 def test_bad_input(found, measured, rng):
-    with pytest.raises(FlexcalError, match="chosen by c, A or D, not by O3"):
+    with pytest.raises(FlexcalError, match="must be c, A or D, not O3"):
         next_poses(found, measured, 2, rng=rng, criterion="O3")
     with pytest.raises(FlexcalError, match="hold the target ball, but the next ones are chosen for smr"):
         next_poses(found, replace(measured, target=np.full(14, "ball")), 2, rng=rng)

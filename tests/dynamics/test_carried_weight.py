@@ -29,7 +29,9 @@ def log_of(recording: Recording, model: RobotModel, folder: Path) -> JointLog:
 
 def test_torques_before_the_gears(recording: Recording, tx40: RobotModel, tmp_path: Path) -> None:
     log = log_of(replace(recording, torque=recording.torque / 45), tx40, tmp_path)
-    sentence = r"log\.parquet: the torque of joint_2 follows only 2\.\d+% of what its weight asks for; .* of the motors"
+    sentence = (
+        r"log\.parquet: the torque of joint_2 is only 2\.\d+% of its gravity torque; .* on the motor side"
+    )
     with pytest.raises(InputError, match=sentence):
         require_joint_torques([log], tx40)
 
@@ -46,7 +48,8 @@ def test_torques_of_the_other_sign(recording: Recording, tx40: RobotModel, tmp_p
     for signs, joint in ((-np.ones(6), "joint_2"), (np.array([1, 1, -1, 1, 1, 1]), "joint_3")):
         log = log_of(replace(recording, torque=recording.torque * signs), tx40, tmp_path)
         with pytest.raises(
-            InputError, match=f"the torque of {joint} pulls with its weight instead of holding it"
+            InputError,
+            match=f"the torque of {joint} has the sign of its gravity torque instead of the opposite",
         ):
             require_joint_torques([log], tx40)
 

@@ -155,4 +155,4 @@ def test_a_column_that_the_data_leave_at_zero_is_named(tx40: RobotModel, swing: 
     assert set(data.silent) == silent
     remarks = dynamics_remarks(data, weighted_least_squares(data), "wls")
     named = "rotor_inertia, viscous, coulomb, sublinear_viscous"
-    assert f"joint_3: {named} stay as they were: these recordings leave their columns at zero" in remarks
+    assert f"joint_3: {named} keep their values: these recordings do not excite them" in remarks

@@ -149,5 +149,5 @@ def test_a_joint_that_never_moves(swing: Motion, observation: Observation, tmp_p
     estimate = weighted_least_squares(data)
     assert not set(data.silent) & {n for n, k in zip(data.names, estimate.identifiable, strict=True) if k}
     assert dynamics_remarks(data, estimate, "wls")[0] == (
-        "joint_2: rotor_inertia, viscous, coulomb stay as they were: these recordings leave their columns at zero"
+        "joint_2: rotor_inertia, viscous, coulomb keep their values: these recordings do not excite them"
     )

@@ -211,7 +211,7 @@ def test_an_exact_model_leaves_nothing_to_learn(arm: Observation) -> None:
 
 def test_too_few_rows_are_refused(arm: Observation) -> None:
     with pytest.raises(
-        FlexcalError, match="90 rows are too few to learn a residual torque from, which takes 100"
+        FlexcalError, match="90 rows are too few to learn a residual torque; the minimum is 100"
     ):
         learned(arm, noisy(swings(arm, 0, 90), np.random.default_rng(0)))
 

@@ -147,7 +147,7 @@ def test_standstill_is_left_out_and_counted(
         observe(observation, base, [held], Decimation(1), mask_standstill=False).subsystems[0].triangle.rows
         == 2500
     )
-    with pytest.raises(FlexcalError, match="no equation is left of the motion"):
+    with pytest.raises(FlexcalError, match="no equations remain of the motion"):
         observe(observation, base, [held], Decimation(1), windows=[Window(start=10.5)])
 
 
@@ -213,5 +213,5 @@ def test_what_is_not_finite_is_refused(observation: Observation, base: BaseParam
 
 
 def test_too_few_rows_for_a_noise(observation: Observation, base: BaseParameters, motion: Motion) -> None:
-    with pytest.raises(FlexcalError, match="do not tell its noise"):
+    with pytest.raises(FlexcalError, match="do not determine its noise"):
         weighted_least_squares(observe(observation, base, [motion.part(0, 20)], Decimation(1)))

@@ -77,14 +77,14 @@ def frozen(recording: Recording) -> Recording:
         (held, r"log\.parquet: the torque of joint_2 stays at its extreme -?\d+\.?\d* for \d+ samples"),
         (
             clipped,
-            r"the position of joint_3 runs into its extreme .* rad at full speed .* the encoder is clipped",
+            r"the position of joint_3 reaches its extreme .* rad at full speed .* the encoder is clipped",
         ),
         (rates(180 / np.pi), r"velocities of joint_1 .* degrees a second: declare 'unit: deg/s'"),
         (rates(-1.0), "velocities of joint_1 .* their sign is the other one"),
         (rates(0.0), "velocities of joint_1 .* they are 0 times as large"),
-        (swapped, "velocities of joint_1 are not those of its positions"),
+        (swapped, "velocities of joint_1 are inconsistent with its positions"),
         (unmeasured, "the torque of joint_5 is the same throughout; it was not measured"),
-        (frozen, "velocities of joint_3 are not those of its positions"),
+        (frozen, "velocities of joint_3 are inconsistent with its positions"),
     ],
 )
 def test_a_sensor_that_lies(

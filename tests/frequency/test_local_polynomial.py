@@ -112,7 +112,7 @@ def test_polynomial_transient_is_exact_and_noise_is_measured(rng):
 def test_too_little_excitation_is_said(rng):
     u = np.ones((1, 60, 2)) + 0j
     y = np.ones((1, 60, 2)) + 0j
-    with pytest.raises(FlexcalError, match="does not tell the inputs"):
+    with pytest.raises(FlexcalError, match="does not separate the inputs"):
         local_polynomial(u, y, 11)
     with pytest.raises(FlexcalError, match="cannot determine 6 unknowns"):
         local_polynomial(u, y, 7)
@@ -138,7 +138,7 @@ def test_it_agrees_with_averaging_in_the_steady_state(make_plan, linear_cell, me
 
 def test_a_reference_needs_both_signs(make_plan, linear_cell, rng):
     plan = make_plan(signs=False, reference_amplitude=0.05)
-    with pytest.raises(FlexcalError, match="cannot tell the reference motion"):
+    with pytest.raises(FlexcalError, match="cannot separate the reference motion"):
         list(local_polynomial_responses(plan, linear_cell().record(plan, rng)))
 
 

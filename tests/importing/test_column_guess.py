@@ -63,10 +63,10 @@ def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
 @pytest.mark.parametrize(
     ("header", "words"),
     [
-        ([*(f"J{i}" for i in SIX), *(f"A{i}" for i in SIX)], "J1 and A1 begin what could both be q"),
+        ([*(f"J{i}" for i in SIX), *(f"A{i}" for i in SIX)], "J1 and A1 could both begin q"),
         ([f"J{i}" for i in range(1, 8)], "there are 7 of them, but 6 joints"),
         ([*(f"J{i}" for i in SIX), *(f"I{i} [A]" for i in SIX)], "currents need a gain in N m/A"),
-        ([*(f"J{i}" for i in SIX), *XYZ, "x2", "y2", "z2"], "x and x2 begin what could both be xyz"),
+        ([*(f"J{i}" for i in SIX), *XYZ, "x2", "y2", "z2"], "x and x2 could both begin xyz"),
     ],
 )
 def test_what_is_left_out_says_why(ur5, made, rng, header, words) -> None:

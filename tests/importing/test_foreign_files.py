@@ -207,7 +207,7 @@ def test_parquet(tmp_path: Path) -> None:
         ("a.xlsx", "nothing", "not a readable Excel"),
         ("a.mcap", "nothing", "not a readable recording"),
         ("a.db3", "nothing", "not a readable recording"),
-        ("a.step", "nothing", "'.step' are not understood"),
+        ("a.step", "nothing", "'.step' are not supported"),
     ],
 )
 def test_bad_files_are_refused(tmp_path: Path, name: str, content: str, words: str) -> None:

@@ -87,7 +87,7 @@ def test_a_guess_is_taken_back(ur5, foreign) -> None:
         ("q1=J9", "no column 'J9'; did you mean"),
         ("q1", "it is written NAME=COLUMN"),
         ("q1=J1[kg]", "the unit 'kg' does not fit; possible are rad, deg"),
-        ("x=Y", "says nothing of y, z"),
+        ("x=Y", "does not give y, z"),
         ("tau1=I1[A]", "by a gain in N m/A"),
         ("q1=who", "holds texts"),
         ("q1=0*J1", "finite number other than 0"),

@@ -129,7 +129,7 @@ def test_springs_do_not_stand_on_links_that_no_body_can_be(examples: Path, tmp_p
     values["link_3.Ixx"] *= 9
     write_estimates(path, "dynamics", estimate(*(Parameter(n, "1", v) for n, v in values.items())))
     with pytest.raises(
-        InputError, match=r"estimates\.yaml: no body can have .* gives link_3, .* --estimator sdp"
+        InputError, match=r"estimates\.yaml: .* not physically consistent for link_3, .* --estimator sdp"
     ):
         RobotModel.from_yaml(robot)
     rigid = replace(nominal, bearing_frames={})

@@ -63,7 +63,7 @@ MISTAKES = [
     (' type="revolute"', "", "line 12: joint 'shoulder' has no type"),
     (LIMIT, "", "line 12: joint 'shoulder' is revolute but has no limits"),
     ('lower="-2" upper="2"', "", "line 17: <limit> of joint 'shoulder' lacks the attribute 'lower'"),
-    ('upper="2"', 'upper="-2"', "line 17: the limits of joint 'shoulder', -2 to -2, leave it no room"),
+    ('upper="2"', 'upper="-2"', "line 17: the limits of joint 'shoulder', -2 to -2, leave no range"),
     (' effort="100"', "", "line 17: <limit> of joint 'shoulder' lacks the attribute 'effort'"),
     ('velocity="3"', 'velocity="-3"', "line 17: the velocity limit of joint 'shoulder' is negative"),
     (LIMIT, LIMIT + '<mimic joint="mount"/>', "line 12: joint 'shoulder' mimics another one"),
@@ -72,7 +72,7 @@ MISTAKES = [
     ('<parent link="boom"/>', "", "line 19: joint 'mount' names no parent link"),
     ('<link name="tip"/>', '<link name="boom"/>', "line 11: the link 'boom' stands here and on line 4"),
     ('name="mount"', 'name="shoulder"', "line 19: the joint 'shoulder' stands here and on line 12"),
-    ('<link name="tip"/>', '<link name="tip"/><link name="lost"/>', "line 2: the links base, lost hang on no joint"),
+    ('<link name="tip"/>', '<link name="tip"/><link name="lost"/>', "line 2: the links base, lost are not attached to a joint"),
     ('<child link="tip"/>', '<child link="boom"/>', "line 19: joint 'mount' carries the link 'boom', which joint 'shoulder'"),
     ('<parent link="base"/>', '<parent link="tip"/>', "line 4: the link 'boom' is carried by itself"),
 ]  # fmt: skip

@@ -84,7 +84,7 @@ def test_a_folder_without_its_torques_is_refused(payload_folder: Path, tmp_path:
     for name in ("results.json", "estimates.yaml", "estimates.npz"):
         (tmp_path / name).write_bytes((payload_folder / name).read_bytes())
     with pytest.raises(
-        InputError, match=r"predictions.npz cannot be read .* run the verb that leaves it again"
+        InputError, match=r"predictions.npz cannot be read .* run the verb that writes it again"
     ):
         report_folder(tmp_path)
 

@@ -1,4 +1,4 @@
-"""Whether measured points prefer bearings fixed to the parent link, or bearings that turn with the child: two fits compared."""
+"""Comparison of bearing axes fixed to the parent link with axes that turn with the child, from measured points."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _RELEVANT = 0.95
 
 @dataclass(frozen=True)
 class BearingAxes:
-    """What measured points say of bearings that tilt `before` and `after` the joint's rotation, from a fit with each.
+    """Comparison of fits with bearings that tilt `before` and `after` the joint's rotation, from measured points.
 
     `declared` are those that robot.yaml or stage 1 says, None where neither does. `statistic` is Vuong's (1989) for models of which neither
     contains the other: the sum over poses of the differences of the log likelihoods, each fit with the scatter that it leaves, over its
@@ -60,7 +60,7 @@ class BearingAxes:
 def compare_bearings(
     model: RobotModel, terms: tuple[str, ...], fit: Callable[[RobotModel, tuple[str, ...]], Calibration]
 ) -> BearingAxes | None:
-    """What the points say that `fit` fits a robot and its `terms` to.
+    """Compare `fit`, of a robot and its `terms`, with a fit of the other bearing axes.
 
     A preference for others than the bearings of `model` must hold with transmission errors in both fits, too: bearings of the wrong kind
     can take a part of those up. None for a robot without bearings, or where one of the two has no fit.

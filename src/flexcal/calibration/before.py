@@ -1,4 +1,4 @@
-"""The uncalibrated robot against measured points: as declared, best-fit registered, and with the measured point found too.
+"""Errors of the uncalibrated robot: as declared, best-fit registered, and with the measured point fitted too.
 
 A reflector whose place on the tool was taken with a ruler is off by millimetres, and so is the robot that is registered with it. That is no
 error of the robot. Its own error is what is left when the instrument's frame (6 parameters a station) and the place of each measured
@@ -25,7 +25,7 @@ DECLARED_WITHIN = 0.05
 
 @dataclass(frozen=True, eq=False)
 class RobotBefore:
-    """An uncalibrated robot with the instrument placed three ways.
+    """Uncalibrated robot as declared, best-fit registered, and with the measured points fitted too.
 
     `declared`: the instrument measures in the base frame, or stands, axes parallel to the base's, where robot.yaml says; None where the
     measured points are in another frame. `registered`: every station placed by the best rigid motion; None where its points are too few.

@@ -1,4 +1,4 @@
-"""Whether what was measured wandered between the first and the last point: a warming arm, an instrument that settles."""
+"""Score test for a drift of robot or instrument during the measurement."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of stiffness and inertia before the geometry is fitted: the posterior of stage 1, or CAD alone."""
+"""Prior of stiffness and inertia for the geometric calibration: posterior of stage 1, or CAD."""
 
 from __future__ import annotations
 

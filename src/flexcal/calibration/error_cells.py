@@ -1,4 +1,4 @@
-"""Measured points that share an error: those of one visit to a pose, of a part of the workspace, of a stretch of time, of one command."""
+"""Groups of measured points with a common error: visits to a pose, regions of the workspace, sections in time, commands."""
 
 from __future__ import annotations
 

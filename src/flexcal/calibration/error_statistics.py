@@ -1,4 +1,4 @@
-"""How far the tool is from where it was said to be."""
+"""Statistics of position errors."""
 
 from __future__ import annotations
 

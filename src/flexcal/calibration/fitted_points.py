@@ -1,4 +1,4 @@
-"""A fit of the geometry to measured points under one error model, and what its residuals say of that error model."""
+"""Fit of the geometry to measured points for one error model, and the likelihood of that error model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""On which side of its backlash a joint rests at each pose, and where that is not certain."""
+"""Flank of the backlash of each joint at each pose, and whether it is certain."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ def require_both_flanks(model: RobotModel, flank: np.ndarray) -> None:
         seen = np.unique(flank[:, i])
         if not {-1.0, 1.0} <= set(seen):
             raise FlexcalError(
-                f"{model.joints[i].name} rests on one flank of its backlash at all {len(flank)} poses, so the backlash cannot be told "
-                f"from the joint's offset; add poses loaded from the other side, or take the joint out of `geometry: backlash:`."
+                f"{model.joints[i].name} rests on one flank of its backlash at all {len(flank)} poses, so backlash and joint "
+                "offset are not identifiable separately; add poses loaded in the other direction, or take the joint out of "
+                "`geometry: backlash:`."
             )

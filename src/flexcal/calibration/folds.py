@@ -1,4 +1,4 @@
-"""Folds for cross-validation that do not leak: contiguous in measuring order, or in the workspace."""
+"""Folds for cross-validation of correlated poses: contiguous in measuring order, or in the workspace."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The most probable robot among those that a calibration cannot tell apart.
+"""Most probable robot among those with the same measured points.
 
 Positions of a point tell where it moves, not how the flange that carries it is turned, nor whether the point or the flange is off: an
 offset of the last joint moves the point as another place of the reflector does. The fit holds such directions at whatever its choice
@@ -85,7 +85,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
 
 
 def found_point(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
-    """The `nominal` robot with the measured points `targets` where `model` has them in their frames: a ruler's errors, and no others."""
+    """The `nominal` robot with the calibrated positions of the measured points `targets` of `model` in their frames."""
     values = {}
     for target in targets:
         moved = found_xyz(model, target) - nominal.points[target].xyz

@@ -104,7 +104,7 @@ def calibrate(
     robust = loss != "auto" and not isinstance(loss_named(loss), Squares)
     if elasticity == "marginalised" and robust:
         raise FlexcalError(
-            "a robust loss weighs poses one by one, but marginalised elasticity ties them together; re-estimate it instead."
+            "a robust loss weights poses individually, but marginalised elasticity correlates them; use re-estimated elasticity instead."
         )
     require_points(poses)
     _check_variety(model, poses)
@@ -174,5 +174,5 @@ def _check_variety(model: RobotModel, poses: PoseSet) -> None:
     still = [joint.name for joint, range_ in zip(model.joints, spread, strict=True) if range_ < 1e-6]
     if still:
         raise FlexcalError(
-            f"{', '.join(still)} never moves in the {len(poses.q)} poses; move every joint, or its errors cannot be seen."
+            f"{', '.join(still)} never moves in the {len(poses.q)} poses; move every joint, or its errors are not identifiable."
         )

@@ -1,4 +1,4 @@
-"""The least-squares problem of stage 2: geometry from measured points, with stiffness and inertia estimated again beside it."""
+"""The least-squares problem of stage 2: geometry from measured points, with stiffness and inertia estimated jointly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Errors of a linear least-squares fit at poses left out of it, exactly, from its hat matrix."""
+"""Exact leave-out errors of a linear least-squares fit from its hat matrix."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How accurate the tool of the calibrated robot should be, all over where it works."""
+"""Predicted accuracy of the calibrated robot over the working volume."""
 
 from __future__ import annotations
 

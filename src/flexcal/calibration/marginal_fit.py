@@ -1,4 +1,4 @@
-"""The same fit with stiffness and inertia marginalised: their uncertainty widens the residual's covariance to R + J Σ Jᵀ."""
+"""Fit with stiffness and inertia marginalised: their uncertainty adds J Σ Jᵀ to the residual's covariance R."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a calibration can be made from: measured points."""
+"""Check that the measurements of a calibration are points."""
 
 from __future__ import annotations
 

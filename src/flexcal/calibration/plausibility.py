@@ -1,4 +1,4 @@
-"""Whether a fit ended near enough to where it began to be believed: data with a wrong sign or unit can be fitted perfectly."""
+"""Plausibility of a fit from the change of its parameters: data with a wrong sign or unit can be fitted perfectly."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ class Moved:
 
 
 def hardly_fits(found: Calibration) -> bool:
-    """Whether data and robot can hardly belong together, so that nothing should be built on the fit."""
+    """Whether data and robot are inconsistent, so that the fit must not be used."""
     return bool(moved_far(found)) or scattered(found)
 
 
 def scattered(found: Calibration) -> bool:
-    """Whether the errors after the fit, outliers apart, are more than any robot that belongs to the data could leave."""
+    """Whether the residuals, without outliers, are larger than plausible for any robot."""
     rows = ~np.isin(np.arange(len(found.poses)), found.estimate.outliers)
     position = found.poses.position[rows]
     extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
@@ -47,7 +47,7 @@ def scattered(found: Calibration) -> bool:
 
 
 def moved_far(found: Calibration) -> tuple[Moved, ...]:
-    """The parameters that a fit moved implausibly far, the farthest first."""
+    """Parameters with an implausibly large change from their start values, the largest first."""
     estimate, prior = found.estimate.parameters, found.prior
     kept = [name for name in found.identifiability.kept_names if _has_size(name)]
     named = [*kept, *prior.parameters.names]

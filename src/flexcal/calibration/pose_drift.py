@@ -1,4 +1,4 @@
-"""Drift of pose accuracy and of repeatability, of ISO 9283, while the same poses are visited again and again."""
+"""Drift of pose accuracy and repeatability (ISO 9283) over repeated visits to the same poses."""
 
 from __future__ import annotations
 
@@ -66,7 +66,7 @@ def drift_of_poses(poses: PoseSet, visited: Sequence[PoseRepeatability]) -> list
 
 
 def common_way(drifts: Sequence[PoseDrift]) -> tuple[float, float]:
-    """How far all poses went together from their first sets to their last, and the root mean square of what each went besides, m."""
+    """Displacement common to all poses from their first to their last sets, and the root mean square of the remainders, m."""
     ways = np.array([drift.way[-1] for drift in drifts])
     together = ways.mean(axis=0)
     return float(np.linalg.norm(together)), float(np.sqrt(((ways - together) ** 2).sum(axis=1).mean()))

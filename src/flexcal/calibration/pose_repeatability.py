@@ -63,7 +63,7 @@ def repeatability_of(points: np.ndarray) -> float:
 
 
 def noise_repeatability(sigma: np.ndarray) -> float:
-    """RP, m, that an instrument's 1σ noise (N, 3) alone shows at many visits."""
+    """Repeatability RP, m, due to an instrument's 1σ noise (N, 3) alone, for many visits."""
     return _NOISE * float(np.sqrt((sigma**2).mean()))
 
 

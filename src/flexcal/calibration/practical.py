@@ -1,4 +1,4 @@
-"""Practical identifiability: what noise and the choice of poses leave unknown although the rank would allow it."""
+"""Practical identifiability: parameters that noise and the choice of poses leave undetermined in spite of full rank."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[s
     if owner == "tool" or owner.startswith("point."):
         turned = _turning(start, poses, owner)
         if turned < _SMALL_TURN:
-            return f"the tool turned by {np.rad2deg(turned):.1f}° only, so its offset cannot be told from the place of the instrument"
+            return f"the tool turned by {np.rad2deg(turned):.1f}° only, so its offset is not identifiable beside the instrument"
     for i in _neighbours(start, owner):
         joint = start.joints[i]
         extent = float(np.ptp(poses.q[:, i]))
@@ -71,7 +71,7 @@ def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[s
         return shape
     with_ = " and ".join(partner for partner, _ in partners[:2])
     return (
-        f"it cannot be told from {with_} at the scatter of these points"
+        f"it is not identifiable beside {with_} at the scatter of these points"
         if with_
         else "these points do not depend on it"
     )

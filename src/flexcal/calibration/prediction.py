@@ -1,4 +1,4 @@
-"""What the instrument should read at each pose, and how that depends on every parameter."""
+"""Predicted measurements at each pose, and their derivatives by all parameters."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def predict(
     elastic: bool = True,
     jacobians: bool = False,
 ) -> Prediction:
-    """Where the instrument should see the target of every pose: the deflected, calibrated robot.
+    """Predicted positions of the target of every pose in the instrument's frame, for the deflected, calibrated robot.
 
     `flank` (N, n) fixes the side of the backlash; without, the drive torque at rest decides. Without `elastic` the arm is rigid.
     Raises `FlexcalError` for unknown targets and stations, and payloads without a declaration.

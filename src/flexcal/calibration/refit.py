@@ -1,4 +1,4 @@
-"""Verification of a calibrated geometry before an instrument that was moved, or with another reflector: leave-one-out."""
+"""Verification with a refit of the instrument's placement or of the measured point: leave-one-out errors."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ _SMALL = 1e-10
 
 @dataclass(frozen=True, eq=False)
 class Refitted:
-    """A verification with the place of the instrument (`station`), of the measured points (`point`), or both fitted to its own poses.
+    """Verification with the placement of the instrument (`station`), the measured points (`point`), or both fitted to its own poses.
 
     `result` has errors by leave-one-out: each pose against the placement that the other poses give, so that they are honest for all poses.
     `covariance` is that of these errors; `parameters` how many were fitted; `model` is the robot with
@@ -41,7 +41,7 @@ class Refitted:
 
 
 def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitted:
-    """Verify `model` at `poses` with stations or points placed anew and everything else as calibrated.
+    """Verify `model` at `poses` with stations or points fitted again and everything else as calibrated.
 
     Linear least squares leaves one pose out by its hat matrix H: e_i = (I - H_ii)⁻¹ r_i. Raises `FlexcalError` where the poses are too
     few for that.
@@ -57,7 +57,7 @@ def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitt
     own = np.eye(3) - blocks @ np.swapaxes(blocks, 1, 2)
     if np.linalg.eigvalsh(own).min() < _FREE:
         raise FlexcalError(
-            f"{len(poses)} poses are too few to place {' and '.join(_WORDS[name] for name in what)} again and to verify with: "
+            f"{len(poses)} poses are too few to refit {' and '.join(_WORDS[name] for name in what)} and to verify with: "
             f"{basis.shape[1]} of their {3 * len(poses)} coordinates go into that; measure {2 * basis.shape[1] // 3 + 4} or more."
         )
 

@@ -1,4 +1,4 @@
-"""Where the instrument stands: its frame against the robot's base, before any parameter is fitted."""
+"""Registration of the instrument's frame with the robot's base before parameters are fitted."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ALREADY_ALIGNED = 0.010
 
 
 def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:
-    """Place every station of `poses` by the rigid motion that best maps `predicted` (N, 3) to the measured points (Kabsch).
+    """Register every station of `poses` by the rigid motion that best maps `predicted` (N, 3) to the measured points (Kabsch).
 
     A station whose points already agree to a centimetre is left at the base frame. The rotation of the first station stays where it
     is put here, for the first joint's errors span it; the rest is refined by the fit. Raises `FlexcalError` for a station that
@@ -43,14 +43,12 @@ def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tupl
     Raises `FlexcalError` where the points do not span a plane.
     """
     if len(source) < 3:
-        raise FlexcalError(
-            f"station '{name}' has {len(source)} poses; at least 3 are needed to find where it stands."
-        )
+        raise FlexcalError(f"station '{name}' has {len(source)} poses; at least 3 are needed to register it.")
     from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
     left, sizes, right = np.linalg.svd((target - to_centre).T @ (source - from_centre))
     if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
         raise FlexcalError(
-            f"the points of station '{name}' lie on a line; measure poses that spread in space."
+            f"the points of station '{name}' lie on a line; measure poses distributed in space."
         )
     sign = np.sign(np.linalg.det(left @ right))
     rotation = left @ np.diag([1.0, 1.0, sign]) @ right

@@ -1,4 +1,4 @@
-"""How large the errors at verification poses are, against what parameters and scatter predict."""
+"""Ratio of observed to predicted errors at verification poses."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
     clear = ~verification.ambiguous
     if clear.sum() < 2:
         raise FlexcalError(
-            f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; measure two or more that have."
+            f"{int(clear.sum())} of the {len(clear)} verification poses have a certain backlash flank; at least two are needed."
         )
     roots, errors = covariance.roots[clear], verification.errors[clear]
     stacked = roots.reshape(-1, roots.shape[2])
@@ -84,7 +84,9 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
     from_parameters = float(np.trace(gram))
     from_noise = float(np.trace(independent, axis1=1, axis2=2).sum())
     if from_parameters + from_noise <= 0:
-        raise FlexcalError("nothing was estimated that predicts an error; calibrate the robot first.")
+        raise FlexcalError(
+            "there are no estimated parameters from which an error could be predicted; calibrate the robot first."
+        )
     mixed = float(np.sum(visits * np.matmul(independent, visits)))
     total = float((errors**2).sum())
 

@@ -1,4 +1,4 @@
-"""Covariance of what a fitted model does not predict of measured points: instrument, robot and model error."""
+"""Covariance of the errors of measured points beside the fitted parameters: instrument, robot and model error."""
 
 from __future__ import annotations
 

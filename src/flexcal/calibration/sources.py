@@ -1,4 +1,4 @@
-"""Which kind of parameter the tool's predicted error comes from."""
+"""Error sources: reduction of the predicted tool error by kind of parameter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which further terms a robot and its poses allow at all, and why others are not considered."""
+"""Candidate terms of a robot and its poses, and reasons why others are not considered."""
 
 from __future__ import annotations
 
@@ -72,7 +72,9 @@ def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
     if not model.backlash_joints:
         wider = _with_backlash(model, torque, joints)
         if wider is None:
-            reason = "gravity loads no joint from both sides, so neither flank can be told from an offset"
+            reason = (
+                "gravity loads no joint from both sides, so backlash is not identifiable beside an offset"
+            )
             excluded.append(("backlash", _without_load(model) if most < _LOAD else reason))
         else:
             model = wider

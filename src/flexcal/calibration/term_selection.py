@@ -1,4 +1,4 @@
-"""Which terms beyond the kinematic ones the data support, by cross-validation that does not leak."""
+"""Selection of terms beyond the kinematic ones by cross-validation."""
 
 from __future__ import annotations
 
@@ -91,6 +91,6 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
 
 def _too_few(distinct: int, more: int) -> str:
     return (
-        f"terms beyond kinematics were not tried: {distinct} different poses are too few to choose by leaving poses out; "
+        f"terms beyond kinematics were not tried: {distinct} different poses are too few for cross-validation; "
         f"measure {more} more, so that compliance under gravity, backlash and transmission errors can be considered."
     )

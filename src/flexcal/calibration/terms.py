@@ -1,4 +1,4 @@
-"""Which parameters a calibration estimates: the kinematic 47 and the terms beyond them."""
+"""Parameters of a calibration: the 47 kinematic ones and those of further terms."""
 
 from __future__ import annotations
 

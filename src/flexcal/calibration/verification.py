@@ -1,4 +1,4 @@
-"""How accurate the calibrated robot is on poses that the fit never saw."""
+"""Accuracy of the calibrated robot at poses outside the fit."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def verify(
 def verify_jointly(
     model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
 ) -> tuple[Verification, ErrorCovariance]:
-    """As `verify`, and what a calibrated robot's parameters and scatter say of the errors at all poses together."""
+    """As `verify`, with the joint covariance of the errors at all poses predicted from parameters and scatter."""
     require_points(poses)
     at = predict(model, poses, elastic=elastic, jacobians=True)
     used = moving_parameters(model, elastic=elastic)

@@ -1,4 +1,4 @@
-"""The virtual cell: a MuJoCo robot with a hidden truth, its controller and its instruments."""
+"""The virtual cell: a simulated robot with hidden true parameters, its controller and its instruments."""
 
 import lazy_loader
 

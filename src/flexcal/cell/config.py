@@ -1,4 +1,4 @@
-"""What a user writes in cell.yaml, one frozen dataclass a block."""
+"""Settings of the virtual cell (cell.yaml), one frozen dataclass per block."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class FrictionConfig:
 
 @dataclass(frozen=True)
 class SpreadConfig:
-    """How far the hidden truth lies from the nominal robot, 1σ unless said.
+    """Deviations of the true parameters from the nominal robot, 1σ unless stated otherwise.
 
     `mass`, `rotor_inertia` relative; `com`, `length` m; `angle` rad; `stiffness`, `damping` of their logarithm; `backlash`: half gaps
     are uniform between these two, rad.
@@ -99,7 +99,7 @@ class SpreadConfig:
 
 @dataclass(frozen=True)
 class MismatchConfig:
-    """What the identified model does not know, all off by default.
+    """Simulated effects that the identified model lacks, all off by default.
 
     `cubic_stiffness`: relative stiffening of every drive at 1 mrad of twist; `hysteresis`: Dahl hysteresis of every drive, its torque
     over the drive stiffness (rad), reached over `hysteresis_width` (rad); `elastic_wrist`: stiffness (N m/rad) of drive springs at the

@@ -1,4 +1,4 @@
-"""The feed-forward of the virtual cell's controller: inverse dynamics of the robot that the controller believes in."""
+"""Feed-forward of the virtual cell's controller: inverse dynamics of the controller's robot model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses of the virtual robot at rest, as they truly are and as encoders and tracker see them."""
+"""Measured poses of the virtual robot at rest: true values, encoder readings and tracker readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How finely the plant has to be stepped."""
+"""Step size required to simulate the plant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The virtual robot at rest: where springs, gravity and the taken-up gaps balance (Eqs. 10-14), in MuJoCo itself."""
+"""Static equilibrium of the virtual robot with springs, gravity and backlash (Eqs. 10-14), in MuJoCo."""
 
 from __future__ import annotations
 
@@ -64,5 +64,5 @@ def _balance(
         if np.abs(move).max() < TOLERANCE:
             return position, gravity_force(plant, data, position)
     raise FlexcalError(
-        "the virtual robot finds no rest: gravity is too strong for its springs; check the stiffness values."
+        "the virtual robot has no stable equilibrium: its springs are too soft for gravity; check the stiffnesses."
     )

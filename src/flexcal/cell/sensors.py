@@ -1,4 +1,4 @@
-"""What the virtual cell's instruments read."""
+"""Sensor models of the virtual cell."""
 
 from __future__ import annotations
 

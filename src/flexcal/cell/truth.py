@@ -1,4 +1,4 @@
-"""The hidden truth: a robot drawn around the nominal one, and its file, which only the final comparison opens."""
+"""True parameters of the virtual robot, drawn about the nominal ones, and their file."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def read_truth_of(path: str | Path, model: RobotModel) -> dict[str, float]:
             raise file.error(keys, f"{model.path} has no parameter '{name}'{hint}")
         if value <= 0 if name.endswith(_POSITIVE) else value < 0 and name.endswith(_NOT_NEGATIVE):
             raise file.error(
-                keys, f"the true value of '{name}' is {value:g}, which no robot has; correct it."
+                keys, f"the true value of '{name}' is {value:g}, which is not possible; correct it."
             )
     found = {name: value for name, (value, _) in entries.items()}
     drawn = draw_truth(model, SpreadConfig(), np.random.default_rng(0))

@@ -31,33 +31,33 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Calibrate:
-    """Fit the geometry of a robot to measured positions: joint offsets, misalignments, lengths, tool, backlash.
+    """Calibrate the geometry of a robot from measured positions: joint offsets, misalignments, lengths, tool, backlash.
 
-    Starts from robot.yaml and what 'identify stiffness' found, and writes estimates.yaml beside robot.yaml. Two fits are reported:
-    the rigid one, and the one with elasticity and the terms that cross-validation supports; the second is stored.
+    Starts from robot.yaml and the results of 'identify stiffness', and writes estimates.yaml beside robot.yaml. Two fits are reported:
+    a rigid one, and one with elasticity and the terms selected by cross-validation; the second is stored.
     """
 
     robot: Robot
     poses: PoseFiles
     terms: Annotated[
-        tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml says)")
+        tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
     ] = ()
-    """auto, or names out of: kinematic, backlash, gravity_compliance, lateral_compliance, transmission; JOINT.gravity_compliance is that of
+    """auto, or some of: kinematic, backlash, gravity_compliance, lateral_compliance, transmission; JOINT.gravity_compliance is that of
     one joint."""
     loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
-    """cauchy finds outliers and lists them; auto takes it where single points stand out."""
+    """Loss function; cauchy is robust and lists outliers; auto uses it where there are outliers."""
     secant_scale: Annotated[float, arg(metavar="STD")] = 0.0
-    """Relative 1σ by which a drive may be stiffer or softer under gravity than in its frequency response; 0.1 is usual."""
+    """Relative 1σ of the ratio of a drive's secant stiffness under gravity to its stiffness in the frequency response; 0.1 is usual."""
     elasticity: Literal["reestimated", "marginalised"] = "reestimated"
-    """How the uncertainty of stiffness and inertia enters; both give the same geometry to first order."""
+    """Treatment of the uncertainty of stiffness and inertia; both give the same geometry to first order."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     write_point: bool = False
-    """Write where the measured points were found into robot.yaml, in place of where a ruler had them, and calibrate with that."""
+    """Write the calibrated positions of the measured points to robot.yaml, in place of the declared ones, and calibrate with them."""
     json: Json = False
 
     def run(self) -> None:
-        """Calibrate, and print what was found."""
+        """Calibrate, and print identifiability, errors and remarks."""
         from flexcal.calibration import POINT_KNOWN, hardly_fits
         from flexcal.cli.considered_terms import considered_lines
         from flexcal.cli.tables import before_rows, dropped_table, error_table, weak_table
@@ -96,7 +96,7 @@ class Calibrate:
             console.say(remark)
         if write:
             for line in told:
-                console.say(f"{line}: written to {self.robot}, and calibrated with that")
+                console.say(f"{line}: written to {self.robot}, and calibrated with it")
         else:
             known = all(point["std_m"] <= POINT_KNOWN for point in document["points"].values())
             for line in point_lines(document["points"]):
@@ -107,8 +107,8 @@ class Calibrate:
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         following = (
-            f"put right what is wrong in the data or in {self.robot}, and calibrate again; "
-            f"flexcal import {self.robot} {self.poses[0]} looks for it"
+            f"correct the data or {self.robot}, and calibrate again; "
+            f"flexcal import {self.robot} {self.poses[0]} looks for the error"
             if hardly_fits(found.selected)
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
@@ -133,7 +133,7 @@ class Calibrate:
         )
 
     def _with_points_written(self, found: RobotCalibration, progress: Progress) -> RobotCalibration:
-        """The points written to robot.yaml, and the calibration anew: the estimates hold what points are off from there."""
+        """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
         from flexcal.workflow.point_place import write_point_place
 
         text = self.robot.read_text(encoding="utf-8")
@@ -147,19 +147,19 @@ class Calibrate:
 
 
 _FOUND_BESIDE = 5e-4
-"""m: a point found nearer than this to where it was declared is not worth a word."""
+"""m: distance of a point from its declared position above which it is reported."""
 
 
 def unknown_place(name: str, std: float) -> str:
-    """A sentence on a measured point whose place on the tool the calibration did not find."""
+    """A sentence on a measured point whose position on the tool the calibration does not determine."""
     return (
-        f"these poses do not tell where the point {name} is on the tool (± {std / MILLIMETRE:.2g} mm): they hardly turn it. "
-        "Only points at such orientations are calibrated; measure poses that turn the tool every way, and calibrate again"
+        f"these poses do not determine the position of the point {name} on the tool (± {std / MILLIMETRE:.2g} mm): its orientation hardly "
+        "changes. The calibration is valid at such orientations only; measure poses with other tool orientations, and calibrate again"
     )
 
 
 def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
-    """A line for each point that was found elsewhere than it was declared; `points` as in the document."""
+    """A line for each point whose calibrated position differs from the declared one; `points` as in the document."""
     from flexcal.calibration import POINT_KNOWN
 
     lines = []
@@ -172,7 +172,7 @@ def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
                 ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")
             )
             lines.append(
-                f"the point {name} was found at [{found}] m in {point['frame']}, {off / MILLIMETRE:.2f} mm from [{declared}], where it was "
-                "declared"
+                f"calibrated position of the point {name}: [{found}] m in {point['frame']}, {off / MILLIMETRE:.2f} mm from the "
+                f"declared [{declared}]"
             )
     return lines

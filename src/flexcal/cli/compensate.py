@@ -19,29 +19,29 @@ _LISTED = 10
 
 
 def _point_words(name: str, point: Mapping[str, Any]) -> str:
-    """Which point is compensated, where it is, and how to have another one."""
+    """The compensated point, its position, and the option that selects another one."""
     if point["found_xyz_m"] is None:
         what = f"the frame {name}" if name == point["frame"] else f"the point '{name}' in {point['frame']}"
         return (
-            f"{what}, which was not measured: what the measured points do not determine of it "
-            "(how the flange is turned, where it is along and about the last axis) stays nominal"
+            f"{what} is brought to the targets; it was not measured, and what the measured points do not determine of it "
+            "(position along and about the last axis, orientation) stays nominal"
         )
     found, declared = (point[key] for key in ("found_xyz_m", "declared_xyz_m"))
     off = float(sum((a - b) ** 2 for a, b in zip(found, declared, strict=True)) ** 0.5) / MILLIMETRE
     place = ", ".join(f"{value:.5f}" for value in found)
     return (
-        f"the point '{name}', found at [{place}] m in {point['frame']}, {off:.2f} mm from where it was declared; "
-        f"--frame {point['frame']} takes that frame itself"
+        f"the point '{name}' is brought to the targets: calibrated position [{place}] m in {point['frame']}, {off:.2f} mm from the "
+        f"declared one; --frame {point['frame']} takes that frame instead"
     )
 
 
 @dataclass(frozen=True)
 class Compensate:
-    """Find the motor commands with which the real tool is where it should be: geometry, deflection under its payload, backlash.
+    """Compute motor commands that bring the real tool to given targets, compensating geometry, deflection under the payload and backlash.
 
-    TARGETS has the column pose, and q1, q2 and so on: where the nominal robot would be commanded, which says the pose that is wanted of the
-    tool and the arm's configuration; or x, y, z in the base frame, with qw, qx, qy, qz where the orientation counts; or both. payload
-    and target are optional.
+    TARGETS has the column pose, and q1, q2 and so on: the nominal commands, which define the target pose of the tool and the configuration
+    of the arm; or x, y, z in the base frame, with qw, qx, qy, qz if the orientation matters; or both. payload and target are
+    optional.
 
     A target that cannot be reached is left out of the commands and listed with the reason; the others are written.
     """
@@ -57,15 +57,15 @@ class Compensate:
     ] = None
     """Point under `points:` that is brought to the targets."""
     frame: Annotated[MaybeText, arg(metavar="FRAME", help_behavior_hint="(default: a point)")] = None
-    """URDF frame, as tool0, whose origin is brought to the targets, in place of a point under `points:`."""
+    """URDF frame, such as tool0, whose origin is brought to the targets, in place of a point under `points:`."""
     start: Annotated[
         Numbers, arg(metavar="Q...", help_behavior_hint="(default: a posture far from singular)")
     ] = ()
-    """Joint positions (rad or m) from which targets without q1, q2 and so on are sought, in the configuration that the arm is to keep."""
+    """Start of the inverse kinematics (joint positions, rad or m) for targets without q1, q2 and so on; determines the configuration."""
     json: Json = False
 
     def run(self) -> None:
-        """Compensate, and say what it changes and what cannot be reached."""
+        """Compensate, and print the error before and the targets that cannot be reached."""
         from flexcal.workflow.compensate_robot import compensate_robot
 
         require_robot(self.robot, self.targets)
@@ -84,16 +84,18 @@ class Compensate:
         document = found.document()
         if document["start"] is not None:
             listed = ", ".join(f"{joint} {value:.4g}" for joint, value in document["start"].items())
-            console.say(f"targets without joint positions were sought from {listed} (rad or m; --start)")
+            console.say(
+                f"start of the inverse kinematics for targets without joint positions: {listed} (rad or m; --start)"
+            )
         if document["from_other_postures"]:
             console.say(
-                f"{len(document['from_other_postures'])} of them were found from another posture only, where the arm may stand in another "
+                f"{len(document['from_other_postures'])} of them were reached from another start only, where the arm may be in another "
                 "configuration: from_other_postures in --json"
             )
         for name, std in document["points_not_found_m"].items():
             console.say(unknown_place(name, std))
         for name, point in document["points"].items():
-            console.say(f"the targets are of {_point_words(name, point)}")
+            console.say(_point_words(name, point))
         before = document["error_before_mm"]
         console.say(
             f"position error with nominal commands: {before['mean_mm']:.3f} mm on average, {before['max_mm']:.3f} mm at most"

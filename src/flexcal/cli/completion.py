@@ -19,7 +19,7 @@ _INSTALLED = {
 
 @dataclass(frozen=True)
 class Completion:
-    """Print what makes a shell complete verbs, options and their choices; file names otherwise.
+    """Print a completion script for verbs, options and their choices; file names otherwise.
 
     For this shell alone: eval "$(flexcal completion bash)", or zsh, or flexcal completion fish | source.
     """

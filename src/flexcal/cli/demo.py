@@ -15,22 +15,22 @@ from flexcal.cli.options import Json, MaybePath, require_at_least
 
 @dataclass(frozen=True)
 class Demo:
-    """Run the whole two-stage calibration on a virtual robot whose true parameters are hidden, and compare at the end."""
+    """Run the whole two-stage calibration on a virtual robot with hidden true parameters, and compare with these at the end."""
 
     seed: Annotated[int, arg(metavar="N")] = 1
-    """Of the hidden truth and all noise."""
+    """Seed of the true parameters and all noise."""
     plan: Literal["default", "paper", "designed", "quick"] = "default"
-    """default: six poses with a payload; paper: three poses without, which leave more unknown; designed: poses and amplitudes chosen for
+    """default: six poses with a payload; paper: three poses without, which determine less; designed: poses and amplitudes optimised for
     this robot; quick: the same in half the time, and 25 calibration poses."""
     cell: Literal["virtual", "hard"] = "virtual"
-    """virtual: a robot of the kind that is identified, its values drawn; hard: a robot of code of its own, with an elastic wrist, gear
-    errors, friction of another kind, drift and a tracker that misstates its noise, which the identification does not know."""
+    """virtual: a robot of the identified model with random parameters; hard: an independently implemented robot with an elastic wrist, gear
+    errors, other friction, drift and a tracker with wrongly stated noise, which the identified model lacks."""
     truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
         None
     )
-    """Hidden truth from outside, in the form of estimates.yaml."""
+    """File of true parameters, in the form of estimates.yaml."""
     out: Annotated[Path, arg(metavar="DIR")] = Path("demo")
-    """Folder for everything, report.html and results.json among it."""
+    """Folder for all results, with report.html and results.json."""
     json: Json = False
     robot: Annotated[
         MaybePath, arg(metavar="ROBOT", help_behavior_hint="(default: the TX90L of flexcal's examples)")
@@ -73,7 +73,7 @@ class Demo:
         if document["cad_alone"] is not None:
             console.show(gain_table(document))
         console.say(found.trust.sentence)
-        console.say(f"took {document['seconds']['total']:.0f} s; everything is in {self.out}")
+        console.say(f"took {document['seconds']['total']:.0f} s; all results are in {self.out}")
         console.finish(document, f"open {self.out / 'report.html'}")
 
 

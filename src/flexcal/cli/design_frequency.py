@@ -19,24 +19,24 @@ from flexcal.errors import InputError
 class DesignFrequency:
     """Plan the frequency experiments: odd random-phase multisines on every elastic axis, under a slow reference motion.
 
-    What they will tell of every spring is predicted from the robot as it is known; nothing needs to be measured for that.
+    The standard deviation of every stiffness and damping is predicted from the present robot model, before any measurement.
     """
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE")] = Path("frequency.yaml")
     """File for the plan."""
     plan: Literal["default", "paper", "designed", "quick"] = "default"
-    """default: payload as declared, 1.5° of reference motion; paper: no payload, 3°; designed: as default, but poses and amplitudes are
-    chosen for what they tell of the springs; quick: the same in half the time."""
+    """default: payload as declared, 1.5° of reference motion; paper: no payload, 3°; designed: as default, with poses and amplitudes
+    optimised for the springs; quick: the same in half the time."""
     poses: Annotated[
         Path | None,
         arg(metavar="FILE", help_behavior_hint="(default: frequency_poses.csv beside robot.yaml)"),
     ] = None
-    """Where to excite: CSV with plan, pose, q1_deg, q2_deg and so on."""
+    """Poses of the experiments: CSV with plan, pose, q1_deg, q2_deg and so on."""
     choose: Annotated[int | None, arg(metavar="N", help_behavior_hint="(default: 6)")] = None
-    """Number of poses that designed and quick choose."""
+    """Number of poses for designed and quick."""
     candidates: Annotated[int, arg(metavar="N")] = 300
-    """Random poses that they choose from."""
+    """Number of random candidate poses for designed and quick."""
     amplitude: Annotated[
         Literal["flat", "shaped"] | None,
         arg(
@@ -47,15 +47,15 @@ class DesignFrequency:
     std: Annotated[float | None, arg(metavar="SHARE", help_behavior_hint="(default: as the plan has it)")] = (
         None
     )
-    """Measure until every stiffness has this relative standard deviation, 0.01 for 1 %: realisations and periods follow."""
+    """Required relative standard deviation of every stiffness, 0.01 for 1 %; determines realisations and periods."""
     crest: Literal["random", "optimised"] = "random"
-    """Phases as drawn, or shifted from there so that the torque's peaks are small."""
+    """Random phases, or phases optimised for a small crest factor of the torque."""
     detection_lines: bool = False
-    """Leave out one line in four; what is seen there is the robot's odd nonlinear distortion."""
+    """Leave one line in four unexcited, to measure odd nonlinear distortion there."""
     place_payload: bool = False
-    """Predict what holding the payload elsewhere about the last axis, as far off it, would change in these poses."""
+    """Also predict the standard deviations for the payload at other angles about the last axis, at the same distance from it."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the random phases."""
+    """Seed of the random phases."""
     json: Json = False
 
     def run(self) -> None:

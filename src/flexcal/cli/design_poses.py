@@ -31,62 +31,62 @@ Planned = TypeVar("Planned")
 
 @dataclass(frozen=True)
 class DesignPoses:
-    """Choose the poses that tell most about the robot's geometric errors where it will work, within joint limits, free of collision, seen
-    by the instrument, and put them into an order of short moves. A page with pictures is left beside the plan.
+    """Choose the calibration poses with the smallest predicted tool error in the working volume, within joint limits, free of collision and
+    visible to the instrument, and order them for short moves. A page with figures is written beside the plan.
 
-    With --from, out of the poses of a file; with --measured, the next ones after those measured; for a verification, --random draws poses
-    all over the workspace instead.
+    With --from, poses are chosen from a file; with --measured, the next ones after those measured; --random draws random poses of the
+    workspace instead, for a verification.
     """
 
     robot: Robot
     count: Annotated[int, arg(metavar="N")] = 40
-    """Number of poses, at most so many with --wanted or --measured."""
+    """Number of poses; with --wanted or --measured the maximum."""
     out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
     """File for the plan, YAML or CSV."""
     working: Annotated[
         MaybeText,
         arg(metavar="BOX|FILE", help_behavior_hint="(default: as robot.yaml declares, else anywhere)"),
     ] = None
-    """Where the robot will work: ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a CSV of points x, y, z or of poses."""
+    """Working volume: ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a CSV of points x, y, z or of poses."""
     wanted: Annotated[
         MaybeNumber,
         arg(
             metavar="MM",
-            help_behavior_hint="(default: --count poses; with --measured until more only average)",
+            help_behavior_hint="(default: --count poses; with --measured until more poses only average noise)",
         ),
     ] = None
-    """Stop as soon as the predicted tool error is so small, mm."""
+    """Stop when the predicted tool error is at most this, mm."""
     measured: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
     """Measured poses, to choose the next ones, best first."""
     pool: Annotated[
         MaybePath, arg(name="from", metavar="FILE", help_behavior_hint="(default: random poses)")
     ] = None
-    """CSV or Parquet with pose, q1, q2 and so on to choose from: poses taught on the robot, or measured before."""
+    """Candidate poses, CSV or Parquet with pose, q1, q2 and so on: poses taught on the robot, or measured before."""
     random: bool = False
-    """Random poses, for a verification; only count, payload and seed count then."""
+    """Random poses, for a verification; of the other options only count, payload and seed apply."""
     criterion: Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"] = "c"
-    """c: least predicted tool error; A, D, E: of the parameters' covariance; O1-O5: observability indices."""
+    """c: smallest predicted tool error; A, D, E: criteria of the parameter covariance; O1-O5: observability indices."""
     candidates: Annotated[int, arg(metavar="N")] = 4000
-    """Random poses to choose from, without --from; 100000 take seconds more."""
+    """Number of random candidate poses, without --from; 100000 take seconds more."""
     payload: Annotated[
         MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
-    """Payload held in the poses, kg."""
+    """Payload in these poses, kg."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the random poses."""
+    """Seed of the random poses."""
     json: Json = False
 
     def run(self) -> None:
-        """Choose, and print how good the choice is."""
+        """Choose the poses, and print the predicted tool error."""
         require_robot(self.robot)
         require_at_least(1, count=self.count, candidates=self.candidates)
         require_at_least(0, seed=self.seed, payload=self.payload)
         if self.wanted is not None and not self.wanted > 0:
             raise InputError(f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
         if self.random and self.pool is not None:
-            raise InputError("--random draws poses and --from chooses given ones; keep one of them.")
+            raise InputError("--random and --from exclude each other; give one of them.")
         if self.random and self.measured:
-            raise InputError("--random draws poses and --measured chooses the next ones; keep one of them.")
+            raise InputError("--random and --measured exclude each other; give one of them.")
         console = Console(self.json)
         if self.random:
             self._draw(console)
@@ -139,8 +139,8 @@ class DesignPoses:
         )
         console.say(
             f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}); "
-            f"no choice of as many reaches less than {document['least_possible_mm']:.4f} mm; from "
-            f"{document['enough_poses']} poses on it falls by averaging only"
+            f"lower bound for this number of poses: {document['least_possible_mm']:.4f} mm; from "
+            f"{document['enough_poses']} poses on further ones only average noise"
         )
         others = {name: value for name, value in document["criteria"].items() if name != "c"}
         console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))
@@ -148,8 +148,8 @@ class DesignPoses:
         blocked = document["blocked_moves"]
         ways = ", ".join(f"{a} to {b}" for a, b in blocked)
         console.say(
-            f"moving through them takes {document['moves_s']:.1f} s or more"
-            + (f"; collisions on the straight joint motion from {ways}: go round there" if blocked else "")
+            f"the moves between them take {document['moves_s']:.1f} s or more"
+            + (f"; the straight joint motion from {ways} collides: add via points" if blocked else "")
         )
         console.say(f"wrote {self.out}: {document['poses']} poses")
         console.finish(
@@ -165,7 +165,7 @@ class DesignPoses:
         errors, least = document["tool_error_mm"], document["least_possible_mm"]
         console.say(
             f"after {document['measured']} measured poses the predicted tool error is {errors[0]:.4f} mm from tracker noise alone "
-            f"(rms over {_where(document)}); no choice of as many reaches less than {least[0]:.4f} mm"
+            f"(rms over {_where(document)}); lower bound for this number of poses: {least[0]:.4f} mm"
         )
         stop = document["stop_after"]
         aim = (
@@ -179,7 +179,7 @@ class DesignPoses:
         reached = errors[document["poses"]]
         console.say(
             f"after {document['poses']} more it is {reached:.4f} mm"
-            + (f": then stop, {aim}" if stop is not None else f", and not yet so that {aim}")
+            + (f": then stop, {aim}" if stop is not None else "; more poses are needed")
         )
         console.say(f"wrote {self.out}: the next {document['poses']} poses, best first")
         console.finish(
@@ -208,4 +208,4 @@ def _where(document: Mapping[str, Any]) -> str:
     if working is None:
         return "the workspace"
     share = working["reached_share"]
-    return "the working volume" + (f", of which it reaches {100 * share:.0f} %" if share < 1 else "")
+    return "the working volume" + (f", {100 * share:.0f} % of it within reach" if share < 1 else "")

@@ -16,50 +16,48 @@ from flexcal.cli.options import Json, Robot, require_at_least, require_robot
 
 @dataclass(frozen=True)
 class DesignTrajectory:
-    """Plan exciting trajectories: periodic motions that keep the limits, touch nothing and tell most of the robot's dynamics."""
+    """Plan exciting trajectories: periodic motions within all limits and without collision that best determine the robot's dynamics."""
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE")] = Path("trajectory.yaml")
     """File for the plan."""
     count: Annotated[int, arg(metavar="N")] = 3
-    """Trajectories; each is designed in view of those before it."""
+    """Number of trajectories; each is optimised given the previous ones."""
     criterion: Literal["posterior", "condition", "D", "E", "A", "c"] = "posterior"
-    """posterior: masses, centres of mass and rotors beside robot.yaml's prior; c: the variances of the parameters --of, beside it.
+    """posterior: masses, centres of mass and rotors, with robot.yaml's prior; c: variances of the parameters --of, with it.
     Of the base parameters without prior: condition number of the column-scaled observation matrix, log det (D), least eigenvalue of the
     information (E), trace of the covariance (A)."""
     of: Annotated[tuple[str, ...], arg(metavar="NAME...", help_behavior_hint="")] = ()
-    """Parameters that the criterion c is of, as link_3.mass or payload.mass."""
+    """Parameters of the criterion c, such as link_3.mass or payload.mass."""
     sequence: Annotated[
         Literal["links", "axes", "kinds"] | None,
         arg(metavar="{links,axes,kinds}", help_behavior_hint="(default: none)"),
     ] = None
     """One trajectory for each link from the last on, for wrist and main axes, or for inertia, gravity and friction; with --criterion D."""
     after: Annotated[Path | None, arg(metavar="PLAN", help_behavior_hint="")] = None
-    """A plan that is recorded already: what it tells counts as known."""
+    """A plan that is already recorded; its information is added."""
     kind: Literal["fourier", "spline"] = "fourier"
     """Fourier series, or cyclic B-splines with three control points for each of the harmonics."""
     duration: Annotated[float, arg(metavar="S")] = 10.0
-    """Seconds that a trajectory lasts, beside one period to settle."""
+    """Duration of a trajectory in seconds, without one period to settle."""
     base_frequency: Annotated[float, arg(metavar="HZ")] = 0.2
-    """Of its repetitions."""
+    """Base frequency of the trajectories."""
     harmonics: Annotated[int, arg(metavar="N")] = 5
-    """Multiples of the base frequency."""
+    """Number of multiples of the base frequency."""
     rest: bool = False
     """Every period begins and ends at rest."""
-    start: Annotated[
-        tuple[float, ...], arg(metavar="Q", help_behavior_hint="(default: anywhere, for the best)")
-    ] = ()
+    start: Annotated[tuple[float, ...], arg(metavar="Q", help_behavior_hint="(default: optimised)")] = ()
     """Joint positions, rad or m, where every period begins and ends at rest."""
     share: Annotated[float, arg(metavar="SHARE")] = 0.8
-    """Of velocities, accelerations and torques that a motion uses; the controller needs the rest."""
+    """Fraction of the limits of velocities, accelerations and torques that a motion may use; the controller needs the rest."""
     loaded: bool = False
-    """With the declared payload, as when the criterion is of it; without by default."""
+    """With the declared payload, as for a criterion of its parameters; without by default."""
     searches: Annotated[int, arg(metavar="N")] = 1
-    """Random beginnings, of which the best is followed; more take longer."""
+    """Number of random starts, of which the best is refined; more take longer."""
     steps: Annotated[int, arg(metavar="N")] = 20
-    """Steps of a search at each height of its barrier; 40 come close to the end."""
+    """Iterations at each level of the barrier; 40 nearly converge."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the random beginnings."""
+    """Seed of the random starts."""
     json: Json = False
 
     def run(self) -> None:
@@ -104,6 +102,6 @@ class DesignTrajectory:
             f"matrix; criterion {self.criterion}: "
             + ", ".join(f"{merit:.4g}" for merit in document["merits"])
         )
-        console.say(f"pictures: {document['page']}")
+        console.say(f"wrote {document['page']}, with figures")
         folder = "loaded" if self.loaded else "exciting"
         console.finish(document, f"{measuring(self.out, self.robot, folder)}, or record it on the robot")

@@ -27,7 +27,7 @@ Point = Annotated[
 
 @dataclass(frozen=True)
 class Export(ABC):
-    """What the verbs have in common: a robot with its estimates to a file, and what the file cannot carry."""
+    """Common part of the export verbs: write the calibrated robot to a file, and report what the format cannot represent."""
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE", help="the file to write")]
@@ -40,14 +40,14 @@ class Export(ABC):
 
     @abstractmethod
     def following(self, document: dict[str, Any]) -> str:
-        """What to do with it."""
+        """Next step with the file."""
 
     def tables(self, document: dict[str, Any]) -> list[Table]:
-        """What to show of the file's content; `document` as with --json."""
+        """Tables of the content of the file; `document` as with --json."""
         return []
 
     def run(self) -> None:
-        """Export, and say what is lost."""
+        """Export, and print the error due to terms that the format lacks."""
         require_robot(self.robot)
         console = Console(self.json)
         found = self.write()
@@ -59,16 +59,16 @@ class Export(ABC):
             console.say(sentence)
         following = self.following(document)
         if not found.calibrated:
-            console.say("there is no calibration: the joints are where the nominal robot has them")
+            console.say("there is no calibration: the joint placements are nominal")
             following = f"flexcal calibrate {self.robot} POSES…, and export again"
         console.finish(document, following)
 
 
 @dataclass(frozen=True)
 class ExportUrdf(Export):
-    """Write the calibrated robot as URDF: joint origins and tool moved to where they were found to be, links with identified inertials.
+    """Write the calibrated robot as URDF: calibrated joint origins and tool, links with identified inertials.
 
-    A URDF cannot hold deflection, backlash and transmission error; what leaving them out costs is said in millimetres. Rotor inertia
+    A URDF cannot represent deflection, backlash and transmission error; the resulting error is printed in millimetres. Rotor inertia
     and friction stay in estimates.yaml.
     """
 
@@ -85,8 +85,8 @@ class ExportUrdf(Export):
 class ExportMjcf(Export):
     """Write the calibrated robot as MJCF for MuJoCo, with its springs, dampers and rotors as joints and its payload in the last link.
 
-    It deflects under gravity as the calibrated robot does. Backlash, gravity compliance and transmission error have no form in MJCF;
-    what leaving them out costs is said in millimetres.
+    It deflects under gravity as the calibrated robot does. MJCF cannot represent backlash, gravity compliance and transmission error;
+    the resulting error is printed in millimetres.
     """
 
     def write(self) -> ExportedRobot:
@@ -100,9 +100,9 @@ class ExportMjcf(Export):
 
 @dataclass(frozen=True)
 class ExportSdf(Export):
-    """Write the calibrated robot as SDFormat 1.7 for Gazebo: geometry, inertials and friction, without looks and collision bodies.
+    """Write the calibrated robot as SDFormat 1.7 for Gazebo: geometry, inertials and friction, without visuals and collision bodies.
 
-    What SDFormat cannot hold (deflection, backlash and transmission error) is said in millimetres.
+    SDFormat cannot represent deflection, backlash and transmission error; the resulting error is printed in millimetres.
     """
 
     def write(self) -> ExportedRobot:
@@ -118,7 +118,8 @@ class ExportSdf(Export):
 class ExportKinematics(Export):
     """Write the placements of the six joints as the `kinematics` YAML of Universal Robots' ROS description.
 
-    Its frames are those of that description whatever the URDF's are, for robots of that maker. The tool has no place in it and is said.
+    Its frames are those of that description, whatever those of the URDF are, for robots of that manufacturer. It cannot hold the tool,
+    which is printed.
     """
 
     def write(self) -> ExportedRobot:
@@ -132,7 +133,7 @@ class ExportKinematics(Export):
 
 @dataclass(frozen=True)
 class ExportJson(Export):
-    """Write everything of the calibrated robot as one JSON document, for programs of your own. Nothing is left out.
+    """Write the complete calibrated model as one JSON document, for programs of your own.
 
     Joints with placements, springs, backlash and drives, points, payload, stations, and every parameter with its standard deviation.
     """
@@ -143,21 +144,21 @@ class ExportJson(Export):
         return export_json(self.robot, self.out, estimates=self.estimates)
 
     def following(self, document: dict[str, Any]) -> str:
-        return f"read {self.out} in your own program; docs/file-formats.md says what stands in it"
+        return f"read {self.out} in your own program; docs/file-formats.md describes its content"
 
 
 @dataclass(frozen=True)
 class ExportDh(Export):
     """Write the standard Denavit-Hartenberg table of the chain to a point as CSV, nominal beside calibrated.
 
-    A row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) Ry(beta). beta (Hayati) stands for d between axes that are nominally parallel, whose
-    common normal would lie anywhere.
+    A row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) Ry(beta). beta (Hayati) replaces d between nominally parallel axes, which have no unique
+    common normal.
     """
 
     convention: ClassVar[Literal["standard", "modified"]] = "standard"
     point: Point = None
     four_parameters: bool = False
-    """Never use beta: for controllers that take four parameters a joint; what axes are tilted that are nominally parallel is left out."""
+    """Never use beta, for controllers with four parameters per joint; the tilt of nominally parallel axes about y is left out."""
 
     def write(self) -> ExportedRobot:
         from flexcal.workflow.export_robot import export_dh
@@ -187,8 +188,8 @@ class ExportDh(Export):
 class ExportMdh(ExportDh):
     """Write the modified Denavit-Hartenberg table (Craig; Khalil, Kleinfinger) of the chain to a point as CSV, nominal beside calibrated.
 
-    A row is Rx(alpha) Tx(a) Ry(beta) Rz(theta + q) Tz(d). beta (Hayati) stands for d between axes that are nominally parallel, whose
-    common normal would lie anywhere.
+    A row is Rx(alpha) Tx(a) Ry(beta) Rz(theta + q) Tz(d). beta (Hayati) replaces d between nominally parallel axes, which have no unique
+    common normal.
     """
 
     convention: ClassVar[Literal["standard", "modified"]] = "modified"
@@ -196,10 +197,10 @@ class ExportMdh(ExportDh):
 
 @dataclass(frozen=True)
 class ExportOffsets(Export):
-    """Write the joint offsets that bring the nominal robot nearest to the real one, for controllers that correct nothing else, as CSV.
+    """Write the joint offsets with the smallest tool error, for controllers that accept nothing else, as CSV.
 
-    They are fitted to the calibrated robot at rest over random poses, of the working volume where robot.yaml declares one: what they
-    cannot correct they balance. Base and tool are placed with them.
+    They are fitted to the calibrated robot at rest over random poses, of the working volume where robot.yaml declares one, so that the
+    remaining error is smallest. Base and tool are fitted with them.
     """
 
     point: Point = None
@@ -216,10 +217,10 @@ class ExportOffsets(Export):
     def following(self, document: dict[str, Any]) -> str:
         frames = "" if self.keep_frames else ", and set base and tool as it says"
         if not document["safe"]:
-            return f"look why the offsets of {self.out} are so large before adding any to the joint zeros of the controller: see above"
+            return f"find out why offsets of {self.out} are so large before adding any to the joint zeros: see above"
         error, without = document["tool_error"], document["without_offsets"]
         if error["mean_mm"] > _WORTH * without["mean_mm"]:
-            return f"offsets alone buy little here: flexcal export mdh {self.robot}, or flexcal compensate {self.robot} TARGETS.csv"
+            return f"offsets alone improve little here: flexcal export mdh {self.robot}, or flexcal compensate {self.robot} TARGETS.csv"
         return f"add the offsets of {self.out} to the joint zeros of the controller{frames}"
 
     def tables(self, document: dict[str, Any]) -> list[Table]:

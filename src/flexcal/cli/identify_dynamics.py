@@ -18,30 +18,30 @@ if TYPE_CHECKING:
     from flexcal.workflow.robot_dynamics import RobotDynamics
 
 _SPRINGS = (".drive.stiffness", ".drive.damping")
-_ESTIMATORS = """wls: every joint and log by its own noise.
-ols: every equation alike.
-sdp: as wls, among robots that can be built.
-irls: as wls, with single rows that miss by far held back.
-iv: as wls, without the bias of noisy velocities (simulates the robot under the `controller:` of robot.yaml).
-didim: from torques alone (simulates it too).
-energy, power: all joints together in one equation a row.
-tls: as wls, knowing the noise of the positions.
-ml: from the scatter between four or more periods of one motion.
-ekf: in one go with positions and velocities, as a Kalman filter."""
+_ESTIMATORS = """wls: weighted least squares, every joint and log by its own noise.
+ols: ordinary least squares.
+sdp: as wls, with physically consistent inertials.
+irls: as wls, robust to outliers in single rows (Huber).
+iv: instrumental variables, without the bias of noisy velocities (simulates the robot under the `controller:` of robot.yaml).
+didim: direct and inverse dynamic identification models, from torques alone (simulates it too).
+energy, power: energy or power of all joints, one equation per row.
+tls: total least squares, with the noise of the positions.
+ml: maximum likelihood, with noise from four or more periods of one motion.
+ekf: extended Kalman filter."""
 _LEARNING = (
-    "Learn what the estimate misses of the torques as a function of what each motor does (needs scikit-learn). "
-    "Written to learned_residual.npz beside the estimates where left-out blocks of time are predicted better with it; "
-    "the estimates stay as they are."
+    "Learn the residual torque of each motor as a function of its position, speed and torque (needs scikit-learn). "
+    "Written to learned_residual.npz beside the estimates where it reduces the cross-validation error; "
+    "the estimates are not changed."
 )
 
 
 @dataclass(frozen=True)
 class IdentifyDynamics:
-    """Fit link inertias, rotor inertias and friction to recordings of exciting motion.
+    """Identify link inertials, rotor inertias and friction (base parameters) from joint logs of exciting motion.
 
-    Writes estimates.yaml beside robot.yaml. Parameters that no motion can tell apart stay as CAD has them, and the others absorb them:
-    the robot as a whole needs the measured torques, while a single mass or inertia need not be what a scale would show. With
-    --estimator sdp every link is a body that could be built, as near to CAD as the torques allow: springs and a URDF need that.
+    Writes estimates.yaml beside robot.yaml. Parameters that are not identifiable keep their CAD values and are absorbed by others:
+    the torques of the whole robot are right, but a single mass or inertia need not be. With --estimator sdp the inertials of every link
+    are physically consistent and as close to CAD as the torques allow, as springs and a URDF need.
     """
 
     robot: Robot
@@ -50,18 +50,18 @@ class IdentifyDynamics:
         arg(metavar="LOGS...", help="joint logs (CSV or Parquet), one or several", help_behavior_hint=""),
     ]
     hold_out: Annotated[str, arg(metavar="last:SHARE", help_behavior_hint="(for example last:0.3)")] = ""
-    """Keep the last share of every log's time out of the fit, and predict its torques."""
+    """Hold out this last fraction of every log, and predict its torques."""
     validate: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
-    """Logs that the fit does not see, whose torques it predicts."""
+    """Logs outside the fit whose torques are predicted."""
     estimator: Annotated[
         Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"],
         arg(help=_ESTIMATORS),
     ] = "wls"
     flexible: bool = False
-    """Tell motors and arm of elastic joints apart, by logs that have the arm side (qa1…), and find the stiffness of the drives."""
+    """Use separate motor and arm equations for elastic joints, and identify the drive stiffness; needs logs with the arm side (qa1…)."""
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
     jobs: Annotated[int, arg(metavar="N")] = 1
-    """Logs that are read at once, each in a process of its own."""
+    """Number of logs read in parallel, each in its own process."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
@@ -105,7 +105,7 @@ class IdentifyDynamics:
         signals = document["signals"]
         if signals["proposed"]:
             console.say(
-                f"proposed from the motion's spectrum, as robot.yaml lacks {' and '.join(signals['proposed'])}: "
+                f"proposed from the spectrum of the motion, because robot.yaml lacks {' and '.join(signals['proposed'])}: "
                 f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
             )
         if document["friction_tried"]:
@@ -120,13 +120,13 @@ class IdentifyDynamics:
             console.say(_learned(learned))
         essential = document["essential_parameters"]
         console.say(
-            f"{len(essential['parameters'])} essential parameters alone have a relative torque error of "
+            f"relative torque error with the {len(essential['parameters'])} essential parameters alone: "
             f"{essential['error_percent']['train']:.2f} %"
         )
         if found.bodiless:
             console.say(
                 f"the inertials of {', '.join(found.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
-                "need consistent ones; --estimator sdp finds them"
+                "need consistent ones; use --estimator sdp"
             )
         for remark in document["remarks"]:
             console.say(remark)
@@ -139,7 +139,7 @@ class IdentifyDynamics:
         console.finish(document, self._next(found))
 
     def _next(self, found: RobotDynamics) -> str:
-        """Frequency responses for an elastic robot; else torques that the fit never saw, and then a URDF, if links are bodies."""
+        """Frequency responses for an elastic robot; else validation, and then a URDF if the inertials are physically consistent."""
         if found.train.observation.model.elastic:
             return f"flexcal design frequency {self.robot} --out frequency.yaml"
         verb = f"flexcal identify dynamics {self.robot} {' '.join(map(str, self.logs))}"
@@ -153,7 +153,7 @@ class IdentifyDynamics:
 
 
 def _share(text: str) -> float:
-    """The share of `last:SHARE`, 0 for none; raises `InputError` for anything else."""
+    """Fraction in `last:SHARE`, 0 for none; raises `InputError` for anything else."""
     if not text:
         return 0.0
     kind, _, number = text.partition(":")
@@ -167,7 +167,7 @@ def _share(text: str) -> float:
 
 
 def _learned(learned: Mapping[str, Any]) -> str:
-    """What a learned residual is worth, in words."""
+    """Reduction of the relative torque error by the learned residual, in words."""
     if not learned["file"]:
         return "no residual model was kept: it reduced the cross-validation error of no motor"
     kinds = {"cross_validation": "in cross-validation", "held_out": "on data outside the fit"}

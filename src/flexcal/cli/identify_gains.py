@@ -30,7 +30,7 @@ class IdentifyGains:
         ),
     ]
     jobs: Annotated[int, arg(metavar="N")] = 1
-    """Logs that are read in parallel, each in a process of its own."""
+    """Number of logs read in parallel, each in its own process."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html and results.json."""
     json: Json = False

@@ -16,10 +16,10 @@ from flexcal.cli.options import Json, MaybePath, Robot, require_robot
 
 @dataclass(frozen=True)
 class IdentifyInertials:
-    """Fit masses, centres of mass, rotor inertias and friction to the recordings of 'design trajectory', with CAD as the prior.
+    """Identify masses, centres of mass, rotor inertias and friction from recordings of 'design trajectory', with CAD as the prior.
 
-    Writes estimates.yaml beside robot.yaml, for 'identify stiffness' and 'calibrate' to start from. What the torques do not determine
-    stays as uncertain as the `prior:` of robot.yaml says; springs and geometry are taken to be as uncertain as before they are identified.
+    Writes estimates.yaml beside robot.yaml, which 'identify stiffness' and 'calibrate' then use. What the torques do not determine
+    keeps the uncertainty of the `prior:` of robot.yaml; springs and geometry have their uncertainty before identification.
     """
 
     robot: Robot

@@ -18,11 +18,11 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class IdentifyPayload:
-    """Find mass, centre of mass and inertia of what the robot holds, from recordings of it in motion.
+    """Identify mass, centre of mass and inertia of the payload from joint logs of motion with it.
 
-    The robot's own dynamics are those of its estimates ('identify dynamics', or 'identify inertials'), or of --free recordings. Friction is
-    found anew. Writes the block `payload` of estimates.yaml beside robot.yaml, with which 'compensate', 'predict', 'calibrate', 'verify'
-    and 'export' reckon from then on. The torques must be in N m: where they are currents times gains, the mass is as much off as the gains.
+    The robot's own dynamics are those of its estimates ('identify dynamics' or 'identify inertials'), or of --free recordings. Friction is
+    estimated again. Writes the block `payload` of estimates.yaml beside robot.yaml, which 'compensate', 'predict', 'calibrate', 'verify'
+    and 'export' use from then on. The torques must be in N m: with currents times gains, a relative error of the gains is one of the mass.
     """
 
     robot: Robot
@@ -35,14 +35,14 @@ class IdentifyPayload:
         ),
     ]
     free: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
-    """The same without the payload; those that the estimates were made from are in them already."""
+    """Joint logs without the payload; not those from which the estimates were identified."""
     frame: Annotated[
         str,
         arg(metavar="FRAME", help_behavior_hint="(default: as robot.yaml declares it, else the last link)"),
     ] = ""
-    """URDF frame that the values are in."""
+    """URDF frame of the values."""
     jobs: Annotated[int, arg(metavar="N")] = 1
-    """Logs that are read at once, each in a process of its own."""
+    """Number of logs read in parallel, each in its own process."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False

@@ -15,10 +15,10 @@ from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least,
 
 @dataclass(frozen=True)
 class IdentifyStiffness:
-    """Fit stiffness and damping of drives and bearings to frequency responses.
+    """Identify stiffness and damping of drives and bearings from frequency responses.
 
-    Writes estimates.yaml beside robot.yaml, for 'calibrate' to use. Link inertias, rotor inertias, friction and delays are estimated too,
-    starting from what CAD knows of them.
+    Writes estimates.yaml beside robot.yaml, which 'calibrate' then uses. Link inertias, rotor inertias, friction and delays are estimated
+    too, with CAD as the prior.
     """
 
     robot: Robot
@@ -33,11 +33,11 @@ class IdentifyStiffness:
     inertias_known: bool = False
     """Take link inertias as exact."""
     weighting: Literal["covariance", "paper", "uniform"] = "covariance"
-    """covariance: that of the measured responses, for true intervals; paper: emphasis near poles and zeros; uniform: all alike."""
+    """covariance: that of the measured responses, with correct intervals; paper: emphasis near poles and zeros; uniform: equal weights."""
     search: Literal["multi-start", "population"] = "multi-start"
-    """For a start: exact derivatives from several starts, or a population over wide bounds, in place of the paper's genetic algorithm."""
+    """Search for a start: multi-start with gradients, or differential evolution in place of the paper's genetic algorithm."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the search for a start."""
+    """Seed of the search for a start."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
     """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
     json: Json = False
@@ -78,7 +78,7 @@ class IdentifyStiffness:
             )
         if fit["missing_poses"]:
             numbers = ", ".join(map(str, fit["missing_poses"]))
-            console.say(f"the plan has poses without a response, which the fit is without too: {numbers}")
+            console.say(f"poses of the plan without a response, not used in the fit: {numbers}")
         if fit["reduced_chi2"] is not None:
             console.say(
                 f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"

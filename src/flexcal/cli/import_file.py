@@ -22,25 +22,28 @@ _MOVED = 0.002
 
 @dataclass(frozen=True)
 class Import:
-    """Turn measurements with other names and units into flexcal's columns in SI units: measured poses, or a log of joints.
+    """Convert measurements with other column names and units to flexcal's, in SI units: measured poses, or a joint log.
 
-    FILE is text with separators, Excel, MAT, Parquet, a universal file, or a ROS recording (MCAP, rosbag2). Columns are recognised by the
-    joints' names, usual words and numbers; units where they stand beside the names, else by magnitude. What was guessed is shown on the
-    first rows, and what is left out is named. Without --out nothing is written.
+    FILE is delimited text, Excel, MAT, Parquet, a universal file, or a ROS recording (MCAP, rosbag2). Columns are recognised by
+    joint names, usual words and numbers; units by the headers, else by magnitude. The first rows are shown as they were
+    read, and columns that are left out are listed. Without --out nothing is written.
 
-    Then the nominal robot is laid through the points. Where it cannot be, nothing is written, and what would explain it is proposed.
+    The nominal robot is then registered with the points by best fit. If the residuals are too large, nothing is written, and an explanation
+    is proposed.
     """
 
     robot: Robot
     file: Annotated[Positional[Path], arg(metavar="FILE", help="the measurements; of a rosbag2, the folder")]
-    map: Annotated[Texts, arg(metavar="NAME=COLUMN...", help_behavior_hint="(default: as guessed)")] = ()
-    """What columns are, over the guess: q2=-J2[deg]+90 x=X[mm] tau1=12.5*I1[A] temperature=none, in quotes where there are spaces."""
-    out: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show the guess)")] = None
+    map: Annotated[Texts, arg(metavar="NAME=COLUMN...", help_behavior_hint="(default: as recognised)")] = ()
+    """Meaning of columns: q2=-J2[deg]+90 x=X[mm] tau1=12.5*I1[A] temperature=none, in quotes where there are spaces."""
+    out: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show how the file is read)")
+    ] = None
     """The file to write, CSV or Parquet."""
     sigma: Annotated[
-        MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as the file says, else unknown)")
+        MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as in the file, else unknown)")
     ] = None
-    """The instrument's 1σ a coordinate, mm, for a file that does not say it."""
+    """The instrument's 1σ per coordinate, mm, for a file that does not state it."""
     sheet: Annotated[
         MaybeText,
         arg(metavar="NAME", help_behavior_hint="(default: the first)"),
@@ -52,15 +55,15 @@ class Import:
     ] = None
     """Topic of the measured points in a ROS recording."""
     unchecked: bool = False
-    """Write although the nominal robot does not go with the points."""
+    """Write although the points do not fit the nominal robot."""
     write_signals: bool = False
-    """Also add the block 'signals:' to robot.yaml, at its end, so that files with these columns are read as they are."""
+    """Also append the block 'signals:' to robot.yaml, so that files with these columns can be read without import."""
     write_point: bool = False
-    """Also write to robot.yaml where the measured point fits the nominal robot best, in place of its `xyz`."""
+    """Also write the position of the measured point that fits the nominal robot best to robot.yaml, as its `xyz`."""
     json: Json = False
 
     def run(self) -> None:
-        """Import, and show what was guessed."""
+        """Import, and show how the columns were read."""
         from flexcal.cli.import_tables import first_rows_table
         from flexcal.importing import reasons_of
         from flexcal.workflow.import_file import import_file
@@ -120,7 +123,7 @@ class Import:
         fit = found.misfit
         if fit is None or fit.doubtful:
             raise InputError(
-                f"{self.file}: these points do not determine the place of the reflector on the tool; leave --write-point out."
+                f"{self.file}: these points do not determine the position of the reflector on the tool; leave --write-point out."
             )
         write_point_place(self.robot, fit.point, fit.moved)
         console.say(f"wrote the xyz of {fit.point} to {self.robot}")
@@ -136,7 +139,7 @@ class Import:
         options = "".join(f" '{option}'" for option in fit.options)
         return (
             f"{what}; {fit.proposal}"
-            + (f": --map{options}" if options else "; put it right with --map, as z=-COLUMN")
+            + (f": --map{options}" if options else "; correct it with --map, as z=-COLUMN")
             + "."
         )
 
@@ -156,7 +159,7 @@ class Import:
 
     def _following(self, found: ImportedFile) -> str:
         if self.out is None:
-            return f"if the guess is right, the same with --out {'log' if found.kind == 'log' else 'poses'}.csv, else with --map"
+            return f"if the columns are right, the same with --out {'log' if found.kind == 'log' else 'poses'}.csv, else with --map"
         if found.kind == "log":
             return f"flexcal identify dynamics {self.robot} {self.out}"
         if found.kind == "joints":
@@ -165,5 +168,7 @@ class Import:
 
         calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))
         if stored_estimates(found.model, None).is_file():
-            return f"{verify}, if these poses are outside the calibration; or, to calibrate anew, {calibrate}"
-        return f"{calibrate}; or, where they were kept to check a calibration, {verify}"
+            return (
+                f"{verify}, if these poses are outside the calibration; or, to calibrate again, {calibrate}"
+            )
+        return f"{calibrate}; or, if they are verification poses, {verify}"

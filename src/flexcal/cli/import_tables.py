@@ -1,4 +1,4 @@
-"""What an import took the columns of a file for, as a table."""
+"""Table of the columns of an imported file, with their meaning and unit."""
 
 from __future__ import annotations
 

@@ -14,10 +14,10 @@ from flexcal.cli.options import Json, MaybeText
 
 @dataclass(frozen=True)
 class Init:
-    """Begin with a robot of your own: write a robot.yaml for its URDF, with comments on what to complete.
+    """Create a robot.yaml for the URDF of a robot, with comments on what to complete.
 
-    The joints of a gripper, and others beside the arm, are locked; the frame that carries the reflector is guessed from its name. Both
-    are said. The URDF stays where it is.
+    The joints of a gripper, and others beside the arm, are locked; the frame of the reflector is chosen by its name. Both
+    are printed. The URDF stays where it is.
     """
 
     urdf: Annotated[Positional[Path], arg(metavar="URDF", help="the robot's URDF, not xacro")]
@@ -32,11 +32,11 @@ class Init:
 
     @property
     def out(self) -> None:
-        """None: it never writes over a file, not even its own, and looks at the URDF before it looks there."""
+        """None: the verb never overwrites a file, not even its own, and reads the URDF first."""
         return None
 
     def run(self) -> None:
-        """Write it, and say what was guessed."""
+        """Write robot.yaml, and print the assumptions."""
         from flexcal.workflow.init_robot import init_robot
 
         console = Console(self.json)
@@ -47,14 +47,14 @@ class Init:
         )
         if arm.locked:
             stand = ", ".join(f"{name} at {value:g}" for name, value in arm.locked.items())
-            console.say(f"no part of the arm, locked: {stand}")
-        others = f"; also there: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
-        console.say(f"the reflector is taken to sit in the frame {arm.frame}{others}")
+            console.say(f"not part of the arm, locked: {stand}")
+        others = f"; other frames there: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
+        console.say(f"the reflector is assumed to be in the frame {arm.frame}{others}")
         for remark in found.remarks:
             console.say(remark)
         console.say(f"wrote {found.file}")
         console.finish(
             found.document(),
-            f"put the place of the reflector under `points:` in {found.file}, then flexcal design poses {found.file} "
-            f"--out {self.folder / 'poses.yaml'}; or, with measurements at hand, flexcal import {found.file} FILE",
+            f"write the position of the reflector under `points:` in {found.file}, then flexcal design poses {found.file} "
+            f"--out {self.folder / 'poses.yaml'}; or, for existing measurements, flexcal import {found.file} FILE",
         )

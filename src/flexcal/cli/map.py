@@ -25,11 +25,11 @@ from flexcal.cli.options import (
 
 @dataclass(frozen=True)
 class Map:
-    """Predict how accurate the tool is all over where the robot works: mean and 95 % of its error, from the calibration's uncertainty.
+    """Predict the accuracy of the tool over the working volume: mean and 95 % bound of its error, from the uncertainty of the calibration.
 
-    The poses are random ones that put the target into the volume, in whatever orientation comes, or those of a file. With --verification,
-    measured poses that the calibration never saw say whether the prediction can be believed, and make it larger where it cannot, never
-    smaller. The page shows where errors are large, and what they come from.
+    The poses are random ones with the target in the volume, in any orientation, or those of a file. With --verification, measured
+    poses outside the calibration test the prediction; where they are less accurate than predicted the map is scaled up, but never
+    down. The page shows where errors are large, and their sources.
     """
 
     robot: Robot
@@ -41,20 +41,20 @@ class Map:
     ] = None
     """Ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a file of points x, y, z, or of pose, q1, q2 and so on."""
     verification: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
-    """Measured poses that the calibration never saw."""
+    """Measured poses outside the calibration."""
     count: Annotated[int, arg(metavar="N")] = 20_000
-    """Number of random poses; those of a file all count."""
+    """Number of random poses; all poses of a file are used."""
     payload: Annotated[
         MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
     ] = None
-    """Payload held, kg."""
+    """Payload, kg."""
     estimates: Estimates = None
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the random poses."""
+    """Seed of the random poses."""
     json: Json = False
 
     def run(self) -> None:
-        """Map, and print how accurate the tool is, where it is worst, and why."""
+        """Print the predicted accuracy, the worst position and the sources of error."""
         from flexcal.cli.tables import before_rows, error_table, map_table
         from flexcal.data import page_beside
         from flexcal.workflow.map_accuracy import map_accuracy
@@ -98,7 +98,7 @@ class Map:
         where = with_estimates(self.estimates)
         console.finish(
             document,
-            f"flexcal compensate {self.robot} TARGETS.csv{where}, for the commands that make the tool so accurate",
+            f"flexcal compensate {self.robot} TARGETS.csv{where}, for commands with this accuracy",
         )
 
 

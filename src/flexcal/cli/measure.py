@@ -14,11 +14,11 @@ from flexcal.cli.options import Json, MaybePath, require_at_least
 
 @dataclass(frozen=True)
 class Measure:
-    """Carry out a plan of 'design': in the virtual cell, or by taking over files that were recorded before."""
+    """Carry out a plan of 'design', in the virtual cell or from recorded files."""
 
     plan: Annotated[Positional[Path], arg(metavar="PLAN", help="the plan (YAML)")]
     cell: Annotated[str, arg(metavar="virtual|DIR")]
-    """virtual, or a folder with plan.yaml and the joint logs or poses.csv measured by it."""
+    """virtual, or a folder with plan.yaml and the joint logs or poses.csv recorded for it."""
     out: Annotated[Path, arg(metavar="DIR")]
     """Folder for the measurements."""
     robot: Annotated[
@@ -33,13 +33,13 @@ class Measure:
     truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
         None
     )
-    """Hidden truth of the virtual cell."""
+    """File of the true parameters of the virtual cell."""
     seed: Annotated[int, arg(metavar="N")] = 0
-    """Of the virtual cell's hidden truth and noise: the same robot has the same seed in every measurement."""
+    """Seed of the virtual cell's true parameters and noise; use the same seed for all measurements of one robot."""
     json: Json = False
 
     def run(self) -> None:
-        """Measure, and say what lies where."""
+        """Measure, and print the files that were written."""
         from flexcal.workflow.experiment_files import robot_file
         from flexcal.workflow.measure import measure
 
@@ -69,5 +69,5 @@ class Measure:
             points = f"{robot} {self.out / 'poses.csv'}"
             following = f"flexcal {'verify' if found.for_verification else 'calibrate'} {points}"
             if self.plan.suffix not in (".yaml", ".yml"):
-                following = f"flexcal verify {points} to check a calibration on them, or flexcal calibrate {points} to make one"
+                following = f"flexcal verify {points} to verify a calibration, or flexcal calibrate {points}"
         console.finish(found.document(), following)

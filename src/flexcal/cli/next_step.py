@@ -31,5 +31,5 @@ def with_estimates(place: Path | None) -> str:
 
 
 def reading_elsewhere(robot: Path, estimates: Path) -> str:
-    """How the verbs that come next find estimates that are not beside robot.yaml."""
-    return f"for the next verbs to start from it, write 'estimates: {relpath(estimates, robot.parent)}' into {robot}"
+    """How other verbs find estimates that are not beside robot.yaml."""
+    return f"for other verbs to use these estimates, write 'estimates: {relpath(estimates, robot.parent)}' to {robot}"

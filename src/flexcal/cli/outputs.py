@@ -1,4 +1,4 @@
-"""What `--out` may write over: only what the same verb wrote; no file of another verb, nor what somebody wrote or changed."""
+"""Protection of existing files: `--out` overwrites only unchanged files of the same verb."""
 
 from __future__ import annotations
 

@@ -14,9 +14,9 @@ from flexcal.cli.options import Estimates, Json, Robot, require_robot
 
 @dataclass(frozen=True)
 class Predict:
-    """Find where the real tool is when the motors stand as commanded: geometry, deflection under its payload, backlash.
+    """Predict the pose of the real tool for given motor commands: geometry, deflection under the payload, backlash.
 
-    The reverse of 'flexcal compensate', whose commands it reads: pose, q1, q2 and so on; payload and target are optional. It writes
+    The inverse of 'flexcal compensate', whose commands it reads: pose, q1, q2 and so on; payload and target are optional. It writes
     x, y, z and qw, qx, qy, qz in the base frame, which 'flexcal compensate' reads.
     """
 
@@ -28,7 +28,7 @@ class Predict:
     json: Json = False
 
     def run(self) -> None:
-        """Predict, and say how far the tool is from where the nominal robot has it."""
+        """Predict, and print the distance from the nominal robot's tool."""
         from flexcal.workflow.predict_robot import predict_robot
 
         require_robot(self.robot, self.commands)
@@ -36,7 +36,7 @@ class Predict:
         document = predict_robot(self.robot, self.commands, self.out, estimates=self.estimates).document()
         beside = document["beside_nominal"]
         console.say(
-            f"the tool is {beside['mean_mm']:.3f} mm on average, {beside['max_mm']:.3f} mm at most, from where the nominal robot has it"
+            f"distance of the tool from that of the nominal robot: mean {beside['mean_mm']:.3f} mm, max {beside['max_mm']:.3f} mm"
         )
         if document["ambiguous_poses"]:
             listed = len(document["ambiguous_poses"])
@@ -44,5 +44,5 @@ class Predict:
         console.say(f"wrote {self.out}: {document['poses']} poses of the tool in the base frame")
         console.finish(
             document,
-            f"flexcal compensate {self.robot} TARGETS.csv, for the commands that bring the tool where it should be",
+            f"flexcal compensate {self.robot} TARGETS.csv, for commands that bring the tool to its targets",
         )

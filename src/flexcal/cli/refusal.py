@@ -1,4 +1,4 @@
-"""Arguments that do not parse: one sentence in the place of what the parser says."""
+"""Error messages of arguments that cannot be parsed, in one sentence."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def refusal(verb: Verb, said: str) -> InputError:
         return InputError(f"'flexcal {verb.name}' needs {', '.join(needed)}; {explained}")
     if told and told[0].startswith("Unrecognized options:"):
         left = told[0].partition(":")[2].strip()
-        return InputError(f"'flexcal {verb.name}' has no place for {left}; {explained}")
+        return InputError(f"'flexcal {verb.name}' does not take {left}; {explained}")
     sentence = " ".join(line.strip() for line in told).rstrip(".").replace(". Expected", "; expected")
     sentence = re.sub(
         r"invalid literal for int\(\) with base 10: ('.*?')", r"\1 is no whole number", sentence

@@ -14,10 +14,10 @@ from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, re
 
 @dataclass(frozen=True)
 class Repeatability:
-    """Find pose accuracy and repeatability (ISO 9283: AP, RP, vAP, dAP, dRP) from repeated visits to the same poses.
+    """Determine pose accuracy and repeatability (ISO 9283: AP, RP, vAP, dAP, dRP) from repeated visits to the same poses.
 
-    Rows whose joint positions are the same are visits to one pose, whatever their numbers; other rows are left out. RP needs no
-    calibration. Where the visits have times (t) and a pose has 20 or more, drift of both is told too (dAP, dRP).
+    Rows with the same joint positions are visits to one pose, whatever their numbers; other rows are left out. RP needs no
+    calibration. Where the visits have times (t) and a pose has 20 or more, the drift of both is given too (dAP, dRP).
     """
 
     robot: Robot
@@ -41,11 +41,11 @@ class Repeatability:
         console.show(repeatability_table(document))
         noise = document["instrument_rp_mm"]
         if noise is not None:
-            console.say(f"the instrument's noise alone would show an RP of {noise:.3f} mm")
+            console.say(f"the instrument's noise alone corresponds to an RP of {noise:.3f} mm")
         if (drift := document["drift"]) is not None:
             moved = sum(item["certain"] for item in drift["each"])
             console.say(
-                f"from the first ten visits to the last the barycentre moved beyond chance at {moved} of {len(drift['each'])} poses"
+                f"significant drift of the barycentre from the first set of visits to the last: at {moved} of {len(drift['each'])} poses"
             )
         for remark in document["remarks"]:
             console.say(remark)

@@ -12,7 +12,7 @@ NOTHING = "–"
 
 
 def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
-    """One row a set of errors: poses, mean, 90th percentile and maximum, mm; `rows` are blocks of results.json by label."""
+    """Error statistics, one row per set: poses, mean, 90th percentile and maximum, mm; `rows` are blocks of results.json by label."""
     table = Table(title=title, title_justify="left")
     table.add_column("")
     for heading in ("poses", "mean mm", "p90 mm", "max mm"):
@@ -89,12 +89,12 @@ def predicted_table(std: Mapping[str, float]) -> Table:
 
 
 def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
-    """The parameters that could not be told apart, and the `most` largest of what absorbed each."""
+    """Parameters that are not identifiable, and the `most` largest coefficients of the parameters that absorb each."""
     title = f"identifiability: {found['rank']} of {found['parameters']} parameters"
     if found["gap_decades"] is not None and found["dropped"]:
         title += f" ({found['gap_decades']:.0f} decades between the last kept and the first dropped)"
     table = Table(title=title, title_justify="left")
-    table.add_column("cannot be told apart")
+    table.add_column("not identifiable")
     table.add_column("absorbed by")
     for entry in found["dropped"]:
         kept = entry["absorbed_by"]
@@ -108,7 +108,7 @@ def dropped_table(found: Mapping[str, Any], most: int = 4) -> Table:
 
 
 def weak_table(directions: Sequence[Mapping[str, Any]]) -> Table:
-    """The combinations of parameters that are seen least."""
+    """The least determined combinations of parameters."""
     table = Table(title="least determined combinations", title_justify="left")
     table.add_column("relative size", justify="right")
     table.add_column("combination, in units of 0.3 mm and 0.5 mrad")
@@ -186,7 +186,7 @@ def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:
         table.add_column(heading, justify="right")
     table.add_column("unit")
     for row in rows:
-        std = "not seen" if row["std"] is None else f"{row['std']:.3g}"
+        std = "not identifiable" if row["std"] is None else f"{row['std']:.3g}"
         percent = "" if row["std_percent"] is None else f"{row['std_percent']:.1f}"
         essential = "" if row["essential"] is None else f"{row['essential']:.5g}"
         table.add_row(row["name"], f"{row['estimate']:.5g}", std, percent, essential, row["unit"])
@@ -194,13 +194,13 @@ def base_parameter_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def drive_gain_table(factors: Mapping[str, Mapping[str, Any]], declared: Sequence[float]) -> Table:
-    """One row a joint: the declared gain of its torque, what was found and its 95 % interval."""
+    """One row per joint: declared drive gain, identified gain and its 95 % interval."""
     table = Table(title="drive gains", title_justify="left")
     table.add_column("joint")
-    for heading in ("declared", "found", "95 % interval"):
+    for heading in ("declared", "identified", "95 % interval"):
         table.add_column(heading, justify="right")
     for (name, factor), gain in zip(factors.items(), declared, strict=True):
-        found, interval = "not seen", ""
+        found, interval = "not identifiable", ""
         if factor["identifiable"]:
             ends = sorted((gain * factor["low"], gain * factor["high"]))
             found, interval = f"{gain * factor['estimate']:.5g}", f"{ends[0]:.5g} to {ends[1]:.5g}"
@@ -209,14 +209,14 @@ def drive_gain_table(factors: Mapping[str, Mapping[str, Any]], declared: Sequenc
 
 
 def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """The best of what was tried with none, one, two … friction terms beyond the plain ones, with its cross-validated error."""
+    """The best sets of none, one, two … friction terms beyond the classic ones, with their cross-validation errors."""
     best: dict[int, Mapping[str, Any]] = {}
     for row in rows:
         held = best.setdefault(len(row["terms"]), row)
         if row["cross_validation_percent"] < held["cross_validation_percent"]:
             best[len(row["terms"])] = row
     table = Table(title="friction terms tried", title_justify="left")
-    table.add_column("beyond the plain ones")
+    table.add_column("beyond the classic ones")
     table.add_column("cross-validation, %", justify="right")
     for row in best.values():
         table.add_row(", ".join(row["terms"]) or "none", f"{row['cross_validation_percent']:.2f}")
@@ -224,7 +224,7 @@ def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def learned_table(motors: Sequence[Mapping[str, Any]]) -> Table:
-    """What each motor's torques are missed by in left-out blocks of the fit, without and with a learned residual."""
+    """Relative torque error of each motor in cross-validation, without and with the learned residual."""
     table = Table(title="learned residual torque", title_justify="left")
     table.add_column("motor")
     for heading in ("cross-validation without, %", "with, %"):
@@ -232,14 +232,14 @@ def learned_table(motors: Sequence[Mapping[str, Any]]) -> Table:
     table.add_column("")
     for row in motors:
         error = row["cross_validation_percent"]
-        verdict = "learned" if row["learned"] else "not worth it"
+        verdict = "learned" if row["learned"] else "no improvement"
         table.add_row(row["motor"], f"{error['without']:.2f}", f"{error['with']:.2f}", verdict)
     return table
 
 
 def gain_table(document: Mapping[str, Any]) -> Table:
-    """What stage 0 buys both stages: results.json's numbers with the inertials of CAD alone beside those of the run."""
-    table = Table(title="what stage 0 buys", title_justify="left")
+    """Improvement by stage 0: errors of both stages with CAD inertials alone and with identified inertials."""
+    table = Table(title="improvement by stage 0", title_justify="left")
     table.add_column("")
     for heading in ("CAD alone", "with stage 0"):
         table.add_column(heading, justify="right")

@@ -15,7 +15,7 @@ from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, re
 
 @dataclass(frozen=True)
 class Verify:
-    """Compare the calibrated robot with measured positions, none of which the calibration should have seen."""
+    """Verify a calibration on measured positions outside the fit."""
 
     robot: Robot
     poses: PoseFiles
@@ -24,8 +24,8 @@ class Verify:
         tuple[Literal["station", "point"], ...],
         arg(metavar="{station,point}...", help_behavior_hint="(default: nothing)"),
     ] = ()
-    """Place the instrument, or find the measured point, again from these poses, where it was moved or is another one since the
-    calibration; the geometry stays. Errors are then those of each pose left out of that."""
+    """Fit the placement of the instrument, or the measured point, to these poses, where it was moved or replaced since the
+    calibration; the geometry is kept. Errors are then leave-one-out errors."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html, results.json and points.csv; without it there is no report."""
     json: Json = False
@@ -60,12 +60,12 @@ class Verify:
         console.show(error_table("distance to the measured points", rows))
         rms = document["rms_mm"]
         whole = (
-            ", without noise of instrument and robot, which nothing states"
+            "; noise of instrument and robot is not known"
             if rms["expected"] is None
             else f", {rms['expected']:.3f} mm with instrument, robot and model error"
         )
         console.say(
-            f"root mean square: {rms['measured']:.3f} mm; the parameters' uncertainty predicts {rms['parameters']:.3f} mm{whole}"
+            f"root mean square: {rms['measured']:.3f} mm; predicted from the parameters' covariance: {rms['parameters']:.3f} mm{whole}"
         )
         for remark in document["remarks"]:
             console.say(remark)
@@ -76,5 +76,5 @@ class Verify:
         console.finish(
             document,
             f"flexcal export urdf {self.robot}{where} --out calibrated.urdf, or flexcal compensate {self.robot} TARGETS.csv{where}; "
-            f"flexcal map {self.robot}{where} --verification {self.poses[0]} says how accurate it is elsewhere",
+            f"flexcal map {self.robot}{where} --verification {self.poses[0]} predicts the accuracy elsewhere",
         )

@@ -1,4 +1,4 @@
-"""Why a target has no command, in a sentence that names the joints."""
+"""Reasons why a target has no command, naming the joints."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def _at_limits(model: RobotModel, q: np.ndarray) -> list[list[int]]:
 def _nearest(away: np.ndarray) -> str:
     turn = f" and {np.linalg.norm(away[3:]):.3g} rad" if len(away) > 3 else ""
     distance = np.linalg.norm(away[:3]) / MILLIMETRE
-    return f"the tool comes no nearer than {distance:{'.0f' if distance >= 1000 else '.3g'}} mm{turn}"
+    return f"the smallest distance of the tool to the target is {distance:{'.0f' if distance >= 1000 else '.3g'}} mm{turn}"
 
 
 def _past_limit(model: RobotModel, q: np.ndarray, verb: str) -> str | None:
@@ -87,7 +87,7 @@ def _tied(model: RobotModel, weakest: np.ndarray) -> str:
     joints = np.flatnonzero(part > _SHARE * part.max()).tolist()
     if len(joints) == 1:
         return f"{model.joint_names[joints[0]]} hardly moves the tool"
-    return f"{_named(model, joints)} can move together and hardly move the tool"
+    return f"{_named(model, joints)} can move together with hardly any motion of the tool"
 
 
 def _named(model: RobotModel, joints: list[int]) -> str:

@@ -1,4 +1,4 @@
-"""Which pose of the tool is wanted, from what a file of targets says."""
+"""Target poses of the tool from a file of targets."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings, measured poses, plans and estimates: what they are, how they are read and written, where they come from."""
+"""Recordings, measured poses, plans and targets, and their files."""
 
 import lazy_loader
 

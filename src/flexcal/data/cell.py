@@ -1,4 +1,4 @@
-"""Where measurements come from."""
+"""Sources of measurements."""
 
 from __future__ import annotations
 

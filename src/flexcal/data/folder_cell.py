@@ -1,4 +1,4 @@
-"""A cell whose measurements were made before: a folder of files."""
+"""A cell of recorded files in a folder."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether joint positions can be in the unit they claim, and whether the robot can take them."""
+"""Check of joint positions against the limits, and of their unit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A low-pass without phase shift, of finite length: blocks that overlap give what the whole gives."""
+"""Zero-phase low-pass of finite length, for overlapping blocks."""
 
 from __future__ import annotations
 

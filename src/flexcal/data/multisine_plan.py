@@ -1,4 +1,4 @@
-"""What to command to measure frequency responses."""
+"""Plan of frequency experiments."""
 
 from __future__ import annotations
 

@@ -50,7 +50,7 @@ def read_plan_of(path: str | Path, kind: type[P]) -> P:
 
 
 def page_beside(plan: Path) -> Path:
-    """The page with pictures of a plan."""
+    """Path of the page of a plan, beside it."""
     return plan.with_suffix(".html")
 
 

@@ -1,4 +1,4 @@
-"""Whether measured poses can be what they claim, and whether they can calibrate anything."""
+"""Checks of measured poses: plausible positions, and motion of every joint."""
 
 from __future__ import annotations
 

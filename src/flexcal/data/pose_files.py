@@ -169,7 +169,8 @@ def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
         )
     if there("q") and not there(place):
         raise file.error(
-            "there are joint positions, but no measured points x, y, z; measure there, and bring what was measured with 'flexcal import'."
+            "there are joint positions, but no measured points x, y, z; measure these poses, and convert the measurements with "
+            "'flexcal import'."
         )
 
 

@@ -1,4 +1,4 @@
-"""What to command to measure poses."""
+"""Plan of poses to measure."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses to choose from."""
+"""Candidate poses from a file."""
 
 from __future__ import annotations
 

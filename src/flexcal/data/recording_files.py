@@ -143,7 +143,7 @@ def _check_payload(
 ) -> None:
     if model.payload is None:
         raise table.file.error(
-            "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame that it hangs on."
+            "there is a column 'payload', but robot.yaml declares none; add `payload:` with the frame to which it is attached."
         )
     first = held[0] if before is None else before
     wrong = (held < 0) | (held != first)

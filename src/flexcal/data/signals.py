@@ -1,4 +1,4 @@
-"""From the columns of a file to SI values at the joint: `signals:` of robot.yaml, or the standard names."""
+"""Conversion of file columns to SI values at the joint: `signals:` of robot.yaml, or the standard names."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tables on disk, CSV or Parquet, read strictly: every cell is there and finite, or one sentence says which is not."""
+"""Strict reading of tables, CSV or Parquet: every cell must be present and finite."""
 
 from __future__ import annotations
 

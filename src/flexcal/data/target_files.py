@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 
 def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
-    """Read where the tool is to go: `pose`, with q1…qn, or x, y, z and where wanted qw, qx, qy, qz, or both.
+    """Read tool targets: `pose`, with q1…qn, or x, y, z and optionally qw, qx, qy, qz, or both.
 
     Optional are `target`, `station` and `payload`. Raises `InputError` with file, line and column for a missing, unknown or partial
     column, a value that is missing or no number, angles that cannot be in rad, points that cannot be in m, an unknown target or station, a
@@ -36,7 +36,7 @@ def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
     signals = assign(file, model, ("pose",), ("q", "xyz", "quaternion", "payload"), texts)
     if "q" not in signals and "xyz" not in signals:
         raise file.error(
-            f"nothing says where the tool is to go; add x, y, z, or q1…q{model.n} of the nominal command."
+            f"there are no target positions; add x, y, z, or q1…q{model.n} of the nominal command."
         )
     for name in ("quaternion", "station"):
         if (name in signals or name in texts) and "xyz" not in signals:

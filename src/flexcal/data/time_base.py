@@ -1,4 +1,4 @@
-"""The uniform time base under measured time stamps."""
+"""Uniform time base fitted to measured time stamps."""
 
 from __future__ import annotations
 

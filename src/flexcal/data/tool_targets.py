@@ -1,4 +1,4 @@
-"""Where a tool is to go."""
+"""Target poses of the tool."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexcal.errors import FlexcalError
 
 @dataclass(frozen=True, eq=False)
 class ToolTargets:
-    """N places for the tool of an n-joint robot, one a row.
+    """N targets for the tool of an n-joint robot, one per row.
 
     pose: (N,) their numbers, each once; target: (N,) names of the points that are to be there.
     q: (N, n) nominal commands, rad or m. Without `position` they say what is wanted: the pose that the nominal robot takes there.

@@ -1,4 +1,4 @@
-"""What to command to excite the whole dynamics of a robot."""
+"""Plan of exciting trajectories."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the robot will work, on disk: CSV or Parquet of poses or of points."""
+"""Files of working poses or points: CSV or Parquet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to measure: the poses that tell most about a robot's geometric errors, under its limits. Needs no data."""
+"""Design of experiments: calibration poses, exciting trajectories and frequency experiments, from the model alone."""
 
 import lazy_loader
 

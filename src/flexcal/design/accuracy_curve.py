@@ -1,4 +1,4 @@
-"""How many poses are enough: predicted tool error against their number."""
+"""Predicted tool error against the number of poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The amplitude spectrum that tells most: more power where the response depends on the springs, within effort and gravity's preload."""
+"""Optimal amplitude spectrum of a frequency experiment within effort and gravity preload."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How good any choice of so many poses could be, from the equivalence theorem."""
+"""Lower bound of the criterion for a number of poses, from the equivalence theorem."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Random joint configurations that the robot can take and the instrument can see."""
+"""Random candidate configurations: within limits, free of collision, visible."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def random_candidates(
             losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
             raise FlexcalError(
                 f"of {drawn} random poses of {model.name} only {have} of the wanted {count} are usable: {losses}; "
-                "loosen what throws out most (station, acceptance, obstacles, floor, payload)."
+                "relax the most restrictive one (station, acceptance, obstacles, floor, payload)."
             )
         share = max(have / drawn, 0.02) if drawn else 0.5
         q = rng.uniform(lower, upper, (int(1.1 * (count - have) / share) + 16, model.n))

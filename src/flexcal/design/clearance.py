@@ -1,4 +1,4 @@
-"""How far a robot's bodies keep from each other along a motion, with the derivatives by the joints: coal's witness points."""
+"""Clearance of a robot's bodies along a motion, and its derivatives by the joints, from coal's witness points."""
 
 from __future__ import annotations
 

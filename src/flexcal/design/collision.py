@@ -1,4 +1,4 @@
-"""Which joint configurations make the robot hit itself, the floor or an obstacle: coal on the collision shapes of the URDF."""
+"""Collision of the robot with itself, the floor and obstacles: coal on the collision shapes of the URDF."""
 
 from __future__ import annotations
 
@@ -135,8 +135,8 @@ class CollisionChecker:
             if second in self._obstacles:
                 link, obstacle = self._names((first, second))
                 raise InputError(
-                    f"the obstacle {obstacle} touches {link} of {self.model.name} in every configuration: it stands there; correct "
-                    "its place in its URDF, which is in the robot's base frame, or remove it from `obstacles:`."
+                    f"the obstacle {obstacle} touches {link} of {self.model.name} in every configuration; correct "
+                    "its position in its URDF, which is in the robot's base frame, or remove it from `obstacles:`."
                 )
 
     def _set_pairs(self, pairs: list[tuple[int, int]], margins: list[float]) -> Any:

@@ -1,4 +1,4 @@
-"""How good a set of measurements is: D, A, c and E optimality, and the observability indices O1-O5.
+"""Optimality criteria of sets of measurements: D, A, c, E, and the observability indices O1-O5.
 
 Every criterion has a `merit`, larger is better, of the information matrix M = ΘᵀΘ (p, p), and its derivative by M. The indices are those
 of Sun & Hollerbach, "Observability index selection for robot calibration" (2008), with σ the singular values of Θ in declared units:
@@ -19,7 +19,7 @@ from flexcal.estimation import Sensitivity
 
 
 class Criterion(Protocol):
-    """What the exchange maximises."""
+    """Criterion that the exchange algorithm maximises."""
 
     @property
     def name(self) -> str:

@@ -1,4 +1,4 @@
-"""Choosing measurements by greedy start and exchange, with updates of low rank (Fedorov 1972; Cook & Nachtsheim 1980).
+"""Selection of measurements by greedy start and exchange with low-rank updates (Fedorov 1972; Cook & Nachtsheim 1980).
 
 For a block Θᵢ of r rows added (s = 1) or taken away (s = -1), with Kᵢ = Θᵢ M⁻¹ Θᵢᵀ the matrix determinant lemma gives
 det M' = det M · det(1 + s Kᵢ), and the Woodbury identity tr(W M'⁻¹) = tr(W M⁻¹) - s tr((1 + s Kᵢ)⁻¹ Θᵢ M⁻¹ W M⁻¹ Θᵢᵀ). Both r × r

@@ -1,4 +1,4 @@
-"""The optimisation behind an exciting trajectory: information of the motor torques, limits of joints, drives, point and bodies."""
+"""The optimisation problem of an exciting trajectory: information of motor torques within all limits of joints, drives, point, bodies."""
 
 from __future__ import annotations
 
@@ -189,7 +189,7 @@ class ExcitingProgram:
             return f"{model.joint_names[j]} is at {q[j]:.4g}, outside {self.limits.lower[j]:.4g} to {self.limits.upper[j]:.4g}"
         j = int(np.argmax(np.abs(torque)))
         return (
-            f"{model.joint_names[j]} needs {abs(torque[j]) * self._drive_share[j]:.4g} N m to stand, but friction leaves it "
+            f"{model.joint_names[j]} needs {abs(torque[j]) * self._drive_share[j]:.4g} N m at rest, but friction leaves "
             f"{self._drive_share[j]:.4g} N m of its effort"
         )
 

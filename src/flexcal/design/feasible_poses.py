@@ -1,4 +1,4 @@
-"""What there is to choose from: feasible poses, what each tells about the geometric errors, and where the robot will work."""
+"""Feasible candidate poses, their sensitivities, and the working poses."""
 
 from __future__ import annotations
 
@@ -96,15 +96,16 @@ def _usable(
     """The poses of a pool that can be measured, of those `seen` (a mask); raises `FlexcalError` where they are fewer than `least`."""
     if not seen.any():
         raise FlexcalError(
-            f"the instrument sees none of the {len(given)} poses of the pool; check where `stations:` puts it, the acceptance of the "
-            "reflector, and what stands in its line of sight."
+            f"the instrument can measure none of the {len(given)} poses of the pool; check where `stations:` puts it, the "
+            "acceptance of the "
+            "reflector, and obstacles in its line of sight."
         )
     shown = given.subset(seen)
     usable = shown.subset(preloaded(checker.model, shown.q, setup.payload))
     if len(usable) < least:
-        hidden = f", of which the instrument sees {len(shown)}" if len(shown) < len(given) else ""
+        hidden = f", of which the instrument can measure {len(shown)}" if len(shown) < len(given) else ""
         raise FlexcalError(
-            f"the pool holds {len(given)} poses{hidden}, and gravity surely settles the flank of every backlash in {len(usable)} of them; "
+            f"the pool holds {len(given)} poses{hidden}, and the flank of every backlash is certain in {len(usable)} of them; "
             f"{least} cannot be chosen."
         )
     return usable
@@ -115,6 +116,7 @@ def _check_flanks(model: RobotModel, q: np.ndarray, payload: float | None) -> No
     for i in preload_joints(model):
         if np.all(torque[:, i] > 0) or np.all(torque[:, i] < 0):
             raise FlexcalError(
-                f"gravity presses {model.joint_names[i]} onto the same flank in all {len(q)} usable poses, so its backlash cannot be "
-                "told from its offset; loosen what restricts the poses, or take it from `geometry: backlash:`."
+                f"gravity presses {model.joint_names[i]} onto the same flank in all {len(q)} usable poses, so its backlash is "
+                "not identifiable beside "
+                "its offset; relax the restrictions of the poses, or take it from `geometry: backlash:`."
             )

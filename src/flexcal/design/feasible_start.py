@@ -1,4 +1,4 @@
-"""Where an exciting trajectory begins to be designed: a place and a swing about it that keep all limits."""
+"""Feasible start of the design of an exciting trajectory: a posture and a small motion about it within all limits."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def feasible_places(program: ExcitingProgram) -> np.ndarray:
         return places[worst < 0]
     best = int(np.argmin(worst))
     raise FlexcalError(
-        f"{model.name} can stand nowhere within its limits: at best, at q = {_written(places[best])}, "
+        f"{model.name} has no feasible posture within its limits: at best, at q = {_written(places[best])}, "
         f"{program.standing_limit(places[best])}; correct that limit."
     )
 

@@ -1,4 +1,4 @@
-"""Random poses in which a robot can be excited: room for the motion, nothing touches, and gravity keeps every gap closed."""
+"""Random candidate poses of frequency experiments: room for the motion, no collision, gaps closed by gravity."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class ExcitablePoses:
         for name, low, high, free in zip(self.model.joint_names, self.lower, self.upper, need, strict=True):
             if low >= high:
                 raise FlexcalError(
-                    f"the limits of {name} leave no room for the {np.degrees(free):.3g}° that the motion under the excitation needs "
+                    f"the limits of {name} leave less room than the {np.degrees(free):.3g}° that the motion under the excitation needs "
                     "on either side; lower the reference motion."
                 )
 

@@ -1,4 +1,4 @@
-"""The poses whose frequency responses tell the springs best together."""
+"""Selection of the poses of frequency experiments."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How large a multisine may be before it pulls a drive across its gap: gravity must hold every drive with backlash to one flank."""
+"""Largest multisine amplitude at which gravity holds every drive with backlash on one flank."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a measured pose tells about the geometric errors: whitened Jacobian rows, then the same of base parameters only."""
+"""Sensitivity of measured poses to geometric errors: whitened Jacobian, reduced to base parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Minimise within limits from inside: a logarithmic barrier that is lowered, and L-BFGS steps that never leave (Nocedal & Wright 2006)."""
+"""Interior-point minimisation: logarithmic barrier with L-BFGS steps (Nocedal & Wright 2006)."""
 
 from __future__ import annotations
 

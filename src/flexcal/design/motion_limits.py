@@ -1,4 +1,4 @@
-"""What a motion must keep: the limits of joints, drives and of the target point, each used to a share between -1 and 1."""
+"""Limits of a motion: joints, drives and target point, each used to a fraction between -1 and 1."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Flat multisines under a reference motion, within the robot's limits: where every frequency experiment starts from."""
+"""Flat multisines under a reference motion within the robot's limits, the start of every frequency design."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What to measure next, given what has been measured, and when to stop."""
+"""Selection of the next poses given measured ones, and the stopping criterion."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def next_poses(
     """
     merit = criterion_named(criterion, found.tool_weight)
     if not isinstance(merit, DOptimal | TraceOptimal):
-        raise FlexcalError(f"the next poses are chosen by c, A or D, not by {criterion}.")
+        raise FlexcalError(f"the criterion of the next poses must be c, A or D, not {criterion}.")
     before = found.base.sensitivity
     rows, noisier = measured_rows(found, measured)
     flat = rows.reshape(-1, rows.shape[2])

@@ -1,4 +1,4 @@
-"""Where to hold the payload so that the springs are told best."""
+"""Placement of the payload for the smallest standard deviations of the springs."""
 
 from __future__ import annotations
 
@@ -43,13 +43,13 @@ def payload_placements(
     held = model.payload
     if held is None or plan.payload == 0 or not held.mass > 0:
         raise FlexcalError(
-            f"{model.path} declares no payload that this plan holds, so none can be placed; add `payload:`."
+            f"{model.path} declares no payload for this plan, so no placement can be evaluated; add `payload:`."
         )
     axis = model.joints[held.joint].axis
     if np.linalg.norm(np.cross(axis, held.com_in_link)) < 1e-3:
         raise FlexcalError(
-            f"the payload's centre of mass lies on the axis of {model.joint_names[held.joint]}, where its direction does not matter; "
-            f"declare in {model.path} how far off it can be held."
+            f"the payload's centre of mass lies on the axis of {model.joint_names[held.joint]}, so its direction has "
+            f"no effect; declare in {model.path} its offset from the axis."
         )
     places = []
     for number in range(DIRECTIONS):

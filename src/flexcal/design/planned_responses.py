@@ -1,4 +1,4 @@
-"""What the frequency responses of a plan will tell, before anything is measured."""
+"""Predicted standard deviations from the frequency responses of a plan."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class PlannedResponses:
         name, reached = largest_stiffness_std(most.sensitivity)
         if reached > wanted:
             raise FlexcalError(
-                f"a standard deviation of {100 * wanted:g} % is not reached however long is measured: {MOST} realisations leave "
+                f"a standard deviation of {100 * wanted:g} % is not reached with any duration: {MOST} realisations leave "
                 f"{100 * reached:.2g} % for {name}; choose more poses or hold a payload off the wrist's axis."
             )
         for _, realisations, kept in sorted(tried):

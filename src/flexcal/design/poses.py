@@ -1,4 +1,4 @@
-"""Which poses to measure: chosen ones for a calibration, random ones for its verification."""
+"""Selection of calibration poses, and random verification poses."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CriterionName = Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"]
 
 @dataclass(frozen=True, eq=False)
 class PoseDesign:
-    """A plan of N poses and why these.
+    """A plan of N poses, with candidates, criterion and predicted errors.
 
     `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
     `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
@@ -200,7 +200,7 @@ def fewest_poses(found: PoseCandidates, most: int, wanted: float) -> int:
     reached = tool_error(found.base, weight, order)
     raise FlexcalError(
         f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not {wanted / MILLIMETRE:.4f} mm; "
-        "allow more poses, or want less."
+        "allow more poses, or a larger error."
     )
 
 

@@ -1,4 +1,4 @@
-"""Which poses preload every backlash: gravity settles the flank, with room to spare."""
+"""Poses at which gravity preloads every backlash with a margin."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def preload_joints(model: RobotModel) -> tuple[int, ...]:
 
 
 def preloaded(model: RobotModel, q: np.ndarray, payload: float | None = None) -> np.ndarray:
-    """Whether gravity surely settles the flank of every joint with backlash at `q` (samples, n), as (samples,) of bool.
+    """Whether the flank of every backlash is certain at `q` (samples, n), as (samples,) of bool.
 
     The sign of its torque must be certain; and the torque must exceed 10 N m and 5 % of its largest over the joint ranges.
     """

@@ -1,4 +1,4 @@
-"""How noisy a frequency response will be: sensors, and friction that the excitation and the reference motion make nonlinear."""
+"""Predicted noise of a frequency response: sensors, and friction under excitation and reference motion."""
 
 from __future__ import annotations
 

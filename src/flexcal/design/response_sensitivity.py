@@ -1,4 +1,4 @@
-"""What the frequency response in one pose tells about springs, rotors and links: whitened Jacobian rows, its own nuisances eliminated."""
+"""Sensitivity of the frequency response in one pose to springs, rotors and links: whitened Jacobian with nuisances eliminated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Sequential sets of trajectories: which joints move in each, and which base parameters it is about (Vandanjon et al. 1995)."""
+"""Sequences of exciting trajectories: joints that move, and base parameters of each stage (Vandanjon et al. 1995)."""
 
 from __future__ import annotations
 

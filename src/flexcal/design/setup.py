@@ -1,4 +1,4 @@
-"""What is measured, from where and how well: the target, the payload, the instrument and its reflector."""
+"""Measuring setup: target, payload, instrument and reflector."""
 
 from __future__ import annotations
 

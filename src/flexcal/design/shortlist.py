@@ -1,4 +1,4 @@
-"""Choosing from very many candidates: exchange among the most promising, look at all again, until the choice stays.
+"""Selection from very many candidates: exchange on a shortlist that is renewed until the selection does not change.
 
 What candidate i would add to a set of information M is, to first order, tr(G ΘᵢᵀΘᵢ) with G the derivative of the merit by M (the function
 of the equivalence theorem: Kiefer, "General equivalence theory for optimum designs", 1974). One product ranks all candidates so. σ_min

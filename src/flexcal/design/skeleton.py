@@ -1,4 +1,4 @@
-"""Where the links of the robot are, joint by joint: for drawing, gravity preload and line of sight."""
+"""Positions of joints and links, for figures, gravity preload and line of sight."""
 
 from __future__ import annotations
 

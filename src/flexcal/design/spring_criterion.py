@@ -1,4 +1,4 @@
-"""How well springs are told: A-optimality in their logarithms, and predicted standard deviations."""
+"""A-optimality in the logarithms of springs, and their predicted standard deviations."""
 
 from __future__ import annotations
 

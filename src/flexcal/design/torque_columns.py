@@ -1,4 +1,4 @@
-"""What joint torques tell along a motion: the base columns of links and drives, their information, and derivatives by the motion."""
+"""Base columns of joint torques along a motion, their information, and its derivatives by the motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an exciting trajectory is for: a criterion of unknowns that the torques tell about, beside what is known already."""
+"""Criterion of an exciting trajectory, given prior information."""
 
 from __future__ import annotations
 
@@ -174,5 +174,5 @@ def _require_visible(columns: TorqueColumns, unknowns: Unknowns, of: Sequence[st
             ]
             how = f"only together with {', '.join(others[:5])}" if others else "not at all"
             raise InputError(
-                f"the criterion is about {name}, which torques show {how}; choose another parameter, or give a prior to the others."
+                f"the criterion is about {name}, which torques determine {how}; choose another parameter, or give a prior to the others."
             )

@@ -1,4 +1,4 @@
-"""A short way through all of some places: nearest neighbour, then 2-opt (Croes 1958) and or-opt (Or 1976) until neither helps."""
+"""Short tour through all poses: nearest neighbour, then 2-opt (Croes 1958) and or-opt (Or 1976)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Exciting trajectories: the periodic motions within a robot's limits from which torques tell most (Swevers 1997)."""
+"""Optimal exciting trajectories within a robot's limits (Swevers 1997)."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def design_trajectories(
     seed: int = 0,
     progress: Progress = silent,
 ) -> TrajectoryDesign:
-    """`count` trajectories, each the best in view of those before it, from the best of `starts` random beginnings of the search.
+    """Design `count` trajectories, each optimal given the previous ones, from the best of `starts` random starts.
 
     A trajectory lasts `duration` s beside one period to settle, and repeats itself at `base_frequency_hz` (once in the duration by
     default). It has `harmonics`, or three times as many control points where `kind` is spline; with `rest` every period begins and ends

@@ -1,4 +1,4 @@
-"""Which poses an instrument can see: the reflector's acceptance angle, and a clear line of sight past the robot itself."""
+"""Visibility of the reflector: acceptance angle, and line of sight past the robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""In which order to take poses: short moves, each on a straight line between joint positions that touches nothing where there is one."""
+"""Order of poses with short, collision-free joint moves where there are any."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class VisitingOrder:
 
 
 def visiting_order(checker: CollisionChecker, q: np.ndarray, *, point: str | None = None) -> VisitingOrder:
-    """A short way through the poses `q` (N, n), beginning anywhere: first as few blocked moves as it finds, then as little time.
+    """Short tour through the poses `q` (N, n) with any start: first the fewest blocked moves, then the shortest time.
 
     A move is as long as its slowest joint at full speed needs. Only the moves of a way are checked for collision; those that touch
     something are made dear, and the way is improved again, until it has no new ones.

@@ -1,4 +1,4 @@
-"""Where the robot will work: joint configurations that put the target all over a box, or at given points."""
+"""Working volume: configurations with the target at points of a box, or at given points."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Recordings to dynamic parameters: base parameters, drive terms, least squares with intervals."""
+"""Identification of dynamic parameters from joint logs: base parameters, friction, payload, estimators with intervals."""
 
 import lazy_loader
 

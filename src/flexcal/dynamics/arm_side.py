@@ -1,4 +1,4 @@
-"""The motion on the arm side of a robot's drives, which an elastic joint has beside that of its motor."""
+"""Motion on the arm side of elastic joints, beside that of the motors."""
 
 from __future__ import annotations
 

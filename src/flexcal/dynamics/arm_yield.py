@@ -1,4 +1,4 @@
-"""What springs that yield, and errors of springs and geometry, change of a rigid arm's torques along one recording."""
+"""Torque difference of an elastic arm from a rigid one along a recording, and its sensitivity to springs and geometry."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How fast a recorded motion is, from the spectrum of its positions."""
+"""Bandwidth of a recorded motion, from the spectrum of its positions."""
 
 from __future__ import annotations
 

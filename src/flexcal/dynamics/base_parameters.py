@@ -1,4 +1,4 @@
-"""Base parameters: what the torques determine at best, and what each stands for (Gautier 1991)."""
+"""Base parameters: the identifiable combinations of dynamic parameters (Gautier 1991)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The covariance of a linear estimate whose errors hang together in time and between joints, from batches of equations."""
+"""Covariance of a linear estimate with errors correlated in time and between joints, from batches of equations."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The equations of one experiment in the space of few: R factors of batches that follow each other."""
+"""Equations of one experiment as upper-triangular factors of consecutive batches."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: 
         raise FlexcalError(f"the equations of {name} are not finite.")
     if not found:
         raise FlexcalError(
-            f"no equation is left of {name}: it, or the part that is fitted or held out, is too short for its filters, "
+            f"no equations remain of {name}: it, or the part that is fitted or held out, is too short for its filters, "
             "or the robot stands still in it."
         )
     return ExperimentSystem(tuple(found), length, last - first, masked)

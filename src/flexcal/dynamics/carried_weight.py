@@ -1,4 +1,4 @@
-"""How much of the links' weight the torques of a log carry: next to nothing where they are those of the motors before their gears."""
+"""Ratio of logged torques to the gravity torques of the links; close to zero for torques on the motor side."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class ClosedLoop:
         if not np.abs(target.path - q).max() < _LOST:
             raise FlexcalError(
                 f"{self._robot.name}: the simulated robot does not follow the recorded path at {target.time:.6g} s; check `controller:` "
-                "in robot.yaml, or look at these data with --estimator wls."
+                "in robot.yaml, or use --estimator wls."
             )
         return q, dq, self._ddq
 

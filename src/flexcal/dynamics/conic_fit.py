@@ -1,4 +1,4 @@
-"""Least squares within cones: the optimum of the data, and of what is as good the most likely."""
+"""Least squares with conic constraints, and the most probable of nearly optimal solutions."""
 
 from __future__ import annotations
 
@@ -113,5 +113,5 @@ def _bordered(matrix: np.ndarray, corner: float) -> np.ndarray:
 
 def _failure(reason: str) -> FlexcalError:
     return FlexcalError(
-        f"no physically feasible parameters were found (solver: {reason}); look at these data with --estimator wls."
+        f"no physically feasible parameters were found (solver: {reason}); use --estimator wls to inspect the data."
     )

@@ -1,4 +1,4 @@
-"""Cross-validation in blocks of time, from triangles alone: no equation is looked at twice."""
+"""Cross-validation in blocks of time, from triangular factors."""
 
 from __future__ import annotations
 

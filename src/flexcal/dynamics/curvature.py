@@ -1,4 +1,4 @@
-"""What a Gaussian of masses and centres of mass cannot hold: torques follow their products (second-order filter, Bar-Shalom 2001, §10.3).
+"""Second-order covariance due to products of mass and centre of mass (second-order filter, Bar-Shalom 2001, §10.3).
 
 Motor torques leave a link's mass as open as CAD, while its product with the centre of mass is known a hundred times better. Along that open
 direction the truth lies on a curve, and the estimate's Gaussian on the tangent. The distance between the two is known in size and goes

@@ -1,4 +1,4 @@
-"""A signal that stays at its largest or smallest value, sample after sample: a limit of the sensor, not of the motion."""
+"""Detection of saturation: consecutive samples at the largest or smallest value of a signal."""
 
 from __future__ import annotations
 

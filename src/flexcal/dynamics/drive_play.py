@@ -1,4 +1,4 @@
-"""Where the gaps of elastic drives with backlash lie, from passes over the equations."""
+"""Position of the gaps of elastic drives with backlash, estimated in preceding passes."""
 
 from __future__ import annotations
 

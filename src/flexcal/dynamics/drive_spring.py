@@ -1,4 +1,4 @@
-"""The spring of an elastic joint between the positions of its motor and its arm, and what it adds to the equations (Eq. 2.22)."""
+"""Torque of the spring between motor and arm of an elastic joint, and its columns (Eq. 2.22)."""
 
 from __future__ import annotations
 

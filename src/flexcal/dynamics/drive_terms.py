@@ -1,4 +1,4 @@
-"""What the drives add to the torques of the links, each term linear in its parameters."""
+"""Torque terms of the drives, linear in their parameters."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Memory = dict[str, Any]
 
 @dataclass(frozen=True, eq=False)
 class Column:
-    """What torque (N,) one unit of the parameter `name` asks of one joint: the number of its equation in an `Observation`."""
+    """Torque (N,) per unit of the parameter `name` at one joint: the number of its equation in an `Observation`."""
 
     name: str
     joint: int

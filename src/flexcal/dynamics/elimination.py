@@ -1,4 +1,4 @@
-"""Essential parameters: the base parameters without which the torques cannot be explained (Gautier 1997)."""
+"""Essential parameters: base parameters with small relative standard deviations (Gautier 1997)."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class EssentialParameters:
 
 
 def essential_parameters(data: RegressionData, estimate: Estimate) -> EssentialParameters:
-    """Set the base parameter of the largest relative standard deviation to zero, estimate the others anew, and again.
+    """Eliminate the base parameter with the largest relative standard deviation, update the others, and repeat.
 
     The others follow by the covariance of the estimate, which is what autocorrelation leaves of least squares. It ends where the largest
     relative standard deviation is at most 30 times the smallest, or where the next step would make the residual of `data` more than

@@ -1,4 +1,4 @@
-"""The energy model: what the motors put in between two instants, without any acceleration (Gautier & Khalil 1988)."""
+"""The energy model: work of the motors between two instants, without accelerations (Gautier & Khalil 1988)."""
 
 from __future__ import annotations
 

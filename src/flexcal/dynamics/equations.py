@@ -1,4 +1,4 @@
-"""What makes equations that are linear in the dynamic parameters from samples of a motion."""
+"""Interface of equations that are linear in the dynamic parameters, for samples of a motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Weighted least squares among the robots that can be built (Sousa & Cortesão 2014)."""
+"""Weighted least squares with physically consistent inertials (Sousa & Cortesão 2014)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexcal.estimation import Estimate, Parameter, Parameters
 
 
 def feasible_least_squares(data: RegressionData) -> Estimate:
-    """The weighted least squares whose links have positive mass and pseudo-inertia and whose drives take, not give, power.
+    """Weighted least squares with positive masses and pseudo-inertias of the links, and dissipative drives.
 
     All parameters get values: of those that fit as well, the nearest to CAD and robot.yaml (`ConicFit.solve`, `feasible_set`), so that
     the links are bodies and can go back into a URDF. Covariance, `dropped` and `identifiable` are those of `weighted_least_squares`:

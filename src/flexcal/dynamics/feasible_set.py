@@ -1,4 +1,4 @@
-"""Which parameters a robot that can be built may have, and what is known of them beforehand."""
+"""Constraints of physical consistency, and the prior of the parameters."""
 
 from __future__ import annotations
 

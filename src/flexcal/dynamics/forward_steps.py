@@ -1,4 +1,4 @@
-"""Short steps of a motion with all that its accelerations depend on: what the direct dynamic model needs, linear in the parameters."""
+"""Quantities of the direct dynamic model along short steps of a motion, linear in the parameters."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which friction terms a recording supports: forward selection by cross-validation."""
+"""Selection of friction terms: forward selection by cross-validation."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Trial:
-    """Friction terms beyond the plain ones, and the cross-validated error ‖Y - W χ‖ / ‖Y‖ with them."""
+    """A set of friction terms beyond the classic ones, and its cross-validation error ‖Y - W χ‖ / ‖Y‖."""
 
     terms: tuple[str, ...]
     error: float

@@ -1,4 +1,4 @@
-"""Friction beyond viscous and Coulomb, on the axes of the motors; what shapes a term is fixed, what it is multiplied by is identified."""
+"""Friction terms beyond viscous and Coulomb friction, on the motor axes; shapes are fixed, coefficients are identified."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _PerMotor:
 
 @dataclass(frozen=True)
 class AsymmetricCoulomb(_PerMotor):
-    """`<joint>.coulomb_asymmetry` · |sign ṡ|: half of what forwards differs from backwards. A torque offset says the same but at rest."""
+    """`<joint>.coulomb_asymmetry` · |sign ṡ|: half the difference between the directions; equals a torque offset except at rest."""
 
     key = "coulomb_asymmetry"
 
@@ -41,7 +41,7 @@ class AsymmetricCoulomb(_PerMotor):
 
 @dataclass(frozen=True)
 class SublinearViscous(_PerMotor):
-    """`<joint>.sublinear_viscous` · sign(ṡ) √|ṡ|: grease that thins as it is sheared."""
+    """`<joint>.sublinear_viscous` · sign(ṡ) √|ṡ|: shear-thinning grease."""
 
     key = "sublinear_viscous"
 
@@ -83,7 +83,7 @@ class Presliding(_PerMotor):
 
 @dataclass(frozen=True)
 class WarmUp(_PerMotor):
-    """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: grease that is still cold."""
+    """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: decreasing viscosity during warm-up."""
 
     time: float
     key = "warm_up"
@@ -95,7 +95,7 @@ class WarmUp(_PerMotor):
 
 @dataclass(frozen=True, eq=False)
 class LoadCoulomb:
-    """`<joint>.load_coulomb` · |load| sign ṡ: teeth that are pressed together.
+    """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears.
 
     The load is what the links alone ask of the joint, by `inertials` (10 n,) as a fit without this term found them: the measured
     torque would put the noise of Y into W, and the answer into a prediction.

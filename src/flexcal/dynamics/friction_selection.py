@@ -1,4 +1,4 @@
-"""From `friction:` of robot.yaml and recordings to the terms of the drives."""
+"""Friction terms of the drives from `friction:` of robot.yaml and recordings."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _CLASSIC = ("viscous", "coulomb", "torque_offset")
 
 @dataclass(frozen=True)
 class FrictionSelection:
-    """All `terms` of the drives, the `names` of the friction terms among them, and what was tried beyond the plain ones."""
+    """All `terms` of the drives, the `names` of the friction terms among them, and the trials of the selection."""
 
     terms: tuple[DriveTerm, ...]
     names: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""The friction terms by the names that robot.yaml gives them, and the shapes in which each is tried."""
+"""Friction terms by their names in robot.yaml, and the shapes tried for each."""
 
 from __future__ import annotations
 

@@ -22,7 +22,7 @@ _ITERATIONS = 100
 
 
 def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
-    """`<joint>.drive_gain`: what the torques of each joint must be multiplied by, from the weight of the payload.
+    """Identify drive gains, as factors `<joint>.drive_gain` to the logged torques, from a payload of known mass.
 
     `payloads` (kg, one an experiment, 0 or that of the one payload) hang on the link that robot.yaml's payload hangs on; of it the mass is
     taken as known, and its first moments and inertia are estimated beside the robot's base parameters. The equations
@@ -39,7 +39,8 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
     masses = sorted({mass for mass in payloads if mass > 0})
     if len(masses) > 1:
         raise FlexcalError(
-            f"payloads of {masses[0]:g} and {masses[1]:g} kg are two, whose centres of mass and inertias differ; give recordings of one."
+            f"payloads of {masses[0]:g} and {masses[1]:g} kg are two payloads with different centres of mass and inertias; give "
+            "recordings of one payload."
         )
     terms = _Terms(data, payloads, held.joint)
     noise = noise_levels(data)
@@ -94,7 +95,7 @@ def _settled(terms: _Terms, noise: Sequence[float], kept: Sequence[int]) -> np.n
         if np.all(np.abs(values[terms.gains] - before) <= _SETTLED * np.abs(before)):
             return values
     raise FlexcalError(
-        f"the drive gains do not settle in {_ITERATIONS} steps; record for longer, or with a heavier payload."
+        f"the drive gains do not converge in {_ITERATIONS} steps; record for longer, or with a heavier payload."
     )
 
 

@@ -1,4 +1,4 @@
-"""Regression by a Gaussian process whose numbers are all plain: scikit-learn fits it, and nothing but NumPy and SciPy predicts with it."""
+"""Gaussian process regression; fitted by scikit-learn, evaluated with NumPy and SciPy alone."""
 
 from __future__ import annotations
 

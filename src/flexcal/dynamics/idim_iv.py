@@ -1,4 +1,4 @@
-"""Instrumental variables from the simulated closed loop (IDIM-IV): no bias by noise in velocities and accelerations (Janot et al. 2014)."""
+"""Instrumental variables from the simulated closed loop (IDIM-IV), unbiased by noisy velocities and accelerations (Janot et al. 2014)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Iteratively reweighted least squares with Huber's loss: single rows that miss by far do not pull the estimate (Huber 1964)."""
+"""Iteratively reweighted least squares with Huber's loss, robust to outliers in single rows (Huber 1964)."""
 
 from __future__ import annotations
 
@@ -46,11 +46,11 @@ def huber_least_squares(data: RegressionData, recorded: RecordedRows) -> Estimat
             return replace(
                 found,
                 covariance=bend**2 * found.covariance,
-                message=f"Huber's loss; {np.mean(every < 0.5):.2%} of the rows count by less than half",
+                message=f"Huber's loss; {np.mean(every < 0.5):.2%} of the rows have a weight below 0.5",
                 iterations=iteration,
             )
     raise FlexcalError(
-        f"the weights of the rows do not settle in {_ITERATIONS} iterations; look at these data with --estimator wls."
+        f"the weights of the rows do not converge in {_ITERATIONS} iterations; use --estimator wls."
     )
 
 

@@ -1,4 +1,4 @@
-"""A joint log on disk as an experiment: filtered once, then gone through again and again in blocks, so that it may be of any length."""
+"""A joint log on disk as an experiment: filtered once, then read in blocks."""
 
 from __future__ import annotations
 

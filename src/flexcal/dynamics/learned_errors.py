@@ -1,4 +1,4 @@
-"""How much less of the torques is missed with a learned residual, in rows of any recording."""
+"""Relative torque errors with and without a learned residual."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is learned of the torques that a physical model misses, as a function of what each motor feels."""
+"""Learned residual torque of each motor as a function of its position, speed and predicted torque."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flexcal.errors import FlexcalError
 
 @dataclass(frozen=True, eq=False)
 class LearnedMotor:
-    """What the motor of the joint `name` gives beyond a predicted torque: `process`, of the axis' position and speed and that torque.
+    """Residual torque of the motor of joint `name`: `process`, a function of the axis' position, speed and predicted torque.
 
     `inflation` is what the standard deviations of the process have to be multiplied by, as the errors of left-out blocks say.
     """

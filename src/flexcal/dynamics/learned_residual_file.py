@@ -1,4 +1,4 @@
-"""`learned_residual.npz`: what was learned, as plain arrays, and which estimate it belongs to.
+"""The file `learned_residual.npz`, and its link to the estimates.
 
 `names` (n,), `shares` (n, n), `inputs` (n, m, 3), `values` (n, m), `lengths` (n, 3), `amplitude`, `noise`, `inflation` (n,) are those of
 `LearnedResidual`; `dynamics` is the SHA-256 of the block that it was learned with.
@@ -40,7 +40,7 @@ def write_learned_residual(path: Path, learned: LearnedResidual, estimates: Path
 
 
 def read_learned_residual(path: str | Path, estimates: str | Path) -> LearnedResidual:
-    """What `identify dynamics --learn-residual` left; needs no scikit-learn.
+    """Read the file that `identify dynamics --learn-residual` writes; needs no scikit-learn.
 
     Raises `InputError` where the file cannot be read, and where it was learned with other dynamics than those of the file `estimates`.
     """

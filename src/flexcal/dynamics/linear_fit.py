@@ -1,4 +1,4 @@
-"""The weighted linear least squares that the estimators share, and the estimate it gives."""
+"""Weighted linear least squares with intervals, common to the estimators."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The inertial columns that each joint feels, without those that others always stand for: fewer to compute, filter and triangularise."""
+"""Independent inertial columns of each joint, which reproduce all others."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What shows that a log lies though every single value is in order: ends that are cut off, rates of another kind, dead sensors."""
+"""Detection of faulty logs: saturation, inconsistent velocities, sensors without signal."""
 
 from __future__ import annotations
 
@@ -54,13 +54,13 @@ class LogFaults:
         for name, torque in self._torques.seen.items():
             if moves and torque.span <= _ROUNDING * widest:
                 raise InputError(
-                    f"{self._path}: the torque of {name} is the same throughout; it was not measured: mend the log, or record again."
+                    f"{self._path}: the torque of {name} is the same throughout; it was not measured: correct the log, or record again."
                 )
             held = torque.held
             if held is not None:
                 raise InputError(
                     f"{self._path}: the torque of {name} stays at its extreme {held.value:.6g} for {held.samples} samples; "
-                    "drive or sensor saturate there: record a calmer motion, or cut these rows out into files of their own."
+                    "drive or sensor saturates there: record a slower motion, or cut these rows out into files of their own."
                 )
         slides = {joint.name for joint in self._model.joints if joint.kind == "prismatic"}
         for name, position in self._positions.seen.items():
@@ -68,8 +68,8 @@ class LogFaults:
             if stopped is not None:
                 unit = "m" if name in slides else "rad"
                 raise InputError(
-                    f"{self._path}: the position of {name} runs into its extreme {stopped.value:.6g} {unit} at full speed and stays "
-                    f"there for {stopped.samples} samples; the encoder is clipped: record inside its range."
+                    f"{self._path}: the position of {name} reaches its extreme {stopped.value:.6g} {unit} at full speed and stays "
+                    f"there for {stopped.samples} samples; the encoder is clipped: record within its range."
                 )
         if moves:
             self._check_rates()
@@ -95,9 +95,10 @@ class LogFaults:
             elif abs(slope + 1) < _CONTRADICTS:
                 advice = "their sign is the other one"
             else:
-                advice = f"they are {slope:.3g} times as large, and miss it by {np.sqrt(missed / size):.0%}"
+                advice = f"they are {slope:.3g} times as large, with a relative error of {np.sqrt(missed / size):.0%}"
             raise InputError(
-                f"{self._path}: the velocities of {joint.name} are not those of its positions: {advice}; mend or remove their column."
+                f"{self._path}: the velocities of {joint.name} are inconsistent with its positions: {advice}; correct or remove "
+                "their column."
             )
 
 

@@ -1,4 +1,4 @@
-"""A recording as the identification of dynamics needs it: filtered positions, velocities, accelerations, torques."""
+"""Filtered positions, velocities, accelerations and torques of a recording."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The axes on which motors turn: those of the joints, but for motors that turn with several."""
+"""Motor axes: those of the joints, except for coupled motors."""
 
 from __future__ import annotations
 

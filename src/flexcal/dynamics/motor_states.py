@@ -1,4 +1,4 @@
-"""What the motors of rows feel and do: the position and speed of their axes, the torque they gave, and what estimates ask of them."""
+"""Position, speed, measured and predicted torque of each motor, row by row."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the noise of the positions does to the columns of the observation matrix, from a second pass with more of it."""
+"""Errors of the observation matrix due to position noise, from a second pass with added noise."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from flexcal.model.regressor import INERTIAL, write_torque_regressor
 
 @dataclass(frozen=True, eq=False)
 class Observation:
-    """Which parameters the torques depend on, and how.
+    """Columns of the joint torques: link inertials and drive terms of a robot.
 
     There is one equation a joint, and after them one a motor that is connected by one of the `springs`: that of the motor alone. The
     joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor.

@@ -1,4 +1,4 @@
-"""Ordinary least squares: every equation counts alike, in N m (Eq. 2.31 of Eq. 2.26)."""
+"""Ordinary least squares: equal weights of all equations (Eq. 2.31 of Eq. 2.26)."""
 
 from __future__ import annotations
 

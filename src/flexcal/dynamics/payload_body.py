@@ -1,4 +1,4 @@
-"""From ten parameters that torques tell to a body: mass, centre of mass, inertia about it, and which of these are known."""
+"""Mass, centre of mass and inertia of a payload from its ten parameters, with their identifiability."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Torques of a robot that holds a payload, and of the same robot without: W χ + W_p φ = Y, with what is known of χ beside."""
+"""Torque equations of a robot with and without payload, W χ + W_p φ = Y, with a prior of χ."""
 
 from __future__ import annotations
 

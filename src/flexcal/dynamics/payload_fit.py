@@ -1,4 +1,4 @@
-"""Mass, centre of mass and inertia of what a robot holds, from its torques and what is known of the robot."""
+"""Identification of mass, centre of mass and inertia of a payload from torques, with the robot's own dynamics as prior."""
 
 from __future__ import annotations
 
@@ -70,7 +70,7 @@ class _Solution:
 
 
 def identify_payload(equations: PayloadEquations) -> PayloadFit:
-    """Bayesian weighted least squares of all unknowns, the payload's ten without prior; then the nearest body (Wensing et al. 2018).
+    """Bayesian weighted least squares, without prior of the payload; then the nearest consistent payload (Wensing et al. 2018).
 
     The intervals hold what is uncertain of the robot, and errors that hang together in time and between joints (`score_covariance`).
     What the motion does not tell of the payload stays as declared, and so does inertia whose intervals tell no body from a point
@@ -88,12 +88,13 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
     least = float(found.values[0]) - quantile * float(np.sqrt(found.covariance[0, 0]))
     if "payload.mass" in {entry.name for entry in found.missing}:
         raise FlexcalError(
-            "the motion does not tell the payload's mass from the robot's own; move the joints that lift it, or give --free logs."
+            "the payload's mass is not identifiable beside the robot's own inertia in this motion; move the joints that lift "
+            "it, or give --free logs."
         )
     if not least > 0:
         raise FlexcalError(
-            f"the torques show no payload: its mass comes out at {found.values[0]:.3g} kg, and no more than "
-            f"{2 * found.values[0] - least:.3g} kg for sure; check that it was held, the signs of the torques and the robot's own dynamics."
+            f"the torques contain no payload: its estimated mass is {found.values[0]:.3g} kg, with an upper 95 % limit of "
+            f"{2 * found.values[0] - least:.3g} kg; check that it was held, the signs of the torques and the robot's own dynamics."
         )
     nearest = nearest_body(found.values, found.root, found.unseen)
     body = of_body(nearest.parameters)
@@ -218,7 +219,7 @@ def _estimate(
     ]
     message = "Bayesian weighted least squares"
     if rise > 0:
-        message += f", the nearest body; the weighted sum of squares is {rise:.3g} above its minimum"
+        message += f", nearest physically consistent payload; the weighted sum of squares is {rise:.3g} above its minimum"
     return Estimate(
         parameters=Parameters(parameters),
         covariance=covariance,

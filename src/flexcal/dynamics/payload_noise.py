@@ -1,4 +1,4 @@
-"""The noise of the torques of a robot that holds something, from what its fit leaves: short recordings fit no robot of their own."""
+"""Noise of the torques of a loaded robot, from the residual of its fit."""
 
 from __future__ import annotations
 
@@ -37,8 +37,8 @@ def residual_noise(
         freedom = s.triangle.rows - taken
         if freedom <= 2.0:
             raise FlexcalError(
-                f"{s.triangle.rows} equations of {equations.data.observation.labels[joint]} in recording {experiment + 1} do not tell its "
-                "noise; record for longer, or decimate less."
+                f"{s.triangle.rows} equations of {equations.data.observation.labels[joint]} in recording {experiment + 1} do not determine "
+                "its noise; record for longer, or decimate less."
             )
         found.append(s.floored(float(np.linalg.norm(rows @ missed)) / np.sqrt(freedom)))
     return found

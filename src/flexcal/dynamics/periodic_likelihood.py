@@ -1,4 +1,4 @@
-"""Maximum likelihood for periodic excitation: the noise of torques and motion is what differs between the periods (Swevers 1997)."""
+"""Maximum likelihood for periodic excitation: noise of torques and motion from the differences between periods (Swevers 1997)."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
             message = f"maximum likelihood from {periods} periods; mean squared error {cost / freedom:.3g} of the noise"
             return unknowns.estimate(found, covariance, float(freedom), cost, freedom, message, iteration)
     raise FlexcalError(
-        f"the noise does not settle in {_ITERATIONS} iterations; look at these data with --estimator wls."
+        f"the noise estimate does not converge in {_ITERATIONS} iterations; use --estimator wls."
     )
 
 

@@ -1,4 +1,4 @@
-"""The power model: the power of all motors as one equation a sample (Gautier 1997)."""
+"""The power model: power of all motors, one equation per sample (Gautier 1997)."""
 
 from __future__ import annotations
 

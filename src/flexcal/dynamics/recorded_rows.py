@@ -1,4 +1,4 @@
-"""The rows of all experiments of a fit, for an estimator that must see them one by one and goes through them again."""
+"""The rows of all experiments, for estimators that need single rows in several passes."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ _Join = Callable[[Rows, Rows], Rows]
 
 @dataclass(frozen=True, eq=False)
 class RecordedRows:
-    """Where the equations of a fit come from; every method is one pass over all `experiments`, of which each has a window.
+    """Rows of a fit; every method is one pass over all `experiments`, of which each has a window.
 
     Of the rows that are kept between passes only one number a row and equation stays in memory.
     """

@@ -1,4 +1,4 @@
-"""Recordings to the overdetermined system W χ + ρ = Y (Eq. 2.26), one triangle an equation and experiment."""
+"""Overdetermined system W χ + ρ = Y from recordings (Eq. 2.26), one triangular factor per equation and experiment."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def observe(
 
 
 def batches_each(experiments: int) -> int:
-    """How many batches each of so many experiments has at most, so that memory hardly grows with their number."""
+    """Largest number of batches per experiment, so that memory hardly grows with their number."""
     return max(1, min(BATCHES, _ALL_BATCHES // max(1, experiments)))
 
 

@@ -1,4 +1,4 @@
-"""A motion that repeats itself, cut into its periods (Swevers 1997)."""
+"""Periodic motion, cut into its periods (Swevers 1997)."""
 
 from __future__ import annotations
 
@@ -52,10 +52,11 @@ class RepeatedMotion:
         size = _period(motion.q)
         count = len(motion) // size if size else 0
         if count < FEWEST:
-            what = f"shows {count} whole periods" if size else "shows no motion that repeats itself"
+            what = f"shows {count} whole periods" if size else "contains no periodic motion"
             raise FlexcalError(
-                f"{experiment.name} {what}; maximum likelihood reads the noise from the scatter between at least {FEWEST}: record the same "
-                "periodic motion again and again, a little longer for the filters, or take --estimator wls."
+                f"{experiment.name} {what}; maximum likelihood estimates the noise from the scatter between periods, of which "
+                f"it needs at least {FEWEST}: record more periods, and "
+                "some time for the filters, or take --estimator wls."
             )
         return cls(tuple(motion.part(size * k, size * (k + 1)) for k in range(count)))
 

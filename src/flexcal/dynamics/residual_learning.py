@@ -1,4 +1,4 @@
-"""Learns what an estimate misses of the torques, and asks blocks of time that it left out whether that is worth anything."""
+"""Learning of residual torques, with cross-validation in blocks of time."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ def learn_residual(
     states, block = _thinned(recorded, systems, parameters)
     if len(states) < _FEWEST:
         raise FlexcalError(
-            f"{len(states)} rows are too few to learn a residual torque from, which takes {_FEWEST}; record for longer."
+            f"{len(states)} rows are too few to learn a residual torque; the minimum is {_FEWEST}; record for longer."
         )
     missed, left, std = np.full((3, *states.torque.shape), np.nan)
     progress("learning", 0.0)

@@ -1,4 +1,4 @@
-"""The noise of the rows by line: what the autocorrelation of a residual is in the frequency domain."""
+"""Noise spectrum of residuals, line by line."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def noise(rows: TrajectoryRows, estimate: Estimate, weighed: np.ndarray) -> np.n
     freedom = near @ free
     if freedom.min() <= 2.0:
         raise FlexcalError(
-            "the recordings leave too few lines to tell their noise; record more or longer trajectories."
+            "the recordings leave too few lines to estimate their noise; record more or longer trajectories."
         )
     shapes = 1.0 / (1.0 + (rows.lines / np.array(_CORNERS)[:, None]) ** 2)[:, :, None]
     sums = np.maximum(near @ (squares / shapes), (_SMALLEST * rows.size) ** 2)

@@ -1,4 +1,4 @@
-"""What is known of the robot itself where its torques are to tell something else: base parameters, springs, geometry, jointly."""
+"""Joint prior of a robot's base parameters, springs and geometry for the identification of a payload."""
 
 from __future__ import annotations
 

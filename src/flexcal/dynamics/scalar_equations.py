@@ -1,4 +1,4 @@
-"""One equation a sample for all joints together, from the same columns as their torques."""
+"""One equation per sample for all joints together, from the columns of their torques."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A recording with the motion that a model makes of it under control: what of the motion is not noise (Janot et al. 2014)."""
+"""Recording with the simulated motion of a model under control, free of measurement noise (Janot et al. 2014)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Estimates that need a simulation, which needs an estimate: from a robot that can be built, until both agree."""
+"""Iteration of simulation and estimation until both agree, from a physically consistent start."""
 
 from __future__ import annotations
 
@@ -39,9 +39,7 @@ def simulated_iteration(data: RegressionData, step: Callable[[np.ndarray], Estim
         if np.all((np.abs(moved) <= room)[seen]):
             return replace(found, iterations=iteration)
         robot[kept] += moved if iteration <= _WHOLE else 0.5 * moved
-    raise FlexcalError(
-        f"{name} does not settle in {_ITERATIONS} simulations; look at these data with --estimator wls."
-    )
+    raise FlexcalError(f"{name} does not converge in {_ITERATIONS} simulations; use --estimator wls.")
 
 
 def _first(data: RegressionData) -> np.ndarray:

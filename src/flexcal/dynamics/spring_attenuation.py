@@ -1,4 +1,4 @@
-"""How much the noise of the positions may lower the stiffness of a drive: errors in variables (Fuller 1987, section 1.1)."""
+"""Bias of an identified drive stiffness by position noise: errors in variables (Fuller 1987, section 1.1)."""
 
 from __future__ import annotations
 

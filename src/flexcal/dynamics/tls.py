@@ -1,4 +1,4 @@
-"""Mixed total least squares: columns with errors of their own beside columns that are exact (Van Huffel & Vandewalle 1991)."""
+"""Mixed total least squares: some columns with errors, others exact (Van Huffel & Vandewalle 1991)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measured torques beside those that an estimate predicts, thinned to what a figure can show, and the spectra of all of them."""
+"""Measured and predicted torques, thinned for figures, and their spectra."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a robot's torques miss on exciting trajectories."""
+"""Relative torque error of a robot on exciting trajectories."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flexcal.model.periodic_torque import periodic_torque
 
 
 def trajectory_error(model: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording]) -> float:
-    """Norm of what the torques of `model` miss of the recorded ones over the norm of these, as `identify_with_prior` sees them.
+    """Relative torque error of `model` on recorded trajectories, up to 5 Hz as in `identify_with_prior`.
 
     Friction that robot.yaml does not know counts as none. Raises `FlexcalError` where a recording does not fit the plan.
     """

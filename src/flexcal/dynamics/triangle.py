@@ -1,4 +1,4 @@
-"""A long least-squares system in the space of a short one."""
+"""Upper-triangular factor of a tall least-squares system, updated block by block."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _TOLERANCE = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Triangle:
-    """R (k + 1, k + 1) of the QR of [W, Y], W (rows, k) and Y (rows,): all that least squares needs, in constant memory.
+    """R (k + 1, k + 1) of the QR of [W, Y], W (rows, k) and Y (rows,), sufficient for least squares.
 
     Triangles of the same columns add up: R of two systems is R of their R stacked. No product WᵀW is ever formed.
     """

@@ -26,7 +26,8 @@ def noise_levels(data: RegressionData) -> list[float]:
         if np.isnan(sigma):
             label = data.observation.labels[s.equation]
             raise FlexcalError(
-                f"{s.triangle.rows} equations of {label} in experiment {s.experiment + 1} do not tell its noise beside {rank} parameters; "
+                f"{s.triangle.rows} equations of {label} in experiment {s.experiment + 1} do not determine its noise beside "
+                f"{rank} parameters; "
                 "record for longer, or decimate less."
             )
         noise.append(s.floored(sigma))

@@ -1,4 +1,4 @@
-"""Stage 1: from frequency responses to the stiffness and damping of drives and bearings, with true uncertainties."""
+"""Stage 1: stiffness and damping of drives and bearings from frequency responses, with their uncertainties."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What the way of measuring adds to a frequency response: the slow motion, the gaps that it opens, and friction at its reversals."""
+"""Effects of the experiment on a frequency response: reference motion, gaps that it opens, friction at its reversals."""
 
 from __future__ import annotations
 

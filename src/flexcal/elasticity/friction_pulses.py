@@ -1,4 +1,4 @@
-"""What Coulomb friction under the reference motion does to the frequency response beyond a viscous loss.
+"""Effect of Coulomb friction at the reversals of the reference motion on the frequency response.
 
 Friction acts on the small motion only around the reversals of the slow one, as a pulse of strong damping twice a cycle. The mean of the
 pulses is part of the motor's viscous coefficient in that pose; their change over the cycle couples the excited line with sidebands at

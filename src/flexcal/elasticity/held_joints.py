@@ -1,4 +1,4 @@
-"""Springs of the joints that are held in a frequency experiment: whether the responses ask for them, and which (score test, profiles)."""
+"""Drive springs of held joints: score test and selection."""
 
 from __future__ import annotations
 

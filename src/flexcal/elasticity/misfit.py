@@ -1,4 +1,4 @@
-"""Whether the fitted robot explains the measured responses, and the covariance of its parameters where it does not."""
+"""Misfit of the fitted robot to the measured responses, and the covariance of its parameters with a misfit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the fitted model leaves out, as a covariance of the residual: geometric errors, and friction that is not viscous."""
+"""Covariance of the residual due to model errors: geometric errors, and friction that is not viscous."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from flexcal.model.names import GEOMETRY
 
 @dataclass(frozen=True)
 class Tolerances:
-    """What the model does not hold, 1σ.
+    """Standard deviations of effects that the model lacks.
 
     `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `strength` and `width` of the friction pulses of a
     motor, relative, common to all poses and half as much in each; `friction`: other deviation of a motor's impedance from a viscous

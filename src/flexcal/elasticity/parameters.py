@@ -1,4 +1,4 @@
-"""What stage 1 estimates: stiffness and damping of every spring, and the nuisances that would otherwise be mistaken for them."""
+"""Parameters of stage 1: stiffness and damping of every spring, and nuisance parameters."""
 
 from __future__ import annotations
 

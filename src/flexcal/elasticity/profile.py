@@ -1,4 +1,4 @@
-"""How wide the profile likelihood of a badly known stiffness is (Raue et al. 2009): its curvature at the optimum may promise too much."""
+"""Standard deviation from the profile likelihood of a poorly determined stiffness (Raue et al. 2009)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The slow motion under the excitation, and the arm along it."""
+"""The slow reference motion under the excitation."""
 
 from __future__ import annotations
 

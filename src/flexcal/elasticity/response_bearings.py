@@ -1,4 +1,4 @@
-"""Whether frequency responses prefer bearings fixed to the parent link, or bearings that turn with the child."""
+"""Comparison of bearing axes fixed to the parent link with axes that turn with the child, from frequency responses."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ CERTAIN = 3.0
 
 @dataclass(frozen=True)
 class ResponseBearings:
-    """What frequency responses say of bearings that tilt `before` and `after` the joint's rotation, from a fit with each.
+    """Comparison of fits with bearings that tilt `before` and `after` the joint's rotation, from frequency responses.
 
     `declared` are those of robot.yaml, None where it has none. `statistic` is Vuong's over clusters of neighbouring lines, positive where
     `before` fits better; `preferred` the clearly better ones, None where both fit about as well.

@@ -1,4 +1,4 @@
-"""Where to start the fit: global searches over the springs, on a cost that is broad where Eq. (26) is narrow."""
+"""Global search for the start of the fit, on a cost with a wide basin."""
 
 from __future__ import annotations
 

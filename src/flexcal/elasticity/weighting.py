@@ -1,4 +1,4 @@
-"""How the complex errors of a measured frequency response are weighed against each other (W of Eq. 26)."""
+"""Weights of the complex errors of a measured frequency response (W of Eq. 26)."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class CovarianceWeighting:
 
 @dataclass(frozen=True)
 class UniformWeighting:
-    """Every element at every line counts the same; the common size is the median variance of the diagonal elements."""
+    """Equal weights of all elements and lines; the common variance is the median of those of the diagonal elements."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
         n = response.response.shape[-1]
@@ -42,7 +42,7 @@ class UniformWeighting:
 
 @dataclass(frozen=True)
 class PaperWeighting:
-    """The paper's: uniform, amplified near poles and zeros of the diagonal elements, the off-diagonal ones held down.
+    """The paper's weights: uniform, amplified near poles and zeros of the diagonal elements, reduced for the others.
 
     The paper says no more than that. Here the error of G_ii is multiplied by up to `emphasis` within about `width` (relative
     frequency) of an extremum of |Ĝ_ii| that stands out by `prominence` (a factor), that of an off-diagonal by `coupling`.

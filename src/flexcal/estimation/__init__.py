@@ -1,4 +1,4 @@
-"""Estimation from whitened residuals: parameters, least squares, uncertainty, identifiability. Knows nothing of robots."""
+"""Estimation from whitened residuals: parameters, least squares, uncertainty, identifiability; independent of robots."""
 
 import lazy_loader
 

@@ -20,7 +20,7 @@ _NOISE_UNKNOWN = 0.1
 
 @dataclass(frozen=True)
 class Dropped:
-    """A parameter that the data cannot tell apart from others: it stays at its start value and the kept ones absorb it.
+    """A parameter that is not identifiable: it keeps its start value and is absorbed by the kept ones.
 
     A kept parameter with (name, coefficient) in `absorbed_by` estimates kept + coefficient · (dropped − its start value),
     all in estimation coordinates. Nothing in `absorbed_by`: the data do not depend on it.

@@ -1,4 +1,4 @@
-"""How far a three-dimensional Gaussian error puts a point away: mean, 95 % quantile and probability of the distance."""
+"""Distance due to a three-dimensional Gaussian error: mean, 95 % quantile and probability."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rows of a residual that belong together."""
+"""Groups of residual rows."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which parameters the data determine, and what absorbed the others."""
+"""Identifiable parameters, and the combinations that absorb the others."""
 
 from __future__ import annotations
 

@@ -76,7 +76,7 @@ class Huber:
 
 @dataclass(frozen=True)
 class Cauchy:
-    """ρ = c²/2 log(1 + s²/c²): gross outliers lose all influence; not convex, so start near or from several starts.
+    """ρ = c²/2 log(1 + s²/c²): gross outliers have no influence; not convex, so start near the solution or from several starts.
 
     `threshold` as for `Huber`; the default is 95 % efficient for Gaussian noise.
     """

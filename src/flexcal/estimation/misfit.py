@@ -1,4 +1,4 @@
-"""What a fit does not explain."""
+"""Description of a misfit."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Misfit:
-    """Where the residual of a fit to frequency responses exceeds what the weights explain.
+    """Pose, band and motor where the residual of a fit to frequency responses exceeds its predicted size.
 
     `reduced_chi2` of all data; `peak` is the largest mean square of the whitened residual over a band from `low_hz` to `high_hz` of one
     pose (its number counts from 1), where 1 is expected; `axis` is the joint whose motor answers there with the largest error. `far` are

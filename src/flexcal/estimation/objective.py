@@ -1,4 +1,4 @@
-"""The cost that is minimised: loss of the residual groups plus prior."""
+"""The objective function: loss of the residual groups plus prior."""
 
 from __future__ import annotations
 

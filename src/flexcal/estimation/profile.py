@@ -1,4 +1,4 @@
-"""The profile likelihood of some parameters."""
+"""Profile likelihood of some parameters."""
 
 from __future__ import annotations
 

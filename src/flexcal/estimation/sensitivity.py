@@ -1,4 +1,4 @@
-"""What a design of experiments consumes."""
+"""Input of the design of experiments."""
 
 from __future__ import annotations
 

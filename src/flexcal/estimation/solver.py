@@ -1,4 +1,4 @@
-"""From a Problem to an Estimate."""
+"""Solution of a `Problem`."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def solve(
     prefer: Sequence[str] = (),
     progress: Callable[[int, float], None] | None = None,
 ) -> Estimate:
-    """Minimise, find what is determined, and say how well.
+    """Minimise a problem, and determine rank and covariance at the optimum.
 
     Levenberg–Marquardt from the parameters' values, or from each row of `starts` (s, p, estimation coordinates): the best
     counts, and the message says how many reached its cost to within 1e-3. Where the rank at the optimum is deficient

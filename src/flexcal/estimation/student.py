@@ -1,4 +1,4 @@
-"""Quantiles of Student's t, without the time that importing SciPy takes: every estimate with intervals needs one."""
+"""Quantiles of Student's t without importing SciPy."""
 
 from __future__ import annotations
 

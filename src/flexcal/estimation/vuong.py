@@ -1,4 +1,4 @@
-"""Which of two models describes the same measurements better, where neither contains the other (Vuong 1989)."""
+"""Vuong's test of two models that are not nested (Vuong 1989)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""RobotModel to files that other programs read."""
+"""Export of `RobotModel` to the file formats of other programs."""
 
 import lazy_loader
 

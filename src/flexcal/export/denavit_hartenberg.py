@@ -1,4 +1,4 @@
-"""Denavit-Hartenberg parameters of the chain of joints that moves a target, from where its axes lie.
+"""Denavit-Hartenberg parameters of the chain of joints that moves a target, from the positions of its axes.
 
 Axis k carries a frame with z along it. Turned by theta and shifted by d along z, its x points to the next axis, whose frame follows:
 

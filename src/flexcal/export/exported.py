@@ -1,4 +1,4 @@
-"""A robot as the text of a file, and the file with what it lost."""
+"""Exported file of a robot, with the error due to terms that the format lacks."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class Rendered:
 
 @dataclass(frozen=True, eq=False)
 class Exported:
-    """The file written, what it cannot say, and remarks on it; `table` is what to show of it."""
+    """The written file, its loss, and remarks; `table` are its rows."""
 
     path: Path
     loss: Loss

@@ -1,4 +1,4 @@
-"""Everything of a calibrated robot in one JSON document, for programs that are not flexcal."""
+"""Complete calibrated robot as one JSON document."""
 
 from __future__ import annotations
 

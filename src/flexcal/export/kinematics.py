@@ -1,4 +1,4 @@
-"""The `kinematics` YAML of Universal Robots' ROS description: where each joint lies in the link before, six numbers a joint.
+"""The `kinematics` YAML of Universal Robots' ROS description: placement of each joint in the previous link.
 
 The description's link frames are those of Denavit and Hartenberg, its first link is the base turned by 180° about z, and the last
 frame is the tool flange. So a row here is Rx(alpha) Tx(a) Ry(beta) Rz(theta) Tz(d) of the modified convention as one placement.

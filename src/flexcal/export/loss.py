@@ -1,4 +1,4 @@
-"""What a file cannot carry of a calibrated robot, and how far the tool is then off: one measure for every format."""
+"""Tool error due to terms that a file format cannot represent."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ToolMap = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Distances:
-    """Mean, 95th percentile and maximum of how far the tool is off, m."""
+    """Mean, 95th percentile and maximum of the tool error, m."""
 
     mean: float
     p95: float
@@ -60,7 +60,7 @@ class Distances:
 
 @dataclass(frozen=True)
 class LostTerm:
-    """A term that a format has no place for, and the tool error where it alone is left out (None: there is no tool)."""
+    """A term that a format cannot represent, and the tool error where it alone is left out (None: there is no tool)."""
 
     name: str
     error: Distances | None

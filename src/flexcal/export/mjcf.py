@@ -1,4 +1,4 @@
-"""RobotModel to MuJoCo: rotors, drive springs and bearings as joints of one kinematic tree.
+"""Conversion of `RobotModel` to MuJoCo: rotors, drive springs and bearings as joints of one kinematic tree.
 
 A joint with springs is up to four hinges on the link's body, outermost first: the motor about the joint axis with the rotor's
 `armature`, the twist of the drive spring about the same axis, the tilts about the bearing's y and x; bearings that are fixed to the

@@ -1,4 +1,4 @@
-"""The MJCF file of a calibrated robot, and where MuJoCo puts its tool at rest."""
+"""The MJCF file of a calibrated robot, and the rest position of its tool in MuJoCo."""
 
 from __future__ import annotations
 

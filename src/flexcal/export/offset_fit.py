@@ -1,4 +1,4 @@
-"""The joint offsets that bring the nominal robot nearest to the real one, for controllers that take nothing else."""
+"""Joint offsets of the nominal robot with the smallest tool error, for controllers that accept nothing else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The table of joint offsets for a controller that corrects nothing else, and its reader."""
+"""The table of joint offsets, and its reader."""
 
 from __future__ import annotations
 

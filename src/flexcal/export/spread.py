@@ -1,4 +1,4 @@
-"""How far the uncertainty of a robot's estimated parameters moves what is computed from it."""
+"""Propagation of the parameter covariance to derived quantities."""
 
 from __future__ import annotations
 

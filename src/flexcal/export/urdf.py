@@ -1,4 +1,4 @@
-"""A calibrated URDF: joint origins and the tool moved to where they were found to be, links with the inertials that were found."""
+"""URDF of a calibrated robot: calibrated joint origins and tool, identified inertials."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""From recordings of multisine experiments to frequency response matrices with their covariances."""
+"""Frequency response matrices with their covariances from recordings of multisine experiments."""
 
 import lazy_loader
 

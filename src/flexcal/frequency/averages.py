@@ -1,4 +1,4 @@
-"""Averages over realisations: from the spectra of R realisations to one frequency response matrix per line.
+"""Averages of R realisations to one frequency response matrix per line.
 
 Wernholt and Moberg 2008 compare them in closed loop, where the torque too is noisy: the logarithmic average is the best,
 H1 the worst (its bias is the ratio of torque noise to torque power). That holds here while the scatter of a single

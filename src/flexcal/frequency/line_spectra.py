@@ -1,4 +1,4 @@
-"""Spectra of recordings: the phasors of motor position and torque at chosen lines, and those bins that hold only noise."""
+"""Spectra of recordings: phasors of motor position and torque at chosen lines, and noise bins."""
 
 from dataclasses import dataclass
 

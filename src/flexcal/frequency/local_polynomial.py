@@ -1,4 +1,4 @@
-"""Robust local polynomial method: a frequency response from few experiments, or from records that never reach a steady state.
+"""Robust local polynomial method: frequency responses from few experiments, or from records with transients.
 
 Pintelon and Schoukens 2012, ch. 7. A transient leaks smoothly over frequency, so near a line it is the polynomial through the bins
 between the lines, which carry nothing else but noise: it is taken out of position and torque alike. What is left over a few lines and
@@ -68,7 +68,7 @@ def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> Loc
     diagonal = np.abs(np.diagonal(r, axis1=-2, axis2=-1))
     if (diagonal.min(-1) < _RANK_TOLERANCE * diagonal.max(-1)).any():
         raise FlexcalError(
-            "the excitation near some line does not tell the inputs of the local polynomial method apart; measure more experiments."
+            "the excitation near some line does not separate the inputs of the local polynomial method; measure more experiments."
         )
     projected = np.swapaxes(q, -1, -2).conj() @ y
     inverse = np.linalg.solve(r, np.broadcast_to(np.eye(unknowns), r.shape))[
@@ -90,7 +90,7 @@ def without_transient(
     """
     if quiet.size < TRANSIENT_BINS:
         raise FlexcalError(
-            f"{quiet.size} bins between the lines are too few to find a transient from; record more periods or lines."
+            f"{quiet.size} bins between the lines are too few to estimate a transient; record more periods or lines."
         )
     first = np.clip(np.searchsorted(quiet, lines) - TRANSIENT_BINS // 2, 0, quiet.size - TRANSIENT_BINS)
     window = quiet[first[:, None] + np.arange(TRANSIENT_BINS)]  # (L, W)
@@ -119,7 +119,7 @@ def local_polynomial_responses(
     """
     if has_reference(plan) and not plan.signs:
         raise FlexcalError(
-            "the local polynomial method cannot tell the reference motion from the response; measure both signs, or without it."
+            "the local polynomial method cannot separate the reference motion from the response; measure both signs, or without it."
         )
     names = axis_names(plan, joint_names)
     for records in by_pose(plan, recordings, keep_whole):

@@ -1,4 +1,4 @@
-"""From recordings in a periodic steady state to spectra: periods averaged, signs subtracted, noise read from empty bins."""
+"""Spectra of recordings in a periodic steady state: mean of periods, difference of signs, noise from empty bins."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What is kept of the recordings of one pose while they stream by: a few spectra of each, and the mean position."""
+"""Spectra and mean positions of the recordings of one pose, collected while they are read."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 
@@ -105,7 +105,7 @@ def by_pose(
     for recording in recordings:
         if recording.label is None:
             raise FlexcalError(
-                f"{recording.name} cannot be told from others; give it its pose, realisation, experiment and sign."
+                f"{recording.name} cannot be assigned; give it its pose, realisation, experiment and sign."
             )
         if recording.label.pose >= len(plan.poses):
             raise FlexcalError(f"{recording.name} is not in the plan; remove it.")

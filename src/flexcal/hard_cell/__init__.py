@@ -1,4 +1,4 @@
-"""A virtual cell that is not made from the model of the identification: its robot errs in ways which that model cannot follow."""
+"""A virtual cell that is independent of the identified model, with effects that the model lacks."""
 
 import lazy_loader
 

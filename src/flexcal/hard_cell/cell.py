@@ -1,4 +1,4 @@
-"""The hard cell: excited and measured like the virtual one, but made from its own description and with errors that no model has."""
+"""The hard cell: the interface of the virtual cell, with an independently implemented robot."""
 
 from __future__ import annotations
 

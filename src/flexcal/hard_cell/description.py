@@ -1,4 +1,4 @@
-"""The hard cell's own description of an arm: plain numbers out of URDF and robot.yaml, without `RobotModel`."""
+"""Description of an arm from URDF and robot.yaml, independent of `RobotModel`."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The true robot of the hard cell, drawn around its description."""
+"""True parameters of the hard cell's robot, drawn about its description."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ WARMING, EXPANSION = 6.0, 2.3e-5  # K at most, 1/K (aluminium)
 
 @dataclass(frozen=True, eq=False)
 class HardRobot:
-    """A true arm with what no description has; n joints, SI, at the joint.
+    """True parameters of an arm; n joints, SI, at the joint.
 
     `bearings_before`: the bearing's axes are fixed to the parent, before the joint's rotation; else they turn with it. `hardening` (n, 3)
     1/rad²; `hysteresis` (n,) half width of the drive's loop, rad; `gap` (n,) half, rad; `stribeck`, `stribeck_velocity`, `per_load`,

@@ -1,4 +1,4 @@
-"""Feed-forward of the hard cell's controller: the rigid robot that the files describe, which is not the one that stands there."""
+"""Feed-forward of the hard cell's controller: the rigid robot of the files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the hard cell records of multisines and of exciting trajectories."""
+"""Recordings of the hard cell: multisines and exciting trajectories."""
 
 from __future__ import annotations
 

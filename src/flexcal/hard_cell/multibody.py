@@ -1,4 +1,4 @@
-"""A described arm as MuJoCo's bodies and hinges, written as XML."""
+"""The arm as MuJoCo bodies and hinges, written as XML."""
 
 from __future__ import annotations
 

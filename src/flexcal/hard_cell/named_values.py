@@ -1,4 +1,4 @@
-"""What of a hard robot has a name in the identified model."""
+"""True parameters of a hard robot that have a name in the identified model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Poses of the hard cell's robot as encoders, torques and a laser tracker see them, and as they truly are."""
+"""Measured poses of the hard cell: true values, encoder, torque and laser tracker readings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The arm of the hard cell standing still: every spring wound up by what gravity asks of it."""
+"""Static equilibrium of the hard cell's arm."""
 
 from __future__ import annotations
 
@@ -76,5 +76,5 @@ def stand(
             held = arm.gravity(angles)
             return Standing(angles, held[motor], arm.point)
     raise FlexcalError(
-        "the hard cell's robot finds no rest: gravity is too strong for its springs; check the stiffness values."
+        "the hard cell's robot has no stable equilibrium: its springs are too soft for gravity; check the stiffness values."
     )

@@ -1,4 +1,4 @@
-"""Files of other programs: what their columns are, in which units, and whether that can be true of this robot."""
+"""Files of other programs: meaning and units of their columns, and a plausibility check with the robot."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""What the columns of a foreign table are: by the joints' names, the usual words and numbers, their order where there are no names."""
+"""Recognition of the columns of a foreign table by joint names, usual words and numbers, or their order."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class LeftOut:
 
 @dataclass(frozen=True)
 class Guess:
-    """What was recognised, by quantity, texts such as `target` by their name, and all other columns."""
+    """Recognised columns by quantity, texts such as `target` by their name, and all other columns."""
 
     placed: Mapping[str, PlacedColumns]
     texts: Mapping[str, str]
@@ -40,7 +40,7 @@ class Guess:
 
 
 def reasons_of(left_out: Sequence[LeftOut]) -> list[str]:
-    """What was left out and why, columns with the same reason together."""
+    """Columns that were left out, grouped by reason."""
     by_reason: dict[str, list[str]] = {}
     for left in left_out:
         by_reason.setdefault(left.why, []).append(left.column)
@@ -141,7 +141,7 @@ def _by_order(foreign: ForeignTable, model: RobotModel) -> Guess:
             placed["xyz"] = place(foreign, model, "xyz", tuple(rest[n:]), "their order")
     if "q" not in placed:
         placed.clear()
-    reasons = dict.fromkeys(names, "the file has no header, and their number does not tell")
+    reasons = dict.fromkeys(names, "the file has no header, and their number is ambiguous")
     return _guess(foreign, placed, {}, reasons)
 
 
@@ -167,7 +167,7 @@ def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, 
         whole = sorted((rest for rest, axes in of_it.items() if set(axes) == set(wanted)), key=rank)
         if len(whole) > 1 and rank(whole[0]) == rank(whole[1]):
             tied = [of_it[rest][wanted[0]] for rest in whole]
-            why = f"{' and '.join(tied)} begin what could both be {quantity}: say which with --map"
+            why = f"{' and '.join(tied)} could both begin {quantity}: say which with --map"
             reasons |= {column: why for rest in whole for column in of_it[rest].values()}
         elif whole:
             found[quantity] = tuple(of_it[whole[0]][axis] for axis in wanted)

@@ -1,4 +1,4 @@
-"""What the name of a column says: words, a number, a unit."""
+"""Words, numbers and units in column names."""
 
 from __future__ import annotations
 

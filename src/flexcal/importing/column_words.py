@@ -1,4 +1,4 @@
-"""The words by which people name columns."""
+"""Words used in column names."""
 
 from __future__ import annotations
 

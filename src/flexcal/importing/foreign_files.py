@@ -1,4 +1,4 @@
-"""Which reader a file needs, by its name."""
+"""Choice of the reader of a file by its name."""
 
 from __future__ import annotations
 
@@ -59,4 +59,4 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
 
         return read_parquet(path)
     known = ", ".join((*_TEXT, *_EXCEL[:2], ".mat", ".parquet", _UFF[0], *_ROS))
-    raise InputError(f"{path}: files that end in '{suffix}' are not understood; known are {known}.")
+    raise InputError(f"{path}: files that end in '{suffix}' are not supported; supported are {known}.")

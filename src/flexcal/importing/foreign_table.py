@@ -12,7 +12,7 @@ from flexcal.data.table import Table
 
 @dataclass(frozen=True, eq=False)
 class ForeignTable:
-    """The columns of a file as they stand there.
+    """The columns of a file, unchanged.
 
     table: numbers (N,), NaN where a cell is empty or holds something else, and texts (N,). units: what the file says of columns beside
     their names, as in a row under the header. named: False where there is no header, so that the columns are called c1, c2, …

@@ -1,4 +1,4 @@
-"""Where a table begins in a grid of cells: notes, names, units, then rows of numbers."""
+"""Detection of the header in a grid of cells: notes, names, units, then rows of numbers."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def find_header(path: Path, rows: Sequence[Sequence[str]], width: int, row_word:
     twice = [name for k, name in enumerate(names) if name in names[:k]]
     if twice:
         raise InputError(f"{place}: the column '{twice[0]}' stands twice; rename or remove one.")
-    notes = (f"what precedes the header in {row_word} {at + 1} was passed over",) if at > above[0] else ()
+    notes = (f"what precedes the header in {row_word} {at + 1} was skipped",) if at > above[0] else ()
     return Header(names, units, first, True, notes)
 
 

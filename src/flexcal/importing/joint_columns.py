@@ -1,4 +1,4 @@
-"""Columns of which there is one a joint: by the joints' names in the URDF, or by words and numbers."""
+"""Columns with one entry per joint: by the URDF's joint names, or by words and numbers."""
 
 from __future__ import annotations
 
@@ -76,7 +76,7 @@ def _best(
             continue
         if len(whole) > 1 and order[whole[0]] == order[whole[1]]:
             tied = [of_it[words][0] for words in whole if order[words] == order[whole[0]]]
-            why = f"{' and '.join(tied)} begin what could both be {quantity}: say which with --map"
+            why = f"{' and '.join(tied)} could both begin {quantity}: say which with --map"
             reasons |= {column: why for words in whole for column in of_it[words].values()}
             continue
         for words in whole[1:]:

@@ -1,4 +1,4 @@
-"""`--map q1=-J1[deg]+90 x=X[mm]`: what the user says of columns, over what was guessed."""
+"""The option `--map q1=-J1[deg]+90 x=X[mm]`, which overrides recognised columns."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _UNIT = re.compile(r"^(.*?)\s*\[([^\]]*)\]$")
 
 
 def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: RobotModel) -> Guess:
-    """The guess with what --map says in its place.
+    """Recognised columns with those of --map in their place.
 
     Each entry is NAME=COLUMN, where NAME is flexcal's (q1, x, t, tau1, pose …); before the column may stand a sign or `factor*`, behind
     it a unit in brackets and an offset in that unit. NAME=none takes a guess back. Raises `InputError` that names the entry where it
@@ -134,7 +134,9 @@ def _said(
     """What was said, and what was guessed of the rest; a unit that was not said is that of the name, else the guessed one."""
     missing = [name for i, name in enumerate(names) if i not in entries]
     if missing and guessed is None:
-        raise InputError(f"--map says nothing of {', '.join(missing)}, and it was not guessed; map it too.")
+        raise InputError(
+            f"--map does not give {', '.join(missing)}, which was not recognised either; map it too."
+        )
     found = []
     for i in range(len(names)):
         if i in entries:

@@ -23,7 +23,7 @@ def read_mat(path: Path) -> ForeignTable:
     lengths = Counter(length for value in variables.values() for length in set(value.shape) if length > 1)
     if not lengths:
         raise InputError(
-            f"{path}: it holds no columns of numbers; a table object is no such: save its columns."
+            f"{path}: it holds no columns of numbers; table objects are not supported: save their columns."
         )
     most = max(lengths.values())
     rows = max(length for length, count in lengths.items() if count == most)

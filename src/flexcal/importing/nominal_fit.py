@@ -1,4 +1,4 @@
-"""Whether joint positions and measured points can belong to this robot, and if not, what would make them."""
+"""Consistency of joint positions and measured points with the nominal robot, and corrections that would explain a misfit."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _ALIKE = 1.5
 
 @dataclass(frozen=True)
 class Misfit:
-    """By how much (rms, m) the registered nominal robot misses the points.
+    """Residuals (rms, m) of the best-fit registered nominal robot.
 
     point: its name; declared: where it is in its frame (m); moved: where it would have to be to fit best, and `moved_rms` what that leaves.
     proposal: what would explain a misfit, in words, and `options` to say so with --map; empty where nothing simple does, or none is needed.
@@ -58,7 +58,7 @@ class Misfit:
 def check_nominal(
     model: RobotModel, q: np.ndarray, xyz: np.ndarray, placed: PlacedColumns, *, point: str | None = None
 ) -> Misfit | None:
-    """Lay the nominal robot at `q` (N, n) rad or m through points `xyz` (N, 3), m, of one station and target.
+    """Register the nominal robot at `q` (N, n) rad or m with points `xyz` (N, 3), m, of one station and target.
 
     Where that misses by more than a hundredth of the reach, joints counted the other way or from another zero, another order of the
     columns `placed` as q, and points in a left-handed frame are tried. None with fewer than six rows: anything fits then.
@@ -181,18 +181,18 @@ def _said(model: RobotModel, placed: PlacedColumns, change: _Change) -> dict[str
     words, options = [], []
     if change.mirrored:
         words.append(
-            "the points are in a left-handed frame: one of x, y, z counts the other way, or two are exchanged"
+            "the points are in a left-handed frame: one of x, y, z has the opposite sign, or two are exchanged"
         )
     if change.order != tuple(range(model.n)):
         words.append(
-            f"the joints seem to stand in another order: {', '.join(placed.columns[i] for i in change.order)}"
+            f"the joints seem to be in another order: {', '.join(placed.columns[i] for i in change.order)}"
         )
     for i, joint in enumerate(model.joints):
         sign, zero, source = change.signs[i], change.zeros[i], change.order[i]
         if sign < 0:
-            words.append(f"{joint.name} seems to be counted the other way")
+            words.append(f"{joint.name} seems to have the opposite sign")
         if zero:
-            words.append(f"{joint.name} seems to be {abs(zero) / DEGREE:.0f} degrees from the URDF's zero")
+            words.append(f"{joint.name} seems to be {abs(zero) / DEGREE:.0f} degrees off the URDF's zero")
         if sign < 0 or zero or source != i:
             options.append(f"q{i + 1}={_source(placed, source, sign, zero)}")
     return {"proposal": "; ".join(words), "options": tuple(options)}

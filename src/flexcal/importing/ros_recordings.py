@@ -150,7 +150,7 @@ def _poses(path: Path, states: _Stream, points: _Stream, notes: list[str]) -> Fo
     q, xyz, sigma, without = points_at_rest(t, states.fields["position"], at, points.fields["xyz"])
     if not len(q):
         raise InputError(
-            f"{path}: while points come on {points.topic}, the robot never stands still for half a second; let it rest in every pose."
+            f"{path}: while there are points on {points.topic}, the robot never stands still for half a second; let it rest in every pose."
         )
     columns: dict[str, np.ndarray] = {"pose": np.arange(1.0, len(q) + 1)}
     units: dict[str, str] = {}

@@ -1,4 +1,4 @@
-"""What Universal Robots' controllers call what they record over their real-time interface: actual_q_0, target_moment_0 and so on."""
+"""Column names of Universal Robots' real-time interface: actual_q_0, target_moment_0 and so on."""
 
 from __future__ import annotations
 
@@ -22,10 +22,10 @@ _OF_JOINTS = (("dq", "actual_qd", "rad/s"), ("tau", "actual_current_as_torque", 
 _REASONS = {
     "actual_current": "currents need a gain in N m/A: --map 'tau1=GAIN*actual_current_0[A]' and so on",
     "actual_current_window": "bounds of the currents",
-    "joint_control_output": "currents that the controller wanted",
-    "joint_temperatures": "one a joint, where a file has one temperature",
-    "target_current": "the controller's model computes them, so they are no measured currents",
-    "target_moment": "the controller's model computes them, so they are no measured torques",
+    "joint_control_output": "currents commanded by the controller",
+    "joint_temperatures": "one per joint, but a file has one temperature",
+    "target_current": "computed by the controller's model, not measured",
+    "target_moment": "computed by the controller's model, not measured",
     "target_q": "what the controller wanted",
     "target_qd": "what the controller wanted",
     "target_qdd": "what the controller wanted",
@@ -35,7 +35,7 @@ _REASONS = {
     "actual_TCP_force": "of the tool, not of the joints",
 }
 _TURN = "the rotation vector of the tool; calibrate takes points alone"
-_IN_LOG = "the tool as the controller computes it from the joints: no part of a log, and not measured"
+_IN_LOG = "tool pose computed by the controller from the joints, not measured"
 _SLOWEST = 1.1
 """s: a log has a sample a second or more; what was recorded more rarely are poses."""
 

@@ -1,4 +1,4 @@
-"""Poses out of a recording: where the robot stood still, its joints and the point that was measured meanwhile."""
+"""Poses from a recording: mean joint positions and measured points at standstill."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Times that stand as texts: date and time of day, or time of day alone, as seconds from the first."""
+"""Conversion of time stamps in text form to seconds from the first."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""URDF and robot.yaml to RobotModel, and its forward maps, each with exact derivatives."""
+"""The robot model from URDF and robot.yaml, and its forward maps with exact derivatives."""
 
 import lazy_loader
 

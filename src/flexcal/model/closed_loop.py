@@ -1,4 +1,4 @@
-"""The linearised robot under position control: how a torque added to the controller's moves it and strains its drives."""
+"""The linearised robot under position control: motion and drive torques due to an added torque."""
 
 from __future__ import annotations
 

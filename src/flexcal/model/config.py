@@ -1,4 +1,4 @@
-"""What a user writes in robot.yaml, one frozen dataclass a block (FORMATS: robot.yaml)."""
+"""Content of robot.yaml, one frozen dataclass per block (FORMATS: robot.yaml)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is known of a robot before anything is identified: one definition for all identifications."""
+"""Prior knowledge of a robot, common to all identifications."""
 
 from __future__ import annotations
 

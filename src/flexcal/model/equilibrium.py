@@ -85,7 +85,7 @@ def _solve(
         ) from problem
     if step > 1e-9:
         raise FlexcalError(
-            f"{model.name}: no rest position was found (last step {step:.1e} rad); check the stiffnesses."
+            f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses."
         )
     return deflection, compliance, regressor, coupling
 

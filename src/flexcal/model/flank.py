@@ -1,4 +1,4 @@
-"""On which flank of its backlash gravity presses a joint, and how surely: the one rule for choosing poses and for judging them."""
+"""Flank of a backlash under gravity, and its certainty."""
 
 from __future__ import annotations
 

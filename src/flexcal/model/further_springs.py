@@ -1,4 +1,4 @@
-"""Drive springs of joints that robot.yaml holds rigid."""
+"""Drive springs of joints that robot.yaml declares rigid."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A robot that holds a body in a frame which robot.yaml need not name beforehand."""
+"""A robot with a payload in any URDF frame."""
 
 from __future__ import annotations
 

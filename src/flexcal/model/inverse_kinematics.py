@@ -1,4 +1,4 @@
-"""Which joint positions bring a target to a point: damped Newton steps (Wampler 1986), a batch at once."""
+"""Inverse kinematics of points: damped Newton steps (Wampler 1986), for batches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The box of joint configurations that a robot's limits leave."""
+"""The box of joint configurations within a robot's limits."""
 
 from __future__ import annotations
 

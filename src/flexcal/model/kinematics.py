@@ -1,4 +1,4 @@
-"""Where a target point is, with every geometric error and deflection, and the exact derivatives (Eqs. 1, 15-17)."""
+"""Position of a target with all geometric errors and deflections, and its exact derivatives (Eqs. 1, 15-17)."""
 
 from __future__ import annotations
 

@@ -200,7 +200,7 @@ def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndar
     if key != "ratio" and min(values) < 0:
         raise file.error(("drives", key), f"{key} must not be negative, but is {min(values):g}.")
     if key == "ratio" and 0 in values:
-        raise file.error(("drives", key), "a ratio of 0 turns nothing; give motor turns per joint turn.")
+        raise file.error(("drives", key), "a ratio of 0 is not possible; give motor turns per joint turn.")
     return np.array(values)
 
 

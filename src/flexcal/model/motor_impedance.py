@@ -1,4 +1,4 @@
-"""How impedances between motor and ground change a frequency response, and changes that vary over frequency."""
+"""Effect of impedances between motor and ground on a frequency response."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The one table of parameter names (FORMATS): where in a `RobotModel` each named value lives, and its unit."""
+"""Table of parameter names (FORMATS): attribute of `RobotModel` and unit of each."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where joints and points lie in the links that carry them, geometric errors included: the chain that every exporter writes down.
+"""Placements of joints and points in their links, geometric errors included.
 
 One joint, parent to child (Eqs. 15-17; docs: the full chain of one axis): length error of the parent, nominal placement,
 misalignment_2, misalignment_1, the joint's motion with its offset; bearing tilts follow, or come before the motion where robot.yaml

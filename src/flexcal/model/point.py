@@ -1,4 +1,4 @@
-"""What the instrument sees, and what the robot holds."""
+"""Measured points and payload."""
 
 from __future__ import annotations
 

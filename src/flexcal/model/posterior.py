@@ -1,4 +1,4 @@
-"""The joint covariance that a robot carries of its estimated values."""
+"""Joint covariance of a robot's estimated values."""
 
 from __future__ import annotations
 

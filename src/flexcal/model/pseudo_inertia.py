@@ -1,4 +1,4 @@
-"""The pseudo-inertia of a link, which is positive definite for every body that can be built (Wensing, Kim & Slotine 2018)."""
+"""The pseudo-inertia of a link, positive definite for physically consistent inertials (Wensing, Kim & Slotine 2018)."""
 
 from __future__ import annotations
 

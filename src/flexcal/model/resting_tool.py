@@ -1,4 +1,4 @@
-"""Where the tool of the deflected, calibrated robot is when its motors stand still: the forward map of calibration and compensation."""
+"""Position of the tool of the deflected, calibrated robot at rest: the forward map of calibration and compensation."""
 
 from __future__ import annotations
 

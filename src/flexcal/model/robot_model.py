@@ -1,4 +1,4 @@
-"""The robot as it is known: nominal from robot.yaml and URDF, then changed by estimates."""
+"""The robot model: nominal from robot.yaml and URDF, updated by estimates."""
 
 from __future__ import annotations
 

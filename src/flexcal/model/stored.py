@@ -1,4 +1,4 @@
-"""What identifications left on disk, put into a robot."""
+"""Application of stored estimates to a robot."""
 
 from __future__ import annotations
 
@@ -99,8 +99,8 @@ def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
     broken = [link for link in links if not is_body(estimate.values, link)]
     if broken:
         raise InputError(
-            f"{path}: no body can have the inertials that the block 'dynamics' gives {', '.join(broken)}, and springs need bodies; "
-            "run 'flexcal identify dynamics' with --estimator sdp."
+            f"{path}: the inertials in the block 'dynamics' are not physically consistent for {', '.join(broken)}, as elastic "
+            "joints require; run 'flexcal identify dynamics' with --estimator sdp."
         )
 
 

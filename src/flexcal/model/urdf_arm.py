@@ -1,4 +1,4 @@
-"""Which joints of a URDF make the arm, which only stand on it, and where its tool sits: read from the tree of links alone."""
+"""The arm in a URDF: its joints, locked joints and tool frame, from the tree of links."""
 
 from __future__ import annotations
 

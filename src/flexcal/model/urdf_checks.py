@@ -1,4 +1,4 @@
-"""Whether a URDF says all that is needed, in numbers: parsers drop an inertial they cannot read, and take an axis of zeros."""
+"""Checks of the completeness and numbers of a URDF, which parsers do not make."""
 
 from __future__ import annotations
 
@@ -50,7 +50,11 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
         carried[name], parents[child] = child, parent
     roots = [name for name in links if name not in parents]
     if len(roots) != 1:
-        what = f"the links {', '.join(roots)} hang on no joint" if roots else "every link hangs on a joint"
+        what = (
+            f"the links {', '.join(roots)} are not attached to a joint"
+            if roots
+            else "every link hangs on a joint"
+        )
         raise robot.error(f"{what}, but a robot has one base; correct the joints' parents and children.")
     for name, link in links.items():
         steps, at = 0, name
@@ -133,9 +137,7 @@ def _check_joint(joint: Element, name: str, links: dict[str, Element]) -> tuple[
             )
         lower, upper = (limit.numbers(key, 1, owner)[0] for key in ("lower", "upper"))
         if not lower < upper:
-            raise limit.error(
-                f"the limits of {owner}, {lower:g} to {upper:g}, leave it no room; correct them."
-            )
+            raise limit.error(f"the limits of {owner}, {lower:g} to {upper:g}, leave no range; correct them.")
     if limit is not None:
         for key in ("effort", "velocity"):
             if limit.numbers(key, 1, owner)[0] < 0:

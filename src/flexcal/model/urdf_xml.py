@@ -1,4 +1,4 @@
-"""The elements of a URDF with the lines they stand on, which messages need and no URDF parser keeps."""
+"""The elements of a URDF with their line numbers."""
 
 from __future__ import annotations
 

@@ -93,7 +93,7 @@ def calibration_page(study: CalibrationStudy) -> Page:
 
 
 def calibration_verdict(study: CalibrationStudy) -> Verdict:
-    """How accurate it was, how accurate it is at the measured poses, and whether that can be trusted."""
+    """Accuracy before and after calibration at the measured poses, and the verdict."""
     before, after = study.points.before, study.points.statistics(CALIBRATED)
     checks = calibration_checks(study.results, study.estimate, study.points)
     trust = Trust(checks)

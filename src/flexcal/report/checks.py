@@ -1,4 +1,4 @@
-"""The questions that decide whether a calibration can be trusted, each answered from the results."""
+"""The checks behind the verdict on a calibration, from its results."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def check_claimed_uncertainty(prediction: Mapping[str, Any] | None) -> Check:
     if prediction is None:
         return Check(
             question,
-            "Cannot be judged: nothing was verified that a prediction could be compared with.",
+            "Cannot be judged: there are no verification poses, or no predicted uncertainty.",
             "unknown",
         )
     ratio, low, high = (prediction[key] for key in ("ratio", "ratio_low", "ratio_high"))
@@ -86,7 +86,7 @@ def check_claimed_uncertainty(prediction: Mapping[str, Any] | None) -> Check:
             "unknown",
         )
     if ratio > MISSING and low > 1:
-        return Check(question, f"No, they are larger: the model lacks something. {numbers}", "bad")
+        return Check(question, f"No, they are much larger: the model lacks a term. {numbers}", "bad")
     if ratio > CHANCE or low > 1:
         return Check(question, f"No, they are larger. {numbers}", "care")
     if prediction["freedom"] < FEW_NUMBERS:
@@ -104,20 +104,20 @@ def check_error_budget(
     """Whether the residuals of the geometry are noise of instrument and robot; `variances` is that of results.json."""
     question = "Are the residuals noise of instrument and robot?"
     if estimate.status != "converged":
-        return Check(question, f"The fit did not end well: {estimate.message}.", "bad")
+        return Check(question, f"The fit did not converge: {estimate.message}.", "bad")
     instrument, stated = variances["instrument_mm"], variances["stated_mm"]
     robot, model = (float(variances[key] or 0.0) for key in ("robot_mm", "model_mm"))
     said = "" if instrument is None else f"instrument {instrument:.3f}, "
-    with_ = " (instrument included, for no sigma is stated)" if instrument is None else ""
+    with_ = " (instrument included, because no sigma is stated)" if instrument is None else ""
     answer = (
         f"Standard deviation of a coordinate: {said}robot {robot:.3f}{with_}, model error {model:.3f} mm."
     )
     if hardly_fits:
-        return Check(question, f"No: these data hardly fit this robot. {answer}", "bad")
+        return Check(question, f"No: the data do not fit this robot. {answer}", "bad")
     if model > np.hypot(instrument or 0.0, robot):
         return Check(
             question,
-            f"No: systematic errors that the model lacks are larger than the noise. {answer}",
+            f"No: systematic model errors are larger than the noise. {answer}",
             "care",
         )
     if instrument is not None and stated is not None and instrument < OVERSTATED * stated:
@@ -126,19 +126,15 @@ def check_error_budget(
 
 
 def check_residual(question: str, estimate: Estimate) -> Check:
-    """Whether what the fit leaves is what the measurement noise explains."""
+    """Whether the measurement noise explains the residuals."""
     if estimate.status != "converged":
-        return Check(question, f"The fit did not end well: {estimate.message}.", "bad")
+        return Check(question, f"The fit did not converge: {estimate.message}.", "bad")
     value = estimate.reduced_chi2
-    answer = (
-        f"χ² per degree of freedom is {value:.2f}; one means that noise explains everything that is left."
-    )
+    answer = f"χ² per degree of freedom is {value:.2f}; one means that noise explains the residuals."
     if not np.isfinite(value) or value > 4:
-        return Check(
-            question, f"{answer} The model misses something that is much larger than the noise.", "bad"
-        )
+        return Check(question, f"{answer} Model errors are much larger than the noise.", "bad")
     if estimate.unexplained:
-        return Check(question, f"{answer} Something small is missing from the model.", "care")
+        return Check(question, f"{answer} There are small model errors.", "care")
     if value < 0.4:
         return Check(question, f"{answer} The stated noise is too large.", "care")
     return Check(question, answer, "good")
@@ -157,7 +153,7 @@ def check_drift(drift: Mapping[str, Any]) -> Check:
 
 
 def check_rank(parameters: int, rank: int, gap: float) -> Check:
-    """Whether the parameters that the poses determine stand clear, by `gap` decades, of those that they do not."""
+    """Whether the rank is unambiguous: a `gap` in decades between the parameters that are determined and the others."""
     question = "Is the rank of the identification clear?"
     dropped = parameters - rank
     answer = f"{rank} of {parameters} geometric parameters are determined; "
@@ -186,15 +182,15 @@ def check_springs(estimate: Estimate, stiffness: Sequence[str], damping: Sequenc
 
 
 def check_flanks(verification: Verification) -> Check:
-    """Whether it is certain at every pose on which side of its backlash a joint rests."""
+    """Whether the flank of every backlash is certain at every pose."""
     question = "Is the flank of the backlash certain at every pose?"
     unclear, all_ = int(verification.ambiguous.sum()), len(verification.ambiguous)
     if not unclear:
         return Check(question, f"Yes, at all {all_} verification poses.", "good")
     largest = float(np.linalg.norm(verification.errors[verification.ambiguous], axis=1).max())
     answer = (
-        f"Not at {unclear} of {all_}: gravity hardly loads the joint there, and the worst of them is "
-        f"{millimetres(largest)} mm off; elsewhere the worst is {millimetres(verification.unambiguous.max)} mm."
+        f"Not at {unclear} of {all_}: gravity hardly loads the joint there. The largest error at these poses is "
+        f"{millimetres(largest)} mm, and {millimetres(verification.unambiguous.max)} mm at the others."
     )
     return Check(question, answer, "good" if unclear <= 0.1 * all_ else "care")
 
@@ -210,11 +206,11 @@ def check_truth(covered: int, total: int) -> Check:
 
 
 def check_left_out(mean: float, left_out: tuple[float, float] | None, share: float) -> Check:
-    """Whether cross-validation errors are as small as those of the fit let expect.
+    """Whether cross-validation errors are as small as expected from those of the fit.
 
-    `mean` is the mean error (m) of the fit, `left_out` those of poses left out by order and by place, `share` the number of parameters
-    over that of measured coordinates. A fit of p parameters to n numbers of variance σ² leaves σ² (1 − p/n) and predicts others with
-    σ² (1 + p/n), to first order.
+    `mean` is the mean error (m) of the fit, `left_out` those of poses left out by order and by region, `share` the number of parameters
+    over that of measured coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and
+    prediction errors of variance σ² (1 + p/n), to first order.
     """
     question = "Are poses left out of the fit predicted?"
     if left_out is None or share >= 1:
@@ -225,30 +221,28 @@ def check_left_out(mean: float, left_out: tuple[float, float] | None, share: flo
         )
     expected = float(np.sqrt((1 + share) / (1 - share))) * mean
     answer = (
-        f"In cross-validation the mean error is {millimetres(max(left_out))} mm; {millimetres(mean)} mm in the fit let "
-        f"{millimetres(expected)} mm expect."
+        f"In cross-validation the mean error is {millimetres(max(left_out))} mm; expected from {millimetres(mean)} mm in the fit are "
+        f"{millimetres(expected)} mm."
     )
     if max(left_out) > CHANCE * expected:
         return Check(
             question,
-            f"{answer} That is {max(left_out) / expected:.2f} times as much: the model overfits or lacks a term.",
+            f"{answer} It is {max(left_out) / expected:.2f} times as large: the model overfits or lacks a term.",
             "care",
         )
     return Check(question, answer, "good")
 
 
 def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
-    """Whether single measurements stand out: so many `outliers` of a robust loss, or the worst of the errors."""
+    """Whether there are outliers: the number of `outliers` of a robust loss, or the largest error relative to P90."""
     question = "Are there outliers?"
     if outliers:
-        answer = (
-            f"{outliers} of {fit.poses} got hardly any weight from the robust loss; they are listed below."
-        )
+        answer = f"{outliers} of {fit.poses} points have a weight below 0.2 in the robust loss; they are listed below."
         return Check(question, answer, "good" if outliers <= 0.02 * fit.poses else "care")
     if fit.max > 4 * fit.p90:
         return Check(
             question,
-            f"The worst, {millimetres(fit.max)} mm, is more than four times P90; check this measurement, or fit with "
+            f"The largest error, {millimetres(fit.max)} mm, is more than four times P90; check this measurement, or fit with "
             "--loss cauchy.",
             "care",
         )

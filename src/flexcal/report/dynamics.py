@@ -31,7 +31,7 @@ _HEADLINES: dict[Status, str] = {
     "good": "Identified, and the torques can be trusted",
     "care": "Identified, with reservations: read the checks below before relying on it",
     "bad": "Do not rely on these dynamics yet",
-    "unknown": "Identified; torques of other motions were not checked",
+    "unknown": "Identified; torques of other motions were not validated",
 }
 
 
@@ -48,7 +48,7 @@ class DynamicsStudy:
 
 
 def held_out(results: Mapping[str, Any]) -> str:
-    """What was kept out of the fit, in words; empty for nothing."""
+    """The held-out data in words; empty for none."""
     found = results.get("hold_out", {})
     if found.get("logs"):
         return " and ".join(PurePath(log).name for log in found["logs"])
@@ -95,7 +95,7 @@ def dynamics_page(study: DynamicsStudy) -> Page:
 
 
 def dynamics_verdict(study: DynamicsStudy) -> Verdict:
-    """How well torques are predicted, what is determined, and whether that can be trusted."""
+    """Torque error, number of determined base parameters, and the verdict."""
     results, checks = study.results, dynamics_checks(study.results)
     error, base = results["error_percent"], results["base_parameters"]
     trust = Trust(checks)
@@ -114,8 +114,8 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
             "How many base parameters are determined?",
             f"{results['rank']} of {len(base)}",
             "",
-            f"{len(results['essential_parameters']['parameters'])} of them are essential. A robot with viscous and Coulomb friction and "
-            f"an offset alone would have {results['structural_rank']}.",
+            f"{len(results['essential_parameters']['parameters'])} of them are essential. With viscous and Coulomb friction and "
+            f"offset alone the rank would be {results['structural_rank']}.",
         ),
         trust.fact(),
     )

@@ -1,4 +1,4 @@
-"""The questions that decide whether identified dynamics can be trusted, each answered from results.json."""
+"""The checks behind the verdict on identified dynamics, from results.json."""
 
 from __future__ import annotations
 
@@ -9,11 +9,11 @@ from flexcal.report.notation import significant
 from flexcal.report.page import Check
 
 MUCH_WORSE = 1.5
-"""Error where the fit did not look over that in the fit, from which the fit has learnt its own recordings."""
+"""Held-out error over that in the fit, above which the model overfits or friction has changed."""
 LARGE, TOO_LARGE = 10.0, 30.0
-"""Per cent of the norm of the torques from which an error is a lot, and from which the torques are not predicted."""
+"""Relative torque errors, per cent, above which the prediction is poor, and above which it fails."""
 JOINT_LARGE = 25.0
-"""Per cent of the norm of its own torques from which a joint is predicted badly; small torques are mostly friction."""
+"""Relative torque error of a joint, per cent, above which it is predicted poorly; small torques are mostly friction."""
 _SHOWN = 3
 
 
@@ -32,7 +32,7 @@ def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
         "The friction terms were chosen without these data."
     )
     if unseen > TOO_LARGE:
-        return Check(question, f"{answer} That is too large: the model does not hold there.", "bad")
+        return Check(question, f"{answer} That is too large: the model is not valid there.", "bad")
     if unseen > MUCH_WORSE * train:
         return Check(
             question, f"{answer} That is much larger: friction changed, or the model overfits.", "care"
@@ -43,14 +43,12 @@ def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
 
 
 def check_joints(per_joint: Mapping[str, float]) -> Check:
-    """Whether every joint by itself is predicted."""
+    """Whether the torques of every single joint are predicted."""
     question = "Is every joint predicted?"
     worst = max(per_joint, key=lambda joint: per_joint[joint])
     answer = f"The worst is {worst}: its relative torque error is {significant(per_joint[worst], 3)} %."
     if per_joint[worst] > JOINT_LARGE:
-        return Check(
-            question, f"{answer} Its torques are small, or its friction model does not hold.", "care"
-        )
+        return Check(question, f"{answer} Its torques are small, or its friction model is wrong.", "care")
     return Check(question, answer, "good")
 
 
@@ -71,7 +69,7 @@ def check_base(results: Mapping[str, Any]) -> Check:
 
 
 def check_bodies(bodiless: list[str]) -> Check:
-    """Whether every link has inertials that a body can have."""
+    """Whether the inertials of every link are physically consistent."""
     question = "Are the inertials of every link physically consistent?"
     if not bodiless:
         return Check(question, "Yes: all masses and pseudo-inertias are positive.", "good")
@@ -84,7 +82,7 @@ def check_bodies(bodiless: list[str]) -> Check:
 
 
 def check_shown(remarks: list[str]) -> Check:
-    """Whether the recordings show every declared term of the drives."""
+    """Whether the recordings determine every declared parameter of the drives."""
     question = "Do the recordings determine every drive parameter?"
     if not remarks:
         return Check(question, "Yes.", "good")

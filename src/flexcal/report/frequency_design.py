@@ -1,4 +1,4 @@
-"""The page beside a plan of frequency experiments (`flexcal design frequency`): poses, amplitudes, and what they will tell."""
+"""The page of a plan of frequency experiments (`flexcal design frequency`): poses, amplitudes, predicted standard deviations."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flexcal.report.render import write_page
 from flexcal.report.sections.provenance import provenance_section
 
 LARGE = 0.05
-"""Relative standard deviation from which a stiffness is known badly; from `LOG_STD_LIMIT` on it is not known at all."""
+"""Relative standard deviation above which a stiffness is known poorly; above `LOG_STD_LIMIT` it is not identifiable."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,10 +77,14 @@ def _verdict(study: FrequencyDesignStudy) -> Verdict:
         ),
     )
     sentence = (
-        f"Predicted from the model, its sensors and its friction: the stiffness of {spring} will have a standard "
-        f"deviation of {significant(100 * std, 2)} %, every other a smaller one."
+        f"Predicted from the model, its sensors and its friction: the largest relative standard deviation of a stiffness is "
+        f"{significant(100 * std, 2)} %, that of {spring}."
     )
-    headline = "Every stiffness will be determined" if std < LOG_STD_LIMIT else f"{spring} will not be known"
+    headline = (
+        "Every stiffness is identifiable"
+        if std < LOG_STD_LIMIT
+        else f"The stiffness of {spring} is not identifiable"
+    )
     return Verdict(worst(checks), headline, sentence, facts, (), "", checks)
 
 
@@ -89,7 +93,7 @@ def _known(spring: str, std: float) -> Check:
     if std > LOG_STD_LIMIT:
         return Check(
             question,
-            f"No: {spring} not even to a factor of two. Choose other poses, or hold a payload off the axis.",
+            f"No: {spring} is not known to a factor of two. Choose other poses, or a payload off the axis.",
             "bad",
         )
     return Check(
@@ -102,8 +106,12 @@ def _known(spring: str, std: float) -> Check:
 def _explained(study: FrequencyDesignStudy) -> Check:
     errors = [np.median(r.relative_error(study.planned.plan)) for r in study.planned.responses]
     large = max(errors)
-    answer = f"The median error of a response at a line is at most {significant(100 * large, 2)} % of it in every pose."
-    return Check("Do the responses rise above noise and friction?", answer, "good" if large < 0.1 else "care")
+    answer = (
+        f"The median relative error of the response is at most {significant(100 * large, 2)} % in every pose."
+    )
+    return Check(
+        "Are the responses larger than noise and friction?", answer, "good" if large < 0.1 else "care"
+    )
 
 
 def _springs(study: FrequencyDesignStudy) -> Section:
@@ -165,8 +173,8 @@ def _poses(study: FrequencyDesignStudy) -> Section:
     blocks.append(Table("table-poses", "Joint positions", heads, rows))
     return Section(
         "poses",
-        "Where to excite",
-        "All poses together determine the springs; no single one does.",
+        "Poses",
+        "A single pose does not determine the springs; all poses together do.",
         tuple(blocks),
     )
 
@@ -174,8 +182,8 @@ def _poses(study: FrequencyDesignStudy) -> Section:
 def _amplitudes(study: FrequencyDesignStudy) -> Section:
     return Section(
         "amplitudes",
-        "How to excite",
-        "More torque where the responses depend on the springs, but never enough to pull a drive with backlash across its gap.",
+        "Amplitudes",
+        "The torque is larger where the responses depend on the springs, but too small to move a drive with backlash across its gap.",
         (
             FigureBlock(
                 "figure-amplitudes",

@@ -1,4 +1,4 @@
-"""The questions that decide whether an identified payload can be trusted, each answered from results.json."""
+"""The checks behind the verdict on an identified payload, from results.json."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from flexcal.report.notation import significant
 from flexcal.report.page import Check
 
 BODILESS = 29.6
-"""Sum of ten squared normal errors that one in a thousand exceeds: the rise of the nearest body from which none fits."""
+"""99.9 % quantile of χ² with ten degrees of freedom: largest increase of the sum of squares by physical consistency."""
 UNLIKE = 3.0
-"""Times what must be missed of the torques that is too much."""
+"""Torque error over that of separate fits of every joint and recording, above which the robot's dynamics do not fit."""
 _WIDE = 0.05
-"""1σ over the mass from which it is not known well."""
+"""Relative standard deviation of the mass above which it is known poorly."""
 
 
 def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
@@ -41,7 +41,7 @@ def _check_torques(error: Mapping[str, Any]) -> Check:
         else "."
     )
     if train > TOO_LARGE:
-        return Check(question, f"{answer} These are not the torques of this robot with a payload.", "bad")
+        return Check(question, f"{answer} The torques are not those of this robot with a payload.", "bad")
     if best and train > UNLIKE * best:
         return Check(
             question,

@@ -178,11 +178,11 @@ def _space(study: PoseStudy) -> Section:
             study.box,
             station_position(study.model),
         ),
-        "The links in the first pose, and the arm as lines in the others; the blue line goes through the target's places in the order of "
+        "The links in the first pose, and the arm as lines in the others; the blue line connects the target positions in the order of "
         "the plan. Drag to rotate, Ctrl and the wheel to zoom.",
         f"The arm in {len(study.q)} poses, in three dimensions.",
     )
-    return Section("space", "Where they are", "", (block,))
+    return Section("space", "Poses in space", "", (block,))
 
 
 def _joints(study: PoseStudy) -> Section:
@@ -193,4 +193,4 @@ def _joints(study: PoseStudy) -> Section:
         "One mark a pose. A joint without limits is drawn over a turn.",
         f"Positions of {study.model.n} joints in {len(study.q)} poses.",
     )
-    return Section("joints", "How the joints stand", "", (block,))
+    return Section("joints", "Joint positions", "", (block,))

@@ -119,15 +119,15 @@ def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
         checks.append(Check(question, "The files state no sigma, so this cannot be judged.", "unknown"))
     else:
         seen = study.results["rp_mm"]["mean"]
-        answer = f"The instrument's noise alone would show an RP of {document_millimetres(noise)} mm; "
-        answer += f"{document_millimetres(seen)} mm are measured on average."
+        answer = f"The instrument's noise alone corresponds to an RP of {document_millimetres(noise)} mm; "
+        answer += f"the mean measured RP is {document_millimetres(seen)} mm."
         checks.append(Check(question, answer, "good" if seen > 1.5 * noise else "care"))
     if (drift := study.results["drift"]) is not None:
         moved = [item for item in drift["each"] if item["certain"]]
         farthest = max(drift["each"], key=lambda item: item["way_mm"][-1])
         answer = (
-            f"{len(moved)} of {len(drift['each'])} poses moved from the first visits to the last, "
-            f"pose {farthest['pose']} by {document_millimetres(farthest['way_mm'][-1])} mm."
+            f"The barycentre moved significantly at {len(moved)} of {len(drift['each'])} poses, at most "
+            f"by {document_millimetres(farthest['way_mm'][-1])} mm at pose {farthest['pose']}."
             if moved
             else "No drift detected."
         )
@@ -142,8 +142,8 @@ def _drift_section(drift: Mapping[str, Any]) -> Section:
         "sets",
         *(f"d{KINDS[kind]} / mm" for kind in kinds),
         "dRP / mm",
-        "way / mm",
-        "beyond chance",
+        "displacement / mm",
+        "significant",
     )
     rows = tuple(
         (
@@ -157,15 +157,15 @@ def _drift_section(drift: Mapping[str, Any]) -> Section:
         for item in drift["each"]
     )
     sentences = [
-        f"The visits to each pose are taken in sets of {VISITS_A_SET} or more, in their order. dAP and dRP are by how much AP and RP of "
-        "the last set differ from those of the first. AP may stay while the point goes round the command: the way is the distance "
-        "between the barycentres of the first set and the last, and goes beyond chance where Hotelling's test of two samples says so "
-        "(less than 0.27 % of poses that stay).",
+        f"The visits to each pose are divided into consecutive sets of {VISITS_A_SET} or more. dAP and dRP are the changes of AP and RP "
+        "from the first set to the last. AP may stay constant while the barycentre moves about the command: the displacement is "
+        "the distance "
+        "between the barycentres of the first and the last set, tested by Hotelling's two-sample test (significant: p < 0.0027).",
     ]
     if len(drift["each"]) > 1:
         sentences.append(
-            f"Drift: all poses moved together by {document_millimetres(drift['together_mm'])} mm, as a base or an instrument does "
-            f"that moves; besides, each went {document_millimetres(drift['apart_mm'])} mm (root mean square), as an arm that warms up."
+            f"Drift: the displacement common to all poses is {document_millimetres(drift['together_mm'])} mm, as of a moving base or "
+            f"instrument; the remainder is {document_millimetres(drift['apart_mm'])} mm (root mean square), as of thermal expansion."
         )
     blocks = (
         Table("table-drift", "Drift from the first visits to the last", columns, rows),

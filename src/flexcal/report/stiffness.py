@@ -24,7 +24,7 @@ _HEADLINES: dict[Status, str] = {
     "good": "Springs identified, and the numbers can be trusted",
     "care": "Springs identified, with reservations: read the checks below before relying on them",
     "bad": "Do not rely on these springs yet",
-    "unknown": "Springs identified; whether they can be trusted cannot be judged by this stage alone",
+    "unknown": "Springs identified; this stage alone has no independent check",
 }
 
 

@@ -65,10 +65,10 @@ def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
             "good" if max(uses.values()) <= 1 else "bad",
         ),
         Check(
-            "Does it touch nothing?",
+            "Is it free of collisions?",
             f"The smallest clearance is {1e3 * document['clearance']:.0f} mm beyond the margin."
             if document["clearance"] > 0
-            else "Bodies touch.",
+            else "Bodies collide.",
             "good" if document["clearance"] > 0 else "bad",
         ),
         Check(
@@ -93,7 +93,11 @@ def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
         ),
         Fact("Can I run it?", "Yes" if status == "good" else "With care", "", f"{tally(checks)}.", status),
     )
-    headline = "The motions keep every limit" if status == "good" else "Read the remarks before running it"
+    headline = (
+        "The motions keep all limits"
+        if status == "good"
+        else "Read the checks below before running the motions"
+    )
     sentence = (
         "Limits are those of the URDF and of robot.yaml, for the nominal robot with its declared friction."
     )
@@ -113,7 +117,7 @@ def _motions(design: TrajectoryDesign) -> Section:
     return Section(
         "motions",
         "The motions",
-        "Every trajectory repeats one period; before the first the robot goes to its beginning slowly.",
+        "Every trajectory repeats one period; the robot moves slowly to the start of the first.",
         (
             FigureBlock(
                 "figure-paths",
@@ -128,8 +132,8 @@ def _motions(design: TrajectoryDesign) -> Section:
                 "figure-shares",
                 "Joints against their limits",
                 limit_shares(time, joints, shares),
-                "Positions from the lower (−100 %) to the upper end of the range that the design leaves; velocities, and motor torques "
-                "with friction, relative to what the design may use of the limits.",
+                "Positions from the lower (−100 %) to the upper end of the permitted range; velocities, and motor torques "
+                "with friction, relative to the permitted fraction of the limits.",
                 f"Shares of the limits of position, velocity and torque of {len(joints)} joints over one period.",
                 choice,
             ),
@@ -160,5 +164,5 @@ def _knowledge(design: TrajectoryDesign, document: Mapping[str, Any]) -> Section
         ),
         Table("table-gain", "The same in numbers", ("parameter", "after / before"), rows, folded=True),
     )
-    lead = "Masses, centres of mass and rotors start from robot.yaml's prior; friction has none, and is found beside them."
-    return Section("knowledge", "What is learned", lead, blocks if names else ())
+    lead = "Masses, centres of mass and rotor inertias have robot.yaml's prior; friction has none, and is estimated with them."
+    return Section("knowledge", "Predicted information", lead, blocks if names else ())

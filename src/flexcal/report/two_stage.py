@@ -34,7 +34,7 @@ from flexcal.report.trust import Trust
 
 HEADLINES: dict[Status, str] = {
     "good": "Calibrated, and the numbers can be trusted",
-    "care": "Calibrated, with reservations: read the checks below before relying on it",
+    "care": "Calibrated, with reservations: read the checks below before relying on the result",
     "bad": "Do not rely on this calibration yet",
     "unknown": "Calibrated; whether it can be trusted cannot be judged yet",
 }
@@ -42,7 +42,7 @@ HEADLINES: dict[Status, str] = {
 
 _ROBOTS = {
     "virtual": "simulated robot, its truth known",
-    "hard": "simulated robot that is not made from the identified model",
+    "hard": "simulated robot, independent of the identified model",
 }
 
 
@@ -74,7 +74,7 @@ def two_stage_page(study: TwoStageStudy) -> Page:
 
 
 def two_stage_verdict(study: TwoStageStudy) -> Verdict:
-    """How accurate it was, how accurate it is, and whether that can be trusted."""
+    """Accuracy before and after calibration, and the verdict."""
     before = study.fresh.before
     assert before is not None
     rigid, after = (study.fresh.statistics(model) for model in (RIGID, CALIBRATED))
@@ -117,7 +117,7 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
 
 
 def truth_checks(study: TwoStageStudy) -> tuple[Check, ...]:
-    """Comparison with the hidden truth, which the verdict leaves out because a real robot has none to compare with."""
+    """Comparison with the true parameters; not part of the verdict, because they are unknown for a real robot."""
     springs = study.springs("stiffness") + study.springs("damping")
     pairs = (
         coverage(study.stiffness, springs, study.truth),

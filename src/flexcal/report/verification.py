@@ -27,7 +27,7 @@ from flexcal.report.trust import Trust
 
 _HEADLINES: dict[Status, str] = {
     "good": "Verified on fresh poses",
-    "care": "Verified, with reservations: read the checks below before relying on it",
+    "care": "Verified, with reservations: read the checks below before relying on the result",
     "bad": "Less accurate than predicted",
     "unknown": "Measured; whether the calibration can be trusted cannot be judged",
 }
@@ -35,7 +35,7 @@ _HEADLINES: dict[Status, str] = {
 
 @dataclass(frozen=True, eq=False)
 class VerificationStudy:
-    """A calibrated robot on measured poses that its calibration never saw, as the folder has it.
+    """Verification of a calibrated robot on measured poses outside the fit, as the folder has it.
 
     `results` is the document of results.json; `arms` is the calibrated robot at the `points`, which have no nominal errors where there
     are too few for a registration.
@@ -47,7 +47,7 @@ class VerificationStudy:
 
     @property
     def verification(self) -> Verification:
-        """Prediction, errors and what the parameters' covariance says of them."""
+        """Prediction, errors and their predicted standard deviations."""
         return self.points.verification
 
 
@@ -100,7 +100,7 @@ def _refitted(results: Mapping[str, Any]) -> str:
     words = " and ".join(
         {"station": "place of the instrument", "point": "measured point"}[w] for w in refit["what"]
     )
-    return f" Fitted to these points: {words}; each point is left out of the fit that it is judged by, so this is of the geometry alone."
+    return f" Fitted to these points: {words}; errors are leave-one-out errors, so this tests the geometry alone."
 
 
 def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
@@ -184,7 +184,7 @@ def _errors_section(study: VerificationStudy) -> Section:
 def _residuals_section(study: VerificationStudy) -> Section:
     return Section(
         "residuals",
-        "Errors by joint, time and place",
-        "Errors that grow with a joint, with time or towards one side of the working volume indicate what the model lacks.",
+        "Errors by joint, time and position",
+        "Errors that depend on a joint, on time or on the position in the working volume indicate a term that the model lacks.",
         residual_blocks(study.results["joints"], study.points.poses, study.points.calibrated),
     )

@@ -1,4 +1,4 @@
-"""What measurements say of robot.yaml's `bearings:`."""
+"""Remarks on the bearing axes that measured points or frequency responses prefer (`bearings:` of robot.yaml)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _AXES = {"before": "fixed to the parent link", "after": "that turn with the chil
 
 
 def bearing_remarks(axes: BearingAxes | None, fit: Calibration) -> tuple[str, ...]:
-    """A sentence where the points of a `fit` decided on the bearing axes, or contradict the declared ones."""
+    """A sentence where the points of a `fit` determined the bearing axes, or contradict the declared ones."""
     if axes is None:
         return ()
     springs = (p for p in fit.prior.parameters if p.name.endswith(".stiffness"))
@@ -30,7 +30,7 @@ def bearing_remarks(axes: BearingAxes | None, fit: Calibration) -> tuple[str, ..
 
 
 def response_bearings_remarks(bearings: ResponseBearings | None) -> tuple[str, ...]:
-    """A sentence where frequency responses decided on the bearing axes, or contradict the declared ones."""
+    """A sentence where frequency responses determined the bearing axes, or contradict the declared ones."""
     if bearings is None:
         return ()
     chi2 = {key: f"reduced chi-square {own:.2f}" for key, own in bearings.reduced_chi2.items()}
@@ -49,7 +49,7 @@ def _remarks(
         f"than axes {_AXES[other]} ({figures[other]})"
     )
     if bearings.declared is None:
-        return (f"{found}: these were taken; `bearings: {better}` in robot.yaml declares them",)
+        return (f"{found}: these were used; `bearings: {better}` in robot.yaml declares them",)
     return (f"{found}: write `bearings: {better}` in robot.yaml{again}",)
 
 

@@ -164,7 +164,7 @@ class RobotCalibration:
                 *(
                     []
                     if misfit is None
-                    else [f"the springs of stage 1 are in doubt: {misfit_sentences(misfit).rstrip('.')}"]
+                    else [f"the springs of stage 1 are doubtful: {misfit_sentences(misfit).rstrip('.')}"]
                 ),
             ],
             "parameters": quantities(self.estimate),

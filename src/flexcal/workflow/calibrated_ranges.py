@@ -43,5 +43,5 @@ def outside_ranges(calibrated: CalibratedRobot, q: np.ndarray) -> str:
     there = told(low[worst], high[worst])
     return (
         f"{100 * share:.0f} % of the poses lie outside the joint ranges of the calibration ({name}: calibrated {there}, here {here}), so "
-        "its accuracy there is extrapolated; calibrate on poses from where the robot works"
+        "its accuracy there is extrapolated; calibrate on poses of the working volume"
     )

@@ -1,4 +1,4 @@
-"""The robot with its calibration, for the verbs that use it."""
+"""The calibrated robot, from robot.yaml and stored estimates."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ class CalibratedRobot:
 
     @cached_property
     def probable(self) -> RobotModel:
-        """`model` with what the measured points cannot tell where it is most probable: for every frame but these points."""
+        """`model` with the most probable values of the directions that the measured points do not determine; for all other frames."""
         return probable_robot(self.model, self.measured)
 
     @cached_property
     def found(self) -> RobotModel:
-        """`nominal` with the measured points where the calibration found them on the tool."""
+        """`nominal` with the measured points at their calibrated positions on the tool."""
         return found_point(self.nominal, self.probable, self.measured)
 
 
@@ -52,7 +52,7 @@ def unmeasured_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tu
     if not named:
         return ()
     return (
-        f"no calibration pose measured {' and '.join(named)}: where it is on the tool is as declared, and an error of that is not in the "
+        f"no calibration pose measured {' and '.join(named)}: its position on the tool is the declared one, whose error is not part of the "
         "predicted uncertainty",
     )
 
@@ -91,7 +91,7 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
 
 
 def found_station(model: RobotModel, station: str) -> bool:
-    """Whether the calibration found where the instrument stood."""
+    """Whether the calibration estimated the placement of this station."""
     return f"station.{station}.x" in model.posterior.parameters
 
 

@@ -1,4 +1,4 @@
-"""What a user should know of a calibration beside its numbers: what it rests on, and what makes it hard to believe."""
+"""Remarks on a calibration: assumptions, outliers, drift, noise, and signs of faulty data."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from flexcal.units import MILLIMETRE
 from flexcal.workflow.pose_remarks import unused_columns
 
 _LOOK = (
-    "these data hardly fit this robot: look for a column with a wrong sign, unit or place in the order, for points of another "
+    "these data do not fit this robot: look for a column with wrong sign, unit or order, for points of another "
     "target or robot, and for a wrong xyz under `points:` (flexcal import looks for these)"
 )
 
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
-"""Noise that was found over the stated sigma below and above which the difference is worth a word."""
+"""Estimated noise over the stated sigma, below and above which a remark is made."""
 
 _SHOWN = 3
 
 
 @dataclass(frozen=True)
 class Outlier:
-    """A measurement that the robust loss gave hardly any weight: number of its pose, point, distance from the fit (m)."""
+    """A measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m)."""
 
     pose: int
     target: str
@@ -39,10 +39,10 @@ def outliers_of(fit: Calibration) -> tuple[Outlier, ...]:
 
 
 def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[str, ...]:
-    """One sentence each, the most important last; a `cause` of a bad fit that was found stands before what it led to."""
+    """One sentence each, the most important last; a known `cause` of a bad fit precedes its consequences."""
     remarks = [*unused_columns(fit.poses), *_nominal_springs(fit)]
     if fit.ambiguous.any():
-        remarks.append(f"{fit.ambiguous.sum()} poses do not surely rest on one flank of a backlash")
+        remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
     if outliers:
         listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers)
@@ -52,14 +52,14 @@ def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[st
     if drift.certain:
         remarks.append(
             f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "
-            "robot or instrument warmed up or settled, or place and order are correlated"
+            "robot or instrument warmed up, or position and measuring order are correlated"
         )
     remarks += cause
     far = moved_far(fit)
     if far:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
         more = f" and {len(far) - _SHOWN} others" if len(far) > _SHOWN else ""
-        remarks.append(f"implausibly far from where the fit began: {', '.join(named)}{more}")
+        remarks.append(f"implausibly far from the nominal value: {', '.join(named)}{more}")
     if hardly_fits(fit) and not cause:
         remarks.append(_LOOK)
     if not fit.estimate.converged:
@@ -75,13 +75,13 @@ def _nominal_springs(fit: Calibration) -> Sequence[str]:
         return ()
     which = "" if len(nominal) == len(springs) else f" of {', '.join(nominal)}"
     return (
-        f"the stiffness{which} was not identified: the nominal one of robot.yaml is taken to be right to {fit.model.prior.stiffness:.0%}; "
-        "run 'flexcal identify stiffness' first to know it",
+        f"the stiffness{which} was not identified: the nominal one of robot.yaml is used with a standard deviation of "
+        f"{fit.model.prior.stiffness:.0%}; run 'flexcal identify stiffness' first to identify it",
     )
 
 
 def _undetermined(fit: Calibration) -> Sequence[str]:
-    """Parameters that the poses hide, one sentence a cause."""
+    """Parameters that the poses do not determine, one sentence per cause."""
     causes: dict[str, list[str]] = {}
     for item in fit.undetermined:
         causes.setdefault(item.cause, []).append(item.name)
@@ -99,20 +99,20 @@ def _noise(fit: Calibration) -> Sequence[str]:
     assert robot is not None and model is not None
     remarks = []
     if instrument is None or stated is None:
-        text = f"no sigma in the files: instrument and robot together scatter by {robot:.3f} mm a coordinate about the fit (1σ)"
-        remarks.append(f"{text}, which is too much to be noise" if scattered(fit) else text)
+        text = f"no sigma in the files: scatter of instrument and robot together about the fit is {robot:.3f} mm per coordinate (1σ)"
+        remarks.append(f"{text}, which is too large for noise" if scattered(fit) else text)
     elif instrument < _OVERSTATED * stated:
         remarks.append(
-            f"the stated sigma of {stated:.3g} mm is {stated / np.hypot(instrument, robot):.3g} times the scatter of the points; what "
-            "they show is used"
+            f"the stated sigma of {stated:.3g} mm is {stated / np.hypot(instrument, robot):.3g} times the scatter of the points; the "
+            "estimated scatter is used"
         )
     elif robot > _UNDERSTATED * stated:
         remarks.append(
-            f"the points scatter by {robot:.3f} mm a coordinate beside the stated sigma of {stated:.3g} mm: repeatability of the robot, "
-            "or a sigma that is too small; weights and intervals use both"
+            f"in addition to the stated sigma of {stated:.3g} mm the points scatter by {robot:.3f} mm per coordinate: repeatability of the "
+            "robot, or a sigma that is too small; weights and intervals include both"
         )
     if model > 0:
         remarks.append(
-            f"systematic errors of {model:.3f} mm a coordinate (1σ) remain that the model lacks; intervals are wider for it"
+            f"systematic model errors of {model:.3f} mm per coordinate (1σ) remain; intervals include them"
         )
     return remarks

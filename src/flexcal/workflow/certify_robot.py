@@ -120,11 +120,12 @@ class RobotCertificate:
             )
         if self.fitted:
             remarks.append(
-                f"the calibration was fitted to {' and '.join(self.fitted)}, so this says little about other targets"
+                f"the calibration was fitted to {' and '.join(self.fitted)}, so other targets may be less accurate"
             )
         if not self.scale.noise_known:
             remarks.append(
-                "the files state no sigma, so the instrument's noise counts as the robot's; 'flexcal import --sigma' states it"
+                "the files state no sigma, so the instrument's noise is counted as an error of the robot; 'flexcal import "
+                "--sigma' states it"
             )
         return tuple(remarks)
 

@@ -63,7 +63,7 @@ def _run(folder: Path, name: str) -> Run:
 def _left(folder: Path, name: str) -> Run:
     if not (folder / RESULTS).is_file():
         raise InputError(
-            f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo left with --out."
+            f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo wrote with --out."
         )
     results = read_results(folder)
     path = folder / ESTIMATES

@@ -125,9 +125,7 @@ def compensate_robot(
     if target is not None:
         calibrated.nominal.point(target)
         if frame is not None:
-            raise InputError(
-                "--target and --frame both say what is brought to the targets; give one of them."
-            )
+            raise InputError("--target and --frame exclude each other; give one of them.")
     model, nominal = (
         robot_ if frame is None else with_frame(robot_, frame)
         for robot_ in (calibrated.probable, calibrated.found)
@@ -136,14 +134,16 @@ def compensate_robot(
     for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
         if not found_station(model, station):
             raise InputError(
-                f"{file}: the station '{station}' was not calibrated, so its place is unknown; give points in the base frame."
+                f"{file}: the station '{station}' was not calibrated, so its position is unknown; give points in the base frame."
             )
     _check_frame(file, nominal, targets)
     origin = None
     if targets.q is None:
         origin = _start(nominal, start) if len(start) else best_posture(nominal, str(targets.target[0]))
     elif len(start):
-        raise InputError(f"{file} has joint positions, which are where the search starts; leave --start out.")
+        raise InputError(
+            f"{file} has joint positions, which are the start of the inverse kinematics; leave --start out."
+        )
     result = compensate(model, nominal, targets, start=origin, progress=progress)
     if not result.found.any():
         raise FlexcalError(
@@ -161,9 +161,7 @@ def _of_point(targets: ToolTargets, file: Path, name: str | None) -> ToolTargets
     if name is None:
         return targets
     if "target" in open_table(file).columns:
-        raise InputError(
-            f"{file} says in its column 'target' which point goes there; leave --target and --frame out."
-        )
+        raise InputError(f"{file} has a column 'target'; leave --target and --frame out.")
     return replace(targets, target=np.full(len(targets), name))
 
 

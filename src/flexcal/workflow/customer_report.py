@@ -35,7 +35,8 @@ def customer_report(folder: Path, particulars: Particulars) -> Path:
             trust = Trust(calibration_checks(results, study.estimate, points))
         else:
             raise InputError(
-                f"{folder} holds no calibration or verification of measured points; give a folder that calibrate or verify left with --out."
+                f"{folder} holds no calibration or verification of measured points; give a folder that calibrate or verify "
+                "wrote with --out."
             )
         write_customer_report(path, CustomerStudy(results, points, trust, input_files(origin), particulars))
     except KeyError as problem:

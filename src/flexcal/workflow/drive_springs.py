@@ -28,15 +28,15 @@ def drive_springs(
         )
     if not model.driven:
         raise InputError(
-            f"{model.path} declares no elastic joint, which --flexible is about; add it under `elastic:`, or leave --flexible out."
+            f"{model.path} declares no elastic joint, which --flexible needs; add it under `elastic:`, or leave --flexible out."
         )
     springs = tuple(DriveSpring(joint.index) for joint in model.driven)
     for entry in model.config.drives.coupling:
         for joint in model.driven:
             if joint.name in (entry.motor, entry.joint):
                 raise InputError(
-                    f"{model.path}: {joint.name} is elastic and coupled with another motor, which the flexible model does not know; "
-                    "leave --flexible out."
+                    f"{model.path}: {joint.name} is elastic and coupled with another motor, which the flexible "
+                    "model lacks; leave --flexible out."
                 )
     for log in logs:
         if next(log_blocks(log, model)).arm is None:

@@ -1,4 +1,4 @@
-"""What a user should know of identified dynamics beside the numbers: which declared terms these recordings do not show."""
+"""Remarks on identified dynamics: parameters of declared terms that the recordings do not determine."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ from flexcal.workflow.estimators import EstimatorName
 
 _SHOWN = 3
 _REGROUPED = ("rotor_inertia", "arm_inertia")
-"""What the inertias of links take up as a matter of course."""
+"""Parameters that are always absorbed by the inertias of links."""
 _LARGEST_ATTENUATION = 0.5
-"""Of a stiffness, in its standard deviations, that is not worth a remark."""
+"""Bias of a stiffness, in its standard deviations, up to which no remark is made."""
 
 
 def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
@@ -27,18 +27,18 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: Estima
     silent = set(data.silent)
     drives = [name for name in data.names[len(INERTIAL) * data.observation.model.n :] if name not in silent]
     remarks = [
-        f"{joint}: {', '.join(keys)} stay as they were: these recordings leave their columns at zero"
+        f"{joint}: {', '.join(keys)} keep their values: these recordings do not excite them"
         for joint, keys in _by_joint(data.silent).items()
     ]
     if estimator in ("iv", "didim") and data.observation.model.controller is None:
         remarks.append(
-            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, its gains by the inertia"
+            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, gains proportional to inertia"
         )
     for name in drives:
         if name in absorbed and (name in structural or not name.endswith(_REGROUPED)):
             heirs = ", ".join(heir for heir, _ in absorbed[name][:_SHOWN]) or "nothing"
-            where = "no recording tells" if name not in structural else "these recordings do not tell"
-            remarks.append(f"{where} {name} from {heirs}")
+            where = "in any recording" if name not in structural else "in these recordings"
+            remarks.append(f"{name} is not identifiable beside {heirs} {where}")
     return (*remarks, *_attenuated(data, estimate))
 
 
@@ -54,6 +54,6 @@ def _attenuated(data: RegressionData, estimate: Estimate) -> Iterator[str]:
     for name, share in attenuation(data, estimate).items():
         if share * estimate.values[name] > _LARGEST_ATTENUATION * (estimate.std(name) or 0.0):
             yield (
-                f"noise of the positions on either side of the drive may have lowered {name} by up to {100 * share:.2g} %, "
-                "which its interval does not hold; larger torques or finer encoders help"
+                f"encoder noise on either side of the drive may have reduced {name} by up to {100 * share:.2g} %, "
+                "which its interval does not include; larger torques or finer encoders help"
             )

@@ -40,7 +40,7 @@ def read_fitted(folder: Path) -> tuple[FittedResponse, ...]:
             return tuple(_response(file, pose) for pose in file["pose"].tolist())
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else problem
-        raise InputError(f"{path} cannot be read ({reason}); run the verb that leaves it again.") from problem
+        raise InputError(f"{path} cannot be read ({reason}); run the verb that writes it again.") from problem
 
 
 def _response(file: np.lib.npyio.NpzFile, pose: int) -> FittedResponse:

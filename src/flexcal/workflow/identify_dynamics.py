@@ -136,6 +136,6 @@ def _require_rigid_and_learnable(flexible: bool) -> None:
     require_scikit_learn()
     if flexible:
         raise InputError(
-            "a residual torque is learned for rigid joints, as a function of what the motors do; leave out one of --learn-residual and "
+            "a residual torque is learned for rigid joints, as a function of the motors' states; leave out one of --learn-residual and "
             "--flexible."
         )

@@ -149,7 +149,7 @@ def identify_robot_payload(
     blocks = read_estimates(source, without="payload") if source.exists() else {}
     if "dynamics" not in blocks and not free:
         raise InputError(
-            f"{source} has no block 'dynamics', so the payload cannot be separated from the robot's own inertia; run 'flexcal identify "
+            f"{source} has no block 'dynamics', so payload and robot inertia are not identifiable separately; run 'flexcal identify "
             f"dynamics {robot} "
             "LOGS…' on recordings without payload first, or give such recordings with --free."
         )
@@ -245,7 +245,7 @@ def _require_news(logs: Sequence[Path], blocks: Mapping[Block, Estimate]) -> Non
     for log in logs:
         if sha256_of(log) in used:
             raise InputError(
-                f"{log}: the block 'dynamics' was made from this recording, which would count twice; leave it out, or give another."
+                f"{log}: the block 'dynamics' was identified from this recording, which would be used twice; leave it out, or give another."
             )
 
 
@@ -263,7 +263,7 @@ def _require_payloads(logs: Sequence[JointLog], loaded: Sequence[bool]) -> None:
     for log, held in zip(logs, loaded, strict=True):
         if held and log.payload == 0:
             raise InputError(
-                f"{log.path}: its column 'payload' says that the robot held nothing; give it with --free, or correct the column."
+                f"{log.path}: its column 'payload' states that the robot held no payload; give it with --free, or correct the column."
             )
         if not held and log.payload is not None and log.payload > 0:
             raise InputError(

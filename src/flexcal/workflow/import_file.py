@@ -142,11 +142,12 @@ def import_file(
         columns["sigma"] = np.full(len(foreign), sigma)
     elif kind == "poses" and not stated:
         remarks.append(
-            "the instrument's noise is not in it: say it with --sigma MM (1σ a coordinate), or it will count as the robot's"
+            "the file does not state the instrument's noise: give it with --sigma MM (1σ per coordinate), or it is counted as "
+            "an error of the robot"
         )
     if "xyz" in guess.placed and guess.placed["xyz"].columns == TOOL:
         remarks.append(
-            "these points are what the controller computes from the joints, by its own kinematics: no calibration can rest on them"
+            "these points are computed by the controller from the joints, not measured: they cannot be used for a calibration"
         )
     if kind == "log" and "tau" not in guess.placed:
         remarks.append("there are no torques: 'identify dynamics' needs tau1 and so on")
@@ -227,7 +228,7 @@ def _converted(
                 raise foreign.table.error(
                     int(np.argmax(bad)),
                     column,
-                    f"there is no {what}; complete or remove the line, or take the column back with --map {quantity}=none.",
+                    f"there is no {what}; complete or remove the line, or discard the column with --map {quantity}=none.",
                 )
         found = placed.values(foreign.table)
         if quantity == "quaternion":
@@ -278,7 +279,7 @@ def _check_sigma(sigma: float, file: Path, kind: str, stated: set[str]) -> None:
         raise InputError(f"--sigma is of measured points, but {file} has none; leave it out.")
     if stated:
         raise InputError(
-            f"{file} says sigma itself; leave --sigma out, or take its own back with --map {min(stated)}=none."
+            f"{file} contains sigma; leave --sigma out, or discard its own with --map {min(stated)}=none."
         )
 
 

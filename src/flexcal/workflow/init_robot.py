@@ -161,19 +161,15 @@ def _remarks(model: RobotModel) -> list[str]:
     massless = [joint.link for joint, mass in zip(model.joints, model.mass, strict=True) if not mass > 0]
     if massless:
         remarks.append(
-            f"the URDF gives no mass to what {', '.join(massless)} carries: nothing can be said about deflection under its weight"
+            f"the URDF gives no mass to what {', '.join(massless)} carries: deflection under its weight cannot be computed"
         )
     try:
         checker = CollisionChecker(model, floor=None)
     except InputError as problem:
         remarks.append(
-            f"{problem} Until then 'design poses' cannot keep the robot from hitting itself, and stops".replace(
-                "\n", " "
-            )
+            f"{problem} Until then 'design poses' cannot exclude self-collision, and stops".replace("\n", " ")
         )
         return remarks
     if not checker.shapes:
-        remarks.append(
-            "the URDF has no collision shapes: 'design poses' cannot keep the robot from hitting itself"
-        )
+        remarks.append("the URDF has no collision shapes: 'design poses' cannot exclude self-collision")
     return remarks

@@ -15,11 +15,13 @@ def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
         joint = log.weight.reversed
         if joint is not None:
             raise InputError(
-                f"{log.path}: the torque of {model.joint_names[joint]} pulls with its weight instead of holding it; turn its sign by "
+                f"{log.path}: the torque of {model.joint_names[joint]} has the sign of its gravity torque instead of the "
+                "opposite; change its sign by "
                 "`tau: {gain: […]}` under `signals:`, or correct `gravity:` in robot.yaml."
             )
         if log.weight.by_motors:
             raise InputError(
-                f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} follows only {log.weight.share:.2%} of what its "
-                "weight asks for; these look like torques of the motors: declare gear ratios as `tau: {gain: […]}` under `signals:`."
+                f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} is only {log.weight.share:.2%} of its "
+                "gravity torque; these look "
+                "like torques on the motor side: declare gear ratios as `tau: {gain: […]}` under `signals:`."
             )

@@ -81,18 +81,19 @@ class RobotMap:
         remarks = list(self.unmeasured)
         if self.scale is None:
             remarks.append(
-                "nothing was verified, so the map rests on the covariance of the calibration alone; give --verification with poses "
+                "no verification: the map is based on the covariance of the calibration alone; give --verification with poses "
                 "outside the fit"
             )
         elif not self.scale.noise_known:
             remarks.append(
-                "the verification files state no sigma, so the instrument's noise counts as the robot's; 'flexcal import --sigma' states it"
+                "the verification files state no sigma, so the instrument's noise is counted as an error of the robot; 'flexcal "
+                "import --sigma' states it"
             )
         if self.outside:
             remarks.append(self.outside)
         if self.fitted:
             remarks.append(
-                f"the calibration was fitted to {' and '.join(self.fitted)}, which verifies nothing"
+                f"the calibration was fitted to {' and '.join(self.fitted)}, so this is no verification"
             )
         return tuple(remarks)
 
@@ -239,9 +240,7 @@ def _verified(
     if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
         (said,) = refit_remarks(found, poses, None, moved)
         named = " and ".join(str(file) for file in files)
-        raise InputError(
-            f"{named} cannot say how large the map's errors are: {said}; give points measured as the calibration's."
-        )
+        raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
     before = robot_before(calibrated.nominal, poses).errors(poses)
     return error_scale(found, covariance), before, found
 

@@ -1,4 +1,4 @@
-"""What a user should know of an identified payload beside the numbers."""
+"""Remarks on an identified payload: identifiability, consistency, and estimates made with another payload."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def payload_remarks(fit: PayloadFit, declared: RobotModel, blocks: Mapping[Block
         )
     low, high = _certain_mass(found)
     if declared.payload is not None and not low <= declared.payload.mass <= high:
-        yield f"robot.yaml declares {declared.payload.mass:g} kg; what was identified counts from now on"
+        yield f"robot.yaml declares {declared.payload.mass:g} kg; the identified payload is used from now on"
     for name, mass in other_payloads(found, blocks).items():
         yield (
-            f"the block '{name}' was found with a payload of {mass:.4g} kg; if the robot held this one then, make that block again"
+            f"the block '{name}' was identified with a payload of {mass:.4g} kg; if the robot held this payload then, identify it again"
         )
 
 

@@ -77,7 +77,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         errors = {model: vectors(f"{model}_d") for model in _MODELS if f"{model}_dx" in table.columns}
         ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
         if CALIBRATED not in errors or not joints or not len(table):
-            raise InputError(f"{path} lacks columns or rows; run the verb that leaves it again.")
+            raise InputError(f"{path} lacks columns or rows; run the verb that writes it again.")
         return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"), column("scatter_rms"))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise _unreadable(path, problem) from problem
@@ -140,4 +140,4 @@ def _unreadable(path: Path, problem: Exception) -> InputError:
         if isinstance(problem, OSError) and problem.strerror
         else " ".join(str(problem).split())
     )
-    return InputError(f"{path} cannot be read ({reason}); run the verb that leaves it again.")
+    return InputError(f"{path} cannot be read ({reason}); run the verb that writes it again.")

@@ -1,4 +1,4 @@
-"""Where a measured point was found, written into robot.yaml in place of where a ruler had it."""
+"""Calibrated position of a measured point, written to robot.yaml in place of the declared one."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is to be said of columns of pose files that a verb reads and does not need."""
+"""Remarks on columns of pose files that are not used."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ def unused_columns(poses: PoseSet) -> tuple[str, ...]:
     remarks = []
     if poses.torque is not None:
         remarks.append(
-            "the torques tau1… in the files are not used: they carry friction, so the model says on which flank a joint rests"
+            "the torques tau1… in the files are not used: they contain friction, so the flank of a backlash is computed from the model"
         )
     if poses.temperature is not None:
         remarks.append("the temperature in the files is not used: no term of the model depends on it")

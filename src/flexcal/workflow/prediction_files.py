@@ -49,5 +49,5 @@ def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
             )
     except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
         raise InputError(
-            f"{path} cannot be read ({problem}); run the verb that leaves it again."
+            f"{path} cannot be read ({problem}); run the verb that writes it again."
         ) from problem

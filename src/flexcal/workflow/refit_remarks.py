@@ -1,4 +1,4 @@
-"""What placing the instrument or the measured point again does to a verification, for people and for results.json."""
+"""Refit of the instrument's placement or the measured point in a verification: proposal, remarks and block of results.json."""
 
 from __future__ import annotations
 
@@ -14,31 +14,31 @@ from flexcal.model import RobotModel
 from flexcal.units import MILLIMETRE
 
 _WORTH = 0.5
-"""Placing something again is proposed where it leaves less than this of the root mean square error."""
+"""A refit is proposed where it reduces the root mean square error to less than this fraction."""
 _TENTH = 0.1
 _MUCH = 1e-4
-"""m: a mean error below this is not worth a proposal."""
+"""m: mean error below which no refit is proposed."""
 _CHANGED = {
     ("station",): (
-        "after placing the station again",
+        "after a refit of the station",
         "the instrument, or the robot's base, was moved since the calibration",
     ),
     ("point",): (
-        "after finding the point again",
-        "the reflector is not where it was at the calibration, or is another one",
+        "after a refit of the point",
+        "the reflector was moved or replaced since the calibration",
     ),
     ("station", "point"): (
-        "after placing the station and finding the point again",
-        "both instrument and reflector are not where they were at the calibration",
+        "after a refit of station and point",
+        "both instrument and reflector were moved since the calibration",
     ),
 }
 
 
 def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Refitted | None:
-    """What would leave less than half of the errors if placed again, by leave-one-out; None where nothing does.
+    """The refit that reduces the leave-one-out errors to less than half; None where there is none.
 
-    What is left has to be about what is predicted, or a tenth: a model that is wrong far from its calibration poses also
-    looks somewhat as if the instrument had been moved.
+    The remaining errors have to be about as large as predicted, or a tenth of those before, because a refit also reduces errors of a
+    model that is wrong far from its calibration poses.
     """
     rms = _rms(found)
     if found.all.mean < _MUCH:
@@ -50,7 +50,7 @@ def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Re
             again = refitted(model, poses, what)
         except FlexcalError:
             continue
-        # two things again only where they leave half of what one leaves
+        # both only where they halve the error of the better single refit
         least = rms if best is None else _rms(best.result)
         if _rms(again.result) < (_WORTH if best is None or len(what) > len(best.what) else 1.0) * least:
             best = again
@@ -66,19 +66,18 @@ def _explains(best: Refitted, rms: float) -> bool:
 def refit_remarks(
     found: Verification, poses: PoseSet, refit: Refitted | None, better: Refitted | None
 ) -> tuple[str, ...]:
-    """One sentence on what was placed again, or should be."""
+    """One sentence on a refit that was made or is proposed."""
     if refit is not None:
-        placed = {"station": "station placed", "point": "point found"}
         return (
-            f"{' and '.join(placed[name] for name in refit.what)} again from these poses, geometry as calibrated: {refit.parameters} of "
-            f"{3 * len(poses)} coordinates went into that, those of {_poses(refit)} poses, and every error is of a pose left out of it",
+            f"{' and '.join(refit.what)} refitted to these poses, geometry as calibrated: {refit.parameters} parameters of "
+            f"{3 * len(poses)} coordinates, as many as {_poses(refit)} poses have; errors are leave-one-out errors",
         )
     if better is None:
         return ()
     after, cause = _CHANGED[better.what]
     return (
-        f"{found.all.mean / MILLIMETRE:.3g} mm on average; {after} {better.result.all.mean / MILLIMETRE:.2g}: {cause}. "
-        f"--refit {' '.join(better.what)} verifies the geometry alone, at the price of {_poses(better)} poses",
+        f"mean error {found.all.mean / MILLIMETRE:.3g} mm; {after} {better.result.all.mean / MILLIMETRE:.2g} mm: {cause}. "
+        f"--refit {' '.join(better.what)} verifies the geometry alone, and costs {_poses(better)} poses",
     )
 
 

@@ -60,19 +60,20 @@ class RobotRepeatability:
         remarks = list(unused_columns(replace(self.poses, time=None)))
         if timed and not self.drifts:
             remarks.append(
-                f"drift shows at poses with {2 * VISITS_A_SET} visits or more, with times that go on from row to row and file to file"
+                f"drift is evaluated at poses with {2 * VISITS_A_SET} visits or more, with times that increase from row to row "
+                "and file to file"
             )
         fewest = min(len(pose.rows) for pose in self.visited)
         if fewest < CYCLES:
             remarks.append(
-                f"ISO 9283 asks for {CYCLES} visits to each pose; here it is {fewest} at the pose with the fewest, so RP is less certain"
+                f"ISO 9283 asks for {CYCLES} visits to each pose; there are {fewest} at the pose with the fewest, so RP is less certain"
             )
         once = len(self.poses) - sum(len(pose.rows) for pose in self.visited)
         if once:
             remarks.append(f"{once} rows are of poses that were visited once; they are not used")
         if "nominal" not in self.errors:
             remarks.append(
-                "there are too few poses to register the nominal robot with them, so its pose accuracy is not known: visit four or more"
+                "too few poses for a registration of the nominal robot, so its pose accuracy is not known: visit four or more"
             )
         if "calibrated" not in self.errors:
             remarks.append(

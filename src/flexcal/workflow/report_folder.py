@@ -47,7 +47,7 @@ def report_folder(folder: Path) -> Path:
     """
     if not (folder / RESULTS).is_file():
         raise InputError(
-            f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify left with --out."
+            f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out."
         )
     results, path = read_results(folder), folder / REPORT
     try:
@@ -85,7 +85,7 @@ def report_folder(folder: Path) -> Path:
 def lacking(folder: Path, problem: KeyError) -> InputError:
     """Of a results.json that lacks a key."""
     return InputError(
-        f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had left it; run the verb that leaves it again."
+        f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had written it; run the verb that writes it again."
     )
 
 
@@ -123,5 +123,5 @@ def _block(folder: Path, block: Block) -> Estimate:
     path = folder / ESTIMATES
     estimates = read_estimates(path)
     if block not in estimates:
-        raise InputError(f"{path} holds no {block}; run the verb that leaves it again.")
+        raise InputError(f"{path} holds no {block}; run the verb that writes it again.")
     return estimates[block]

@@ -37,7 +37,7 @@ def read_results(folder: Path) -> dict[str, Any]:
         return json.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError) as problem:
         raise InputError(
-            f"{path} cannot be read ({problem}); run the verb that leaves it again."
+            f"{path} cannot be read ({problem}); run the verb that writes it again."
         ) from problem
 
 

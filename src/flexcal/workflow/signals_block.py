@@ -32,9 +32,7 @@ def add_signals(robot: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
     if declared is not None:
         if all(declared.get(quantity) == dict(entry) for quantity, entry in signals.items()):
             return
-        raise InputError(
-            f"{robot} has `signals:` already, which is yours and not changed; put this in its place: {block}"
-        )
+        raise InputError(f"{robot} has `signals:` already, which is not changed; replace it by: {block}")
     text = robot.read_text(encoding="utf-8")
     write_text(robot, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
     try:

@@ -1,4 +1,4 @@
-"""What a user should know of identified springs beside their numbers."""
+"""Remarks on identified springs: added joints, braked motors, misfit, bearing axes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _ONE_SIDED = 1.645
 
 
 def further_joints(estimate: Estimate, model: RobotModel) -> tuple[str, ...]:
-    """Joints that robot.yaml holds rigid and that got a drive spring because the responses ask for it."""
+    """Joints that robot.yaml declares rigid and that were given a drive spring because the responses require it."""
     declared = {entry.joint for entry in model.config.elastic}
     return tuple(
         name
@@ -31,10 +31,10 @@ def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, 
     remarks: list[str] = []
     if joints:
         remarks.append(
-            f"robot.yaml holds {_listed(joints)} rigid, but the responses show that they give way: a drive spring was identified for each"
+            f"robot.yaml declares {_listed(joints)} rigid, but the responses show elasticity: a drive spring was identified for each"
         )
     remarks += [
-        f"the drive of {joint} gives way too little to be measured well: its stiffness is at least "
+        f"the stiffness of the drive of {joint} is too high to be determined; it is at least "
         f"{_lower_limit(estimate, f'{joint}.drive.stiffness'):.2g} N m/rad (95 %)"
         for joint in joints
         if estimate.interval(f"{joint}.drive.stiffness") is None
@@ -42,8 +42,8 @@ def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, 
     moving = [joint for joint in joints if _moves(estimate, joint, model)]
     if moving:
         remarks.append(
-            f"the motor of {_listed(moving)} seems to have moved with the arm: it was held by its controller and not by a brake, whose "
-            "stiffness is then part of the spring that was found; apply the brakes and repeat, or read this spring with care"
+            f"the motor of {_listed(moving)} seems to have moved with the arm, held by its controller and not by a brake; the identified "
+            "spring then contains the stiffness of the controller; apply the brakes and repeat, or use this spring with care"
         )
     if estimate.misfit is not None:
         remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")

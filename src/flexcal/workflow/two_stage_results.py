@@ -187,5 +187,5 @@ def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
         return measured, points(vectors(""), np.zeros((size, 3)), "model_rms")
     except (pl.exceptions.PolarsError, TypeError, OSError) as problem:
         raise InputError(
-            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that leaves it again."
+            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that writes it again."
         ) from problem

@@ -84,13 +84,13 @@ class RobotVerification:
         ]
         if self.uncalibrated:
             remarks.append(
-                f"no calibration pose measured {' and '.join(self.uncalibrated)}: where it is on the tool is as robot.yaml declares it, "
-                "and an error of that is in these numbers; --refit point finds it from these poses"
+                f"no calibration pose measured {' and '.join(self.uncalibrated)}: its position on the tool is the declared one, "
+                "whose error is part of these numbers; --refit point fits it to these poses"
             )
         if self.fitted:
             which = " and ".join(self.fitted)
             remarks.append(
-                f"the calibration was fitted to {which}, so this says little about other poses; verify on poses outside the fit"
+                f"the calibration was fitted to {which}, so errors at other poses may be larger; verify on poses outside the fit"
             )
         return tuple(remarks)
 
@@ -207,8 +207,9 @@ def verification_poses(
     for station in poses.stations:
         if not placed_again and not found_station(model, station):
             raise FlexcalError(
-                f"the station '{station}' was not calibrated, so its place is unknown; add poses measured from there to the calibration, "
-                "or find it from these poses: 'flexcal verify' with --refit station."
+                f"the station '{station}' was not calibrated, so its position is unknown; add poses measured from there to the "
+                "calibration, "
+                "or fit it to these poses: 'flexcal verify' with --refit station."
             )
     return poses
 

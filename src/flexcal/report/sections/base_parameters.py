@@ -1,4 +1,4 @@
-"""The base parameters: what the recordings determine, how well, and how their errors hang together."""
+"""The base parameters, their standard deviations and correlations."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ def budget_table(variances: Mapping[str, float | None]) -> Table:
     rows = (
         (f"instrument ({said})", document_millimetres(instrument), share(instrument)),
         ("robot: repeatability", document_millimetres(robot), share(robot)),
-        ("model: systematic errors that neighbouring poses share", document_millimetres(model), share(model)),
+        ("model: systematic errors common to neighbouring poses", document_millimetres(model), share(model)),
         ("sum of the variances", document_millimetres(whole), share(whole)),
     )
     return Table(
@@ -32,5 +32,5 @@ def budget_table(variances: Mapping[str, float | None]) -> Table:
         ("source", "1σ / mm", "share of the variance"),
         rows,
         strong=(len(rows) - 1,),
-        note="Found from the points by restricted maximum likelihood. Intervals and predictions have all three in them.",
+        note="Estimated from the points by restricted maximum likelihood. Intervals and predictions include all three.",
     )

@@ -1,4 +1,4 @@
-"""Which friction terms the recordings support."""
+"""The friction terms selected by cross-validation."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def friction_section(results: Mapping[str, Any]) -> Section:
         fitting = [k for k, row in enumerate(tried) if set(row["terms"]) <= set(labels)]
         taken = max(fitting, key=lambda k: len(tried[k]["terms"]))
         rows = tuple(
-            (_words(row["terms"]) or "plain terms only", significant(row["cross_validation_percent"], 4))
+            (_words(row["terms"]) or "classic terms only", significant(row["cross_validation_percent"], 4))
             for row in tried
         )
         rule = (
@@ -35,13 +35,13 @@ def friction_section(results: Mapping[str, Any]) -> Section:
                 "Friction terms that were tried, in order",
                 ("terms", "cross-validated error / %"),
                 rows,
-                f"Relative torque errors in cross-validation. In bold: the chosen terms; {rule}.",
+                f"Relative torque errors in cross-validation. In bold: the selected terms; {rule}.",
                 strong=(taken,),
                 folded=len(rows) > LONG,
             )
         )
     else:
-        blocks.append(Text(("No term was chosen from the recordings: robot.yaml names them.",)))
+        blocks.append(Text(("The terms are declared in robot.yaml; none was selected from the recordings.",)))
     return Section("friction", "Friction", "", tuple(blocks))
 
 

@@ -1,4 +1,4 @@
-"""Which geometric parameters the poses determine, and what absorbed the others."""
+"""Identifiable geometric parameters, and the combinations that absorb the others."""
 
 from __future__ import annotations
 
@@ -56,8 +56,7 @@ def identifiability_blocks(found: Determined, paper: Publication | None) -> tupl
     words = (
         f"Of {found.parameters} geometric parameters, the measured points determine {found.rank} combinations. The other {dropped} would "
         "move the tool exactly as some of the kept ones do: a longer first link and a higher base, for example, are not separately "
-        "identifiable. They stay at their nominal values, and the kept ones absorb what they would have been; predictions lose nothing "
-        "by it."
+        "identifiable. They keep their nominal values and are absorbed by the kept ones, which does not affect predictions."
     )
     paragraphs = [words]
     if paper is not None and paper.rank is not None and paper.rank != found.rank:

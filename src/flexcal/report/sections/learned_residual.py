@@ -1,4 +1,4 @@
-"""What a learned residual torque adds to the prediction of torques."""
+"""Reduction of the torque error by a learned residual torque."""
 
 from __future__ import annotations
 

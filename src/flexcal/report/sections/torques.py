@@ -14,7 +14,7 @@ from flexcal.report.page import Block, FigureBlock, Selector, Table
 
 
 def recording_labels(predictions: Sequence[TorquePrediction]) -> tuple[str, ...]:
-    """What a reader chooses recordings by: their numbers, from 1, and the names of their files."""
+    """Labels of recordings: their numbers, from 1, and file names."""
     return tuple(f"{k}: {PurePath(log.name).name}" for k, log in enumerate(predictions, 1))
 
 

@@ -1,4 +1,4 @@
-"""Verification in the report: accuracy on poses that the fit never saw."""
+"""Verification in the report: accuracy on poses outside the fit."""
 
 from __future__ import annotations
 
@@ -115,7 +115,7 @@ def _floor_words(study: TwoStageStudy) -> tuple[str, ...]:
         f"errors that no calibration can remove. The calibrated robot reaches {millimetres(elastic.p90)} and {millimetres(elastic.mean)} "
         f"mm.",
         f"Uncertainty of the parameters alone predicts errors of {millimetres(float((std**2).mean() ** 0.5))} mm (root mean square). "
-        "More poses, or a better tracker, would lower that part; the floor stays.",
+        "More poses, or a better tracker, would reduce that part, but not the floor.",
     )
 
 
