@@ -69,7 +69,7 @@ def identify_stiffness(
     tolerances: Tolerances | None = None,
     progress: Progress = silent,
 ) -> StiffnessResult:
-    """Fit the linearised elastic robot to the measured responses of all poses, with the uncertainty of every spring.
+    """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
 
     The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
     measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the

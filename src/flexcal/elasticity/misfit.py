@@ -1,4 +1,4 @@
-"""Misfit of the fitted robot to the measured responses, and the covariance of its parameters with a misfit."""
+"""Whether the fitted robot explains the measured responses, and the covariance of its parameters where it does not."""
 
 from __future__ import annotations
 
