@@ -105,7 +105,7 @@ def cramer_rao(run: TwoStageRun) -> np.ndarray:
     """Standard deviations (p,) of stage 1 that noise, distortion and the priors of inertias and geometry allow."""
     estimate, responses = run.stiffness.estimate, run.responses
     x = estimate.parameters.coordinates()
-    model = ResponseModel.of(run.informed, responses, estimate.parameters).with_open_gaps(x, run.plan)
+    model = ResponseModel.of(run.informed, responses, estimate.parameters).with_loaded_drives(x, run.plan)
     residual = StageOneResidual.of(model, responses, CovarianceWeighting())
     geometry = replace(Tolerances.none(), length=Tolerances.length, angle=Tolerances.angle)
     still = [ExperimentEffect.none(response) for response in responses]

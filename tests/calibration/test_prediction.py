@@ -63,6 +63,20 @@ def test_every_column(simulate: Callable, suffixes: tuple, step: float, relative
         assert np.abs(jacobian[:, :, k] - expected).max() <= relative * size + 1e-9, name
 
 
+def test_columns_of_drives_that_harden(simulate: Callable) -> None:
+    """Stiffness acts through the tangent of a drive, and the hardening by the cube of its twist; to the load of the undeflected arm."""
+    simulated = simulate(3, 25)
+    drives = [f"joint_{k}.drive" for k in (2, 3)]
+    robot = simulated.robot.with_values({f"{drive}.hardening": 3e5 for drive in drives})
+    at = predict(robot, simulated.poses, jacobians=True)
+    steps = {f"{drive}.hardening": 3e3 for drive in drives} | {f"{drive}.stiffness": 10.0 for drive in drives}
+    jacobian = at.jacobian(list(steps))
+    for k, (name, step) in enumerate(steps.items()):
+        expected = slope(robot, simulated.poses, name, step, at.rest.flank)
+        size = np.abs(expected).max()
+        assert np.abs(jacobian[:, :, k] - expected).max() <= 0.02 * size, name
+
+
 def test_a_parameter_without_effect_on_points_is_refused(simulate: Callable) -> None:
     simulated = simulate(1, 5)
     with pytest.raises(FlexcalError, match=r"does not depend on 'joint_1.delay'"):

@@ -27,6 +27,8 @@ from flexcal.model.further_springs import with_brakes, with_drive_springs
 from flexcal.model.names import spring_names
 from flexcal.progress import Progress, silent
 
+SPRING_VALUES = (".stiffness", ".damping", ".hardening")
+
 
 @dataclass(frozen=True, eq=False)
 class StiffnessResult:
@@ -180,9 +182,10 @@ def _searched_fit(
 def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     """The estimate with the covariance for measurements whose variance is `Tolerances.inflation` f times what weighs them.
 
-    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L. Every standard deviation
-    is then raised by the sandwich's or the reduced χ², where these are larger than the weights say, by a misfit's where there is one, and
-    by the profile likelihood's.
+    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
+    exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the profile likelihood is error of the
+    springs alone, independent of each other: masses and centres of mass, whose moments are known far better than each of them, stay as
+    they are correlated.
     """
     problem, fitted = fit.problem, fit.estimate
     posterior = fitted.covariance
@@ -190,9 +193,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     from_data = posterior - from_prior.T @ from_prior
     covariance = posterior + (data.tolerances.inflation(data.responses) - 1.0) * from_data
     std = np.sqrt(np.diag(posterior))
-    factor = np.full(
-        std.shape, np.sqrt(max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0))
-    )
+    excess = max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0)
     misfit = misfit_of_fit(fit, data.responses)
     wider = std
     if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
@@ -200,9 +201,11 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
         wider = np.sqrt(np.diag(robust.covariance))
     if misfit is not None:
         wider = np.maximum(wider, misfit_std(fit, misfit))
-    factor = np.maximum(factor, np.divide(wider, std, out=np.ones_like(std), where=std > 0))
-    factor *= profile_stretch(problem, fitted)
-    covariance = covariance * np.outer(factor, factor)
+    factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)
+    factor = np.maximum(factor, np.sqrt(excess)) * profile_stretch(problem, fitted)
+    springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])
+    alone = np.where(springs, (factor**2 - excess) * np.diag(covariance), 0.0)
+    covariance = excess * covariance + np.diag(alone)
     sized = known_to_a_factor_of_two(fitted.parameters, covariance)
     small = {
         name: flag and size

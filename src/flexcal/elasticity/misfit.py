@@ -22,7 +22,9 @@ SEVERE_CHI2 = 2.0
 """Reduced χ² of all lines from which the springs are not to be relied on."""
 
 DOUBTFUL_STIFFNESS = 0.1
-"""Relative 1σ of a stiffness at least where there is a misfit: drives that harden or slip differ so much between small motion and load."""
+"""Relative 1σ of a stiffness at least where there is a misfit: drives that slip differ so much between small motion and load."""
+DOUBTFUL_HARDENING = 3e4
+"""The same of a hardening, 1/rad²: 3 % of the torque at 1 mrad."""
 
 FAR = 3.0
 """Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""
@@ -57,12 +59,13 @@ def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> M
 
 
 def far_springs(fit: ResponseFit) -> tuple[str, ...]:
-    """Names of the stiffnesses that ended more than a factor of `FAR` from the robot that the fit started with."""
-    robot = fit.residual.model.robot
+    """Names of the stiffnesses that ended clearly, by two standard deviations, more than a factor of `FAR` from the robot that the fit
+    started with."""
+    robot, stds = fit.residual.model.robot, np.sqrt(np.diag(fit.estimate.covariance))
     return tuple(
         name
-        for name, value in fit.estimate.values.items()
-        if name.endswith(".stiffness") and _moved(robot, name, value) > np.log(FAR)
+        for (name, value), std in zip(fit.estimate.values.items(), stds, strict=True)
+        if name.endswith(".stiffness") and _moved(robot, name, value) > np.log(FAR) + 2 * std
     )
 
 
@@ -77,7 +80,8 @@ def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
     """Standard deviations (p,), in estimation coordinates, that the size of a misfit supports.
 
     The sandwich over clusters of one octave of one pose, in which errors of the model are coherent, and no stiffness better known than to
-    `DOUBTFUL_STIFFNESS`. Where the misfit is severe, a stiffness is known no better than robot.yaml's, nor than its distance from that.
+    `DOUBTFUL_STIFFNESS`, no hardening than to `DOUBTFUL_HARDENING`. Where the misfit is severe, a stiffness is known no better than
+    robot.yaml's, nor than its distance from that.
     """
     residual, jacobian = fit.problem.linearise(fit.x)
     posterior = fit.estimate.covariance
@@ -86,6 +90,8 @@ def misfit_std(fit: ResponseFit, misfit: Misfit) -> np.ndarray:
     std = np.sqrt(np.diag(posterior @ (scores.T @ scores) @ posterior))
     robot = fit.residual.model.robot
     for number, item in enumerate(fit.estimate.parameters):
+        if item.name.endswith(".hardening"):
+            std[number] = max(std[number], DOUBTFUL_HARDENING)
         if item.name.endswith(".stiffness"):
             std[number] = max(std[number], DOUBTFUL_STIFFNESS)
             if misfit.severe:
