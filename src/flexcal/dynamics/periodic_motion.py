@@ -10,8 +10,8 @@ from flexcal.data import Recording, TrajectoryPlan
 from flexcal.errors import FlexcalError
 from flexcal.frequency.line_spectra import torque_hold
 
-_FOLLOWS = 0.1
-"""A motion farther than this from its planned one (rad or m) is another motion."""
+_FOLLOWS, _FOLLOWS_SHARE = 0.1, 0.2
+"""A motion farther than this from its planned one, in rad or m and in its range, is another motion: loops of weak gains lag."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,9 +41,11 @@ class PeriodicMotion:
             values.reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
             for values in (recording.q, recording.torque)
         )
-        apart = np.abs(mean_q - plan.motion(number, np.arange(size) / plan.rate_hz)[0]).max(axis=0)
-        if apart.max() > _FOLLOWS:
-            joint = int(np.argmax(apart))
+        planned = plan.motion(number, np.arange(size) / plan.rate_hz)[0]
+        apart = np.abs(mean_q - planned).max(axis=0)
+        allowed = np.maximum(_FOLLOWS, _FOLLOWS_SHARE * np.ptp(planned, axis=0))
+        if (apart > allowed).any():
+            joint = int(np.argmax(apart / allowed))
             raise FlexcalError(
                 f"{recording.name}: q{joint + 1} is up to {apart[joint]:.3g} from trajectory {number + 1} of its plan; record the planned "
                 "trajectories in their order."
