@@ -94,7 +94,7 @@ def test_currents_of_any_scale(arm: Path, capsys: pytest.CaptureFixture[str]) ->
     """At gains of 1 they look like torques of motors, which the robot's own dynamics refuse; here the gains are what is sought."""
     robot = arm / "robot.yaml"
     robot.write_text(robot.read_text().replace("gain: [50, 20]", "gain: [1, 1]"))
-    assert "torques of the motors" in refusal("dynamics", arguments(arm, "free"), capsys)
+    assert "torques on the motor side" in refusal("dynamics", arguments(arm, "free"), capsys)
     assert main(["identify", "gains", *arguments(arm, "free", "loaded"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["gains"] == pytest.approx(list(DECLARED * GAINS), rel=0.01)

@@ -156,7 +156,7 @@ def comparison_table(kind: str, joints: Mapping[str, Mapping[str, Mapping[str, A
 def response_table(responses: Sequence[Mapping[str, Any]]) -> Table:
     """One row a frequency response: band, and median relative standard deviation of its diagonal."""
     table = Table(title="frequency responses", title_justify="left")
-    for heading in ("pose", "lines", "Hz", "relative std", "of it noise", "freedom"):
+    for heading in ("pose", "lines", "Hz", "relative std", "noise", "degrees of freedom"):
         table.add_column(heading, justify="right")
     table.add_column("file")
     for r in responses:

@@ -56,7 +56,7 @@ def _verdict(results: Mapping[str, Any]) -> Verdict:
     sentence = (
         f"The known mass of the payload is the reference: {len(results['payloads_kg'])} recordings hold "
         f"{' or '.join(f'{mass:g} kg' for mass in payloads)}, and the change of the torques determines the gains. "
-        "A relative error of the declared mass is one of every gain, and no check below detects it."
+        "An error of the declared mass changes all gains by the same factor; no check below detects it."
     )
     return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", trust.checks)
 

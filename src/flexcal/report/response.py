@@ -75,9 +75,9 @@ def _verdict(study: ResponseStudy) -> Verdict:
     trust = Trust(response_checks(study.results, study.responses))
     least, limit = worst_pose(entries), limit_of(entries)
     advice = (
-        "More realisations lower it, more periods of the same do not."
+        "More realisations reduce it, more periods do not."
         if limit == "distortion"
-        else "More periods lower it, or larger torques."
+        else "More periods or larger torques reduce it."
     )
     facts = (
         Fact(
@@ -90,7 +90,7 @@ def _verdict(study: ResponseStudy) -> Verdict:
             "What limits it?",
             limit.capitalize(),
             "",
-            f"Noise alone would leave {percent(least['relative_noise_std'])} there. {advice}",
+            f"The part due to noise is {percent(least['relative_noise_std'])}. {advice}",
         ),
         trust.fact(),
     )
@@ -128,15 +128,15 @@ def _table(study: ResponseStudy) -> Table:
                 *((odd,) if with_odd else ()),
             )
         )
-    columns = ("pose", "mean joint position", "payload", "lines", "band / Hz", "1σ", "of it noise")
-    columns += ("of it distortion", "degrees of freedom", *(("odd distortion",) if with_odd else ()))
+    columns = ("pose", "mean joint position", "payload", "lines", "band / Hz", "1σ", "noise")
+    columns += ("distortion", "degrees of freedom", *(("odd distortion",) if with_odd else ()))
     return Table(
         "table-responses",
         "Uncertainty by pose",
         columns,
         tuple(rows),
-        "1σ is that of the mean over the response, at the median line of the diagonal; noise and distortion add up as squares, their "
-        f"medians nearly so. Realisations were averaged by the method '{entries[0]['method'].replace('_', '-')}'."
+        "1σ is the relative standard deviation of the mean, at the median line of the diagonal; noise and distortion are its parts, whose "
+        f"squares add up. Realisations were averaged by the method '{entries[0]['method'].replace('_', '-')}'."
         + (
             " Odd distortion is what lines that were left out show, over the excited acceleration of the axis where it is largest."
             if with_odd

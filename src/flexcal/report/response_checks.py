@@ -136,9 +136,7 @@ def _check_poses(entries: Sequence[Mapping[str, Any]]) -> Check:
 def _check_freedom(entries: Sequence[Mapping[str, Any]]) -> Check:
     question = "Is the uncertainty itself well estimated?"
     freedom = min(entry["degrees_of_freedom"] for entry in entries)
-    answer = (
-        f"It rests on {freedom:.0f} degrees of freedom, so it is known to {percent((2 * freedom) ** -0.5)}."
-    )
+    answer = f"It has {freedom:.0f} degrees of freedom, a relative standard deviation of {percent((2 * freedom) ** -0.5)}."
     if freedom < _FREEDOM:
         return Check(
             question, f"{answer} Springs are weighted by it; measure more lines or realisations.", "care"
