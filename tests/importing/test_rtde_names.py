@@ -62,7 +62,7 @@ def test_a_log(ur5, made, rng: np.random.Generator) -> None:
         ("target_moment_0 … target_moment_5", "computed by the controller's model, not measured"),
         ("actual_TCP_pose_0 … actual_TCP_pose_2", "tool pose computed by the controller"),
         ("actual_TCP_pose_3 … actual_TCP_pose_5", "rotation vector"),
-        ("target_q_0 … target_q_5, target_qd_0 … target_qd_5, target_qdd_0 … target_qdd_5", "wanted"),
+        ("target_q_0 … target_q_5, target_qd_0 … target_qd_5, target_qdd_0 … target_qdd_5", "commanded"),
     ]:
         assert any(columns in reason and words in reason for reason in reasons), columns
     assert not any("could both begin" in reason for reason in reasons)

@@ -106,7 +106,7 @@ def _rotation_spread(quaternion_wxyz: np.ndarray) -> np.ndarray:
 
 
 def _direction_variation(points: np.ndarray, rows: np.ndarray, number: np.ndarray) -> float | None:
-    """Directions are told apart by the commanded pose that was measured before."""
+    """Directions of approach are distinguished by the commanded pose that was measured before."""
     before = np.where(rows > 0, number[np.maximum(rows - 1, 0)], -1)
     centres = [
         points[before == k].mean(axis=0)

@@ -1,4 +1,4 @@
-"""The command line of this run, for those who want to repeat it."""
+"""The command line of this run, stored for reproduction."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Scripts that complete command lines of flexcal: tables of words, so that completing starts no Python."""
+"""Completion scripts: tables of words, so that completion starts no Python."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the selection of terms considered, as people read it on the console."""
+"""Considered terms of a calibration, as lines of the console."""
 
 from __future__ import annotations
 

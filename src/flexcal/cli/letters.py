@@ -1,4 +1,4 @@
-"""Letters on a terminal that has only some: a near one in the place of what it cannot show, never an error."""
+"""Replacement of letters that a terminal cannot show."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What several verbs say at their end about the one that comes next."""
+"""Next steps that several verbs print."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The options of a verb, from the dataclass that carries it out: for completion, and for what is said of a wrong one."""
+"""The options of a verb, from its dataclass, for completion and error messages."""
 
 from __future__ import annotations
 

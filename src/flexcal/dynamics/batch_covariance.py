@@ -17,7 +17,7 @@ _LEVERAGE = 0.9
 
 @dataclass(frozen=True, eq=False)
 class BatchCovariance:
-    """`covariance` (k, k) of the kept parameters, its degrees of `freedom`, and over how many batches errors hang together: `window`."""
+    """`covariance` (k, k) of the kept parameters, its degrees of `freedom`, and the errors' correlation length in batches: `window`."""
 
     covariance: np.ndarray
     freedom: float

@@ -16,7 +16,7 @@ from flexcal.errors import FlexcalError
 from flexcal.kernels import append
 
 BATCHES = 128
-"""Batches of an experiment, at most: enough to see how its errors hang together in time, however long it is."""
+"""Largest number of batches of an experiment, sufficient for the autocorrelation of its errors at any length."""
 
 
 @dataclass(frozen=True, eq=False)

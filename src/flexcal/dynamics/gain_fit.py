@@ -140,7 +140,7 @@ class _Terms:
         return found
 
     def determined(self, noise: Sequence[float]) -> list[int]:
-        """Numbers of the columns that the data tell apart."""
+        """Numbers of the columns that the data determine."""
         names = [str(number) for number in range(self._width)]
         return sorted(analyse(self._system(noise)[:, :-1], names, prefer=names[::-1]).kept)
 

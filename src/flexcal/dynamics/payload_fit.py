@@ -72,7 +72,7 @@ class _Solution:
 def identify_payload(equations: PayloadEquations) -> PayloadFit:
     """Bayesian weighted least squares, without prior of the payload; then the nearest consistent payload (Wensing et al. 2018).
 
-    The intervals hold what is uncertain of the robot, and errors that hang together in time and between joints (`score_covariance`).
+    The intervals include the uncertainty of the robot, and errors correlated in time and between joints (`score_covariance`).
     What the motion does not tell of the payload stays as declared, and so does inertia whose intervals tell no body from a point
     (`told_moments`). Raises `FlexcalError` as `residual_noise` does, and where the mass is not above zero for sure.
     """

@@ -1,4 +1,4 @@
-"""The one-file HTML reports: what was found, how sure it is, and where it came from, for engineers who have not read the paper."""
+"""The self-contained HTML reports: results, uncertainty, checks and provenance."""
 
 import lazy_loader
 

@@ -1,4 +1,4 @@
-"""Whether the bearings tilt where robot.yaml says, judged by two fits to the same points."""
+"""Check of the declared bearing axes by two fits to the same data."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Residuals along the motion of every joint, and the gravity torque on it: what a compliance that the model lacks would show."""
+"""Residuals along the motion of every joint, and the gravity torque on it."""
 
 from __future__ import annotations
 

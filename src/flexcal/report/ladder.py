@@ -1,4 +1,4 @@
-"""Where errors of different sizes lie on one logarithmic scale, drawn with HTML alone so that it needs no script."""
+"""Errors of several models on one logarithmic scale, in HTML without scripts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measured points, and how far each is from where the models of a robot have it: what the reports on measured positions draw."""
+"""Measured points and their errors for several models, as the reports draw them."""
 
 from __future__ import annotations
 

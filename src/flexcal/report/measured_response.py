@@ -1,4 +1,4 @@
-"""What the reports draw of a measured frequency response, fitted already or not."""
+"""Interface of a measured frequency response, as the reports draw it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a report page is made of, before it becomes HTML."""
+"""Content of a report page, before it becomes HTML."""
 
 from __future__ import annotations
 

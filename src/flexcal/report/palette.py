@@ -1,4 +1,4 @@
-"""The colours of figures and page: each has one value on a light and one on a dark ground."""
+"""Colours of figures and page, on light and dark ground."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether errors at measured poses are what the calibration predicts, for the pages of a map and a certificate."""
+"""Checks of predicted errors against measured poses, for a map and a certificate."""
 
 from __future__ import annotations
 

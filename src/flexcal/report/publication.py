@@ -1,4 +1,4 @@
-"""What others have published about a robot, to be printed beside our own numbers."""
+"""Published results of a robot, printed beside those of a run."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A page to one self-contained HTML file: words and tables first, Plotly once at the end."""
+"""Rendering of a page to one self-contained HTML file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Whether two runs differ by more than chance: in their errors, and in their parameters."""
+"""Significance of the differences between two runs: errors and parameters."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Composes the stages into jobs: one module a job; alone opens the truth file."""
+"""Complete jobs composed of the stages, one module per job; the only package that reads the truth file."""

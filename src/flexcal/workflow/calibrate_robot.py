@@ -1,4 +1,4 @@
-"""Measured positions to geometry: the rigid fit, the terms that the data support, the fit with them, and estimates.yaml."""
+"""Calibration from measured positions: rigid fit, selection of terms, final fit, and estimates.yaml."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joint ranges that a calibration has seen, against those where it is used."""
+"""Comparison of the joint ranges of a calibration with those of its use."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Tool targets to the motor commands of the calibrated robot."""
+"""Motor commands of the calibrated robot for tool targets."""
 
 from __future__ import annotations
 

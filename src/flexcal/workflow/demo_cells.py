@@ -1,4 +1,4 @@
-"""The cells of the demonstration: the virtual one, made from the identified model, and the hard one, which is not."""
+"""The cells of the demonstration: the virtual cell and the hard cell."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Choosing the poses to measure, for a calibration or for its verification."""
+"""Selection of calibration or verification poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Planning the motions that tell what the links weigh."""
+"""Design of exciting trajectories."""
 
 from __future__ import annotations
 

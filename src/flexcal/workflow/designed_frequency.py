@@ -1,4 +1,4 @@
-"""Frequency experiments whose poses and amplitudes are chosen: for the demonstration, and for `flexcal design frequency`."""
+"""Frequency experiments with optimised poses and amplitudes."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measurements that are told apart: one that counts twice makes intervals too narrow, and one that was fitted is not unseen."""
+"""Check that no recording is given twice, or both fitted and validated."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Logs of a robot, divided into what is fitted and what is kept to be predicted."""
+"""Logs of a robot, divided into a fitted and a held-out part."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the flexible model needs of a robot and its logs (Eqs. 2.21, 2.22)."""
+"""Requirements of the flexible model on a robot and its logs (Eqs. 2.21, 2.22)."""
 
 from __future__ import annotations
 

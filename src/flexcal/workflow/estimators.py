@@ -1,4 +1,4 @@
-"""The estimators of dynamic parameters, by the names that users choose them by."""
+"""The estimators of dynamic parameters, by name."""
 
 from __future__ import annotations
 

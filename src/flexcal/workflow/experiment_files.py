@@ -1,4 +1,4 @@
-"""The files that the verbs hand to each other."""
+"""Files that verbs pass to each other."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The calibrated robot in a form that other programs read."""
+"""Export of the calibrated robot to file formats of other programs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a fit of springs leaves of the responses, measured and by the fitted model: fitted_responses.npz."""
+"""Measured and fitted frequency responses: fitted_responses.npz."""
 
 from __future__ import annotations
 

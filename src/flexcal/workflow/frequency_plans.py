@@ -1,4 +1,4 @@
-"""The plain frequency experiments of the demonstration: six informative poses with a payload, or the paper's three without."""
+"""Default plans of frequency experiments: six poses with a payload, or the paper's three without."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Drive gains from the first and from the second half of the recordings, which should agree."""
+"""Drive gains from the first and the second half of the recordings, for comparison."""
 
 from __future__ import annotations
 

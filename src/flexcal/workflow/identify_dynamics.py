@@ -1,4 +1,4 @@
-"""Recordings of exciting motion to dynamic parameters, and estimates.yaml."""
+"""Identification of dynamic parameters from joint logs, and estimates.yaml."""
 
 from __future__ import annotations
 

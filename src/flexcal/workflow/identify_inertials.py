@@ -1,4 +1,4 @@
-"""Recordings of exciting trajectories to link inertials, rotors and friction with CAD as the prior, and estimates.yaml."""
+"""Identification of link inertials, rotors and friction with CAD as the prior, and estimates.yaml."""
 
 from __future__ import annotations
 

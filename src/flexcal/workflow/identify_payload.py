@@ -1,4 +1,4 @@
-"""Recordings of a robot that holds something to its mass, centre of mass and inertia, and estimates.yaml."""
+"""Identification of a payload's mass, centre of mass and inertia, and estimates.yaml."""
 
 from __future__ import annotations
 

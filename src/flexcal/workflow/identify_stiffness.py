@@ -1,4 +1,4 @@
-"""Frequency responses to stiffness and damping, and estimates.yaml."""
+"""Identification of stiffness and damping from frequency responses, and estimates.yaml."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measurements of another program in flexcal's columns and units."""
+"""Import of measurements of other programs."""
 
 from __future__ import annotations
 

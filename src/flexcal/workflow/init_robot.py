@@ -1,4 +1,4 @@
-"""A robot.yaml made for a URDF, to be completed by hand."""
+"""A robot.yaml for a URDF, to be completed by hand."""
 
 from __future__ import annotations
 

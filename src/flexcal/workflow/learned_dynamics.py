@@ -1,4 +1,4 @@
-"""A residual torque learned beside identified dynamics: what it is worth, in results.json, and its file."""
+"""Learned residual torque of identified dynamics: reduction of the error, block of results.json, and file."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""With what payload logs were recorded."""
+"""Payloads of logs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the identified robot predicts for every log, for the report."""
+"""Predicted torques of every log, for the report."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Joint logs to the equations that the estimators need, one after the other or in several processes."""
+"""Equations of joint logs, one after the other or in several processes."""
 
 from __future__ import annotations
 

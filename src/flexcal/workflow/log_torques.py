@@ -1,4 +1,4 @@
-"""Whether the torques of logs can be those of the joints."""
+"""Check that the torques of logs are those of the joints."""
 
 from __future__ import annotations
 

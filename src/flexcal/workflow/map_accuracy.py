@@ -1,4 +1,4 @@
-"""How accurate the calibrated robot should be where it works."""
+"""Accuracy map of the calibrated robot over the working volume."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Carrying out a plan, in the virtual cell or on files recorded before."""
+"""Execution of a plan, in the virtual cell or from recorded files."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which poses to measure next, after those that have been measured."""
+"""Selection of the next poses after measured ones."""
 
 from __future__ import annotations
 

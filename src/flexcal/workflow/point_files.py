@@ -1,4 +1,4 @@
-"""What calibrate and verify leave of single points: points.csv, and arm.npz for the drawing of the arm."""
+"""Files of points and arm drawings of calibrate and verify: points.csv and arm.npz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What poses are chosen from: candidates that can be measured, and where the robot will work."""
+"""Candidate poses and working volume of a pose selection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Motor commands to where the tool of the calibrated robot is."""
+"""Predicted tool poses of the calibrated robot for motor commands."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What identify dynamics and identify payload leave of measured and predicted torques: predictions.npz."""
+"""Measured and predicted torques of identify dynamics and identify payload: predictions.npz."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The joint logs that a verb is given, as files or as folders of plans of trajectories."""
+"""Joint logs given as files or as folders of trajectory plans."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The report of a folder that a verb filled before."""
+"""Report of a folder that a verb has written."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The documents that scripts read (FORMATS: results.json), and the blocks they share."""
+"""The documents for scripts (FORMATS: results.json), and their common blocks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where a page on the robot as it is known comes from."""
+"""Provenance of pages that are based on the present robot model."""
 
 from __future__ import annotations
 

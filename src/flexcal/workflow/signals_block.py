@@ -1,4 +1,4 @@
-"""`signals:` in a robot.yaml."""
+"""The block `signals:` of a robot.yaml."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage 0 of the demonstration: link inertials, rotors and friction from exciting trajectories, before anything elastic is identified."""
+"""Stage 0 of the demonstration: link inertials, rotors and friction from exciting trajectories."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where an identification leaves its estimate."""
+"""File of an identification's estimate."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is done to a log before its equations are written: as robot.yaml declares it, else as the motion asks for."""
+"""Filtering and decimation of a log: as robot.yaml declares, else proposed from the motion."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The main job, whole: identify inertials, then stiffness, choose poses, measure, calibrate, verify, report (P0, P1)."""
+"""The complete two-stage procedure: inertials, stiffness, pose selection, measurement, calibration, verification, report (P0, P1)."""
 
 from __future__ import annotations
 

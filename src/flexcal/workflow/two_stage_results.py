@@ -1,4 +1,4 @@
-"""The document and the table that a two-stage run leaves for scripts (FORMATS: results.json, verification.csv)."""
+"""The document and table of a two-stage run (FORMATS: results.json, verification.csv)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Everything that a two-stage calibration of the virtual robot found."""
+"""Results of a two-stage calibration of the virtual robot."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A calibrated robot against positions that its calibration never saw."""
+"""Verification of a calibrated robot on positions outside the fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where the tool's predicted error is large, in three dimensions."""
+"""Predicted tool error in three dimensions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The tool's predicted error seen from above, from the side and from the front."""
+"""Predicted tool error in three views."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which estimated parameters go together."""
+"""Correlations of estimated parameters."""
 
 from __future__ import annotations
 

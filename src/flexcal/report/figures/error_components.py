@@ -1,4 +1,4 @@
-"""Fig. 12: what is left at every calibration pose, by coordinate."""
+"""Fig. 12: residuals at every calibration pose, by coordinate."""
 
 from __future__ import annotations
 

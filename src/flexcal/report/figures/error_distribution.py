@@ -1,4 +1,4 @@
-"""Cumulative distribution of the error: what share of poses is better than a given number."""
+"""Cumulative distribution of the errors."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many points had which error, before and after."""
+"""Histogram of the errors, before and after."""
 
 from __future__ import annotations
 

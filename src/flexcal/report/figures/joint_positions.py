@@ -1,4 +1,4 @@
-"""Where the joints stand in the poses of a plan, between their limits."""
+"""Joint positions of planned poses between their limits."""
 
 from __future__ import annotations
 

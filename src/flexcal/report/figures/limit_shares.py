@@ -1,4 +1,4 @@
-"""How much of its limits a planned motion takes, joint by joint over one period."""
+"""Use of the limits by a planned motion, joint by joint over one period."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The poses of a plan in three dimensions, with where the robot will work and where the instrument stands."""
+"""The poses of a plan in three dimensions, with working volume and instrument."""
 
 from __future__ import annotations
 

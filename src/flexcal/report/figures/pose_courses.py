@@ -1,4 +1,4 @@
-"""What becomes of poses over time: where their barycentres go, and how they repeat."""
+"""Displacement of the barycentre and repeatability of poses over time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How the predicted tool error falls with the number of poses."""
+"""Predicted tool error against the number of poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How many poses are enough for the stiffnesses."""
+"""Largest standard deviation of a stiffness against the number of poses."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Observed against predicted errors: whether the uncertainty that was claimed is the one that was found."""
+"""Observed errors against predicted quantiles."""
 
 from __future__ import annotations
 

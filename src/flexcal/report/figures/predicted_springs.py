@@ -1,4 +1,4 @@
-"""How well every spring will be known, before anything is measured."""
+"""Predicted standard deviations of the springs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What planned measurements would make of what is known: standard deviations before and after."""
+"""Predicted standard deviations after planned measurements, relative to the prior."""
 
 from __future__ import annotations
 

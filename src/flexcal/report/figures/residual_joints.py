@@ -1,4 +1,4 @@
-"""Residuals against every joint: what the model misses in one joint shows as a wave or a slope here."""
+"""Residuals against every joint position; waves and slopes indicate missing terms."""
 
 from __future__ import annotations
 

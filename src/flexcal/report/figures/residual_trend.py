@@ -1,4 +1,4 @@
-"""Residuals against a quantity of their measurement: its place in the order, its time, the temperature."""
+"""Residuals against measuring order, time or temperature."""
 
 from __future__ import annotations
 

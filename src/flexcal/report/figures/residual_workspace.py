@@ -1,4 +1,4 @@
-"""Where in the working volume the errors are large."""
+"""Residuals over the working volume."""
 
 from __future__ import annotations
 

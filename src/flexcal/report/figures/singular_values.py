@@ -1,4 +1,4 @@
-"""The gap that separates what the poses determine from what they do not."""
+"""Singular values of the identification Jacobian, and the gap at the rank."""
 
 from __future__ import annotations
 

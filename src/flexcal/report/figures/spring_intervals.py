@@ -1,4 +1,4 @@
-"""Table 1 as a picture: every stiffness and damping with its 95 % interval, relative to a reference."""
+"""Stiffnesses and dampings with their 95 % intervals, relative to a reference (Table 1)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What each further term of the geometric model gains on poses left out of the fit."""
+"""Cross-validation errors of sets of terms of the geometric model."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Where in frequency the torques are missed."""
+"""Spectra of measured and residual torques."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Torques over time: what was measured, and what the identified robot predicts."""
+"""Measured and predicted torques over time."""
 
 from __future__ import annotations
 

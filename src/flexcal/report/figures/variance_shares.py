@@ -1,4 +1,4 @@
-"""Which kinds of parameter the predicted error comes from."""
+"""Error sources: reduction of the error variance by kind of parameter."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Fig. 13: the error at poses that the fit never saw, with and without elasticity in the model."""
+"""Fig. 13: errors at poses outside the fit, with and without elasticity in the model."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Sections of a report, one a file: functions from result objects to `Section`."""
+"""Sections of a report, one per file: functions from result objects to `Section`."""

@@ -1,4 +1,4 @@
-"""Where the numbers come from, and how to get them again."""
+"""Origin of the numbers, and the command that reproduces them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a model leaves, against everything that might explain it."""
+"""Residuals against joint positions, order, time, temperature and position."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Measured frequency responses in the report: how strongly motors accelerate, and how surely that is known."""
+"""Measured frequency responses with their noise and distortion levels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What was done to joint logs before their equations were written."""
+"""Filtering and decimation of joint logs."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stiffness and damping with intervals, beside the truth and what was published."""
+"""Stiffness and damping with intervals, beside true and published values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage 0: what exciting trajectories tell of the links, and what that buys the stages after."""
+"""Stage 0 in the report: link inertials from exciting trajectories, and their effect on later stages."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Stage 1 in the report: what shaking the motors told about springs and dampers."""
+"""Stage 1 in the report: stiffness and damping from frequency responses."""
 
 from __future__ import annotations
 

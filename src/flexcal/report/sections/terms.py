@@ -1,4 +1,4 @@
-"""Which terms beyond lengths and angles the data support."""
+"""Selected terms beyond lengths and angles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How well the identified robot predicts torques, over time and over frequency."""
+"""Torque prediction of the identified robot, over time and over frequency."""
 
 from __future__ import annotations
 
