@@ -11,7 +11,7 @@ from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.model import RobotModel
 from flexcal.model.closed_loop import multisine_torque
 from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.hardening import twist_of
+from flexcal.model.hardening import REFERENCE_TWIST, twist_of
 from flexcal.model.linearisation import linearise
 
 PHASES = 64
@@ -53,10 +53,10 @@ class DriveTorque:
         return 2 * self.stiffness * density
 
     def hardening_stiffness(self, hardening: np.ndarray) -> np.ndarray:
-        """What hardening adds to the stiffness of each drive along the reference motion, relative, per 1/rad², (phases, E).
+        """What hardening adds to the stiffness of each drive along the reference motion, relative, per unit of it, (phases, E).
 
-        The torque k (θ + a θ³) of a twist with the mean θ̄ and Gaussian about it, 1σ s, has the equivalent stiffness
-        k (1 + 3 a (θ̄² + s²)) (Bussgang 1952). θ̄ is the twist that drives of `hardening` a (E,) have under the slow torque.
+        The torque k θ (1 + h (θ/θ₁)²) of a twist with the mean θ̄ and Gaussian about it, 1σ s, has the equivalent stiffness
+        k (1 + 3 h (θ̄² + s²)/θ₁²) (Bussgang 1952). θ̄ is the twist that drives of `hardening` h (E,) have under the slow torque.
         """
         twist = twist_of(self.slow, self.stiffness, hardening)
-        return 3 * (twist**2 + (self.size / self.stiffness) ** 2)
+        return 3 * (twist**2 + (self.size / self.stiffness) ** 2) / REFERENCE_TWIST**2

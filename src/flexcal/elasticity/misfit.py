@@ -23,8 +23,8 @@ SEVERE_CHI2 = 2.0
 
 DOUBTFUL_STIFFNESS = 0.1
 """Relative 1σ of a stiffness at least where there is a misfit: drives that slip differ so much between small motion and load."""
-DOUBTFUL_HARDENING = 3e4
-"""The same of a hardening, 1/rad²: 3 % of the torque at 1 mrad."""
+DOUBTFUL_HARDENING = 0.03
+"""1σ of a hardening at least where there is a misfit."""
 
 FAR = 3.0
 """Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""

@@ -26,7 +26,7 @@ def half_gap_name(joint: str) -> str:
 
 
 def hardening_name(joint: str) -> str:
-    """Name of the hardening of a drive, 1/rad²."""
+    """Name of the hardening of a drive."""
     return f"{joint}.drive.hardening"
 
 

@@ -23,8 +23,8 @@ from flexcal.model.names import unit_of
 HALF_GAP_STD = 1e-4
 """Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
 
-HARDENING_STD = 3e5
-"""Prior of a drive's hardening, 1σ in 1/rad²: 30 % more torque at 1 mrad, about the twist of a loaded gear, than its stiffness says."""
+HARDENING_STD = 0.3
+"""Prior of a drive's hardening, 1σ."""
 
 
 def stage_one_parameters(

@@ -32,7 +32,7 @@ class PoseModel:
 
     `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
     half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` and
-    `hardening_stiffness` (phases, E) are the same for drives that harden: relative stiffness, per 1/rad². `delays` (E,)
+    `hardening_stiffness` (phases, E) are the same for drives that harden: relative stiffness, per unit of hardening. `delays` (E,)
     are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
     """
 

@@ -1,20 +1,28 @@
-"""Drive springs that harden: the torque k (θ + a θ³) of a twist θ, as of gears whose teeth come into contact one after the other."""
+"""Drive springs that harden, as of gears whose teeth come into contact one after the other: a twist θ takes the torque
+k θ (1 + h (θ / 1 mrad)²).
+
+The hardening h is the share by which the torque at a twist of 1 mrad, about that of a loaded gear, exceeds what the stiffness k at no load
+makes of it.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+REFERENCE_TWIST = 1e-3
+"""The twist, rad, that hardening is stated for."""
 _NEWTON_STEPS = 20
 
 
 def twist_of(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarray) -> np.ndarray:
-    """Twist (..., n), rad, under `torque` (..., n) N m; `stiffness` k (n,) N m/rad at no load, `hardening` a ≥ 0 (n,) 1/rad²."""
+    """Twist (..., n), rad, under `torque` (..., n) N m; `stiffness` (n,) N m/rad at no load, `hardening` (n,) at least 0."""
     linear = torque / stiffness
     if not np.any(hardening):
         return linear
-    twist = linear / (1 + hardening * linear**2) ** (1 / 3)
+    twist = linear / (1 + hardening * (linear / REFERENCE_TWIST) ** 2) ** (1 / 3)
     for _ in range(_NEWTON_STEPS):
-        step = (twist + hardening * twist**3 - linear) / tangent_ratio(twist, hardening)
+        excess = twist * (1 + hardening * (twist / REFERENCE_TWIST) ** 2) - linear
+        step = excess / tangent_ratio(twist, hardening)
         twist = twist - step
         if np.all(np.abs(step) <= 1e-15):
             break
@@ -22,10 +30,10 @@ def twist_of(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarray) -
 
 
 def tangent_ratio(twist: np.ndarray, hardening: np.ndarray) -> np.ndarray:
-    """Tangent stiffness at a twist over that at no load, 1 + 3 a θ²."""
-    return 1 + 3 * hardening * twist**2
+    """Tangent stiffness at a twist over that at no load."""
+    return 1 + 3 * hardening * (twist / REFERENCE_TWIST) ** 2
 
 
 def twist_by_hardening(twist: np.ndarray, hardening: np.ndarray) -> np.ndarray:
-    """Derivative of the twist under a given torque by the hardening, rad³."""
-    return -(twist**3) / tangent_ratio(twist, hardening)
+    """Derivative of the twist under a given torque by the hardening, rad."""
+    return -twist * (twist / REFERENCE_TWIST) ** 2 / tangent_ratio(twist, hardening)

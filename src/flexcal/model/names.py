@@ -20,7 +20,7 @@ _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
     "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
     "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
-    "stiffness": "N m/rad", "damping": "N m s/rad", "hardening": "1/rad²",
+    "stiffness": "N m/rad", "damping": "N m s/rad",
     "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
