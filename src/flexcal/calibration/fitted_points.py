@@ -327,7 +327,9 @@ class FittedPoints:
         model, model_std = self._together("workspace", "order", "command")
         values = (instrument, scatter.share, robot, scatter.angular, model, scatter.pose)
         angular_std, pose_std = (self.spread.get(name, 0.0) for name in ("angular", "pose"))
-        known = np.array([0.0, 0.0, robot_std, angular_std, model_std, pose_std])
+        # the points of the fit are all that speaks for a stated sigma
+        share_std = scatter.share / np.sqrt(2 * max(self.estimate.degrees_of_freedom, 1))
+        known = np.array([0.0, share_std, robot_std, angular_std, model_std, pose_std])
         items = (
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
             for key, value in zip(SCATTER, values, strict=True)

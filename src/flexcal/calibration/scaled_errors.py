@@ -19,7 +19,8 @@ class ErrorScale:
     `ratio`, between `ratio_low` and `ratio_high`, is of the whole root mean square. `factor`, between `low` and `high`, is by how much
     the errors of parameters and model must be larger for that, independent noise being as it is. `freedom`: so many independent numbers the
     errors at all poses are worth, for they share one set of parameters. `probability` (N,): of an error no larger than the observed one, as
-    predicted; uniform where the prediction is right. `noise_known`: whether instrument and repeatability are among what is predicted.
+    predicted, the size of the scatter being known no better than the calibration found it; uniform where the prediction is right.
+    `noise_known`: whether instrument and repeatability are among what is predicted.
     """
 
     factor: float
@@ -111,7 +112,7 @@ def error_scale(verification: Verification, covariance: ErrorCovariance) -> Erro
         ratio_low=float(np.sqrt(total / predicted / low)),
         ratio_high=float(np.sqrt(total / predicted / high)),
         freedom=mean_and_freedom(max(factor**2, 1e-12))[1],
-        probability=distance_probability(size, principal_variances(whole)),
+        probability=distance_probability(size, principal_variances(whole), covariance.freedom),
         noise_known=covariance.independent is not None,
     )
 

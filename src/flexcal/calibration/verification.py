@@ -116,7 +116,7 @@ def verify_jointly(
         scatter_rms=np.sqrt(squares),
         ambiguous=ambiguous_poses(model, at),
     )
-    freedom = np.inf if noise_free else _freedom(model, at, float(np.sum(found.expected_rms**2)))
+    freedom = np.inf if noise_free else _freedom(model, at, poses, float(np.sum(found.expected_rms**2)))
     return found, ErrorCovariance(
         np.concatenate([roots, shared], axis=2),
         shared.shape[2],
@@ -127,12 +127,13 @@ def verify_jointly(
     )
 
 
-def _freedom(model: RobotModel, at: Prediction, predicted: float) -> float:
+def _freedom(model: RobotModel, at: Prediction, poses: PoseSet, predicted: float) -> float:
     """Degrees of freedom of the `predicted` sum of squares, m², from the standard deviations of the scatter (Satterthwaite, 1946)."""
     known, rows = model.posterior, 3 * len(at.position)
     weights = {
         "scatter.robot": rows,
         "scatter.model": rows,
+        "scatter.instrument_share": float(np.sum(poses.sigma**2)) if poses.sigma_given else 0.0,
         "scatter.angular": float(np.sum(joint_turns(at) ** 2)),
     }
     seen = [name for name in weights if known.determines(name)]

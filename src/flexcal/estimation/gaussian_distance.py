@@ -8,6 +8,8 @@ import numpy as np
 
 _DEGREE = 14
 """Of the Chebyshev series for the quantile, in each of two ratios of standard deviations; it is then right to 2e-6 of the quantile."""
+_KNOWN = 1e9
+"""Degrees of freedom from which variances count as known."""
 _DIRECTIONS = 24
 """Nodes a coordinate of the quadrature over an octant of directions."""
 
@@ -40,16 +42,17 @@ def distance_quantile(variances: np.ndarray) -> np.ndarray:
     return largest * np.polynomial.chebyshev.chebval2d(2 * first - 1, 2 * second - 1, _series())
 
 
-def distance_probability(distance: np.ndarray, variances: np.ndarray) -> np.ndarray:
+def distance_probability(distance: np.ndarray, variances: np.ndarray, freedom: float = np.inf) -> np.ndarray:
     """Probability (N,) that zero-mean Gaussian vectors with principal `variances` (N, 3) are no longer than `distance` (N,).
 
-    The mean over all directions of the probability that a length with three degrees of freedom stays within the ellipsoid's.
+    The mean over all directions of the probability that a length with three degrees of freedom stays within the ellipsoid's. Where the
+    variances are themselves estimated with finite `freedom`, that of Student's multivariate t.
     """
-    from scipy.special import gammainc
+    from scipy.special import fdtr
 
     squares, weights = _quadrature()
     along = np.maximum(variances @ squares.T, np.finfo(float).tiny)
-    return gammainc(1.5, 0.5 * distance[:, None] ** 2 / along) @ weights
+    return fdtr(3.0, min(freedom, _KNOWN), distance[:, None] ** 2 / (3 * along)) @ weights
 
 
 @cache

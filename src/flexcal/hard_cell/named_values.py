@@ -6,11 +6,12 @@ import numpy as np
 
 from flexcal.hard_cell.drawn import HardRobot
 
+MILLIRADIAN = 1e-3
 _SPRINGS = ("bearing_x", "bearing_y", "drive")
 
 
 def counterparts(robot: HardRobot) -> dict[str, float]:
-    """True values, SI, of link masses and centres of mass, rotor inertias, springs, dampers and half gaps, by parameter name.
+    """True values, SI, of link masses and centres of mass, rotor inertias, springs, dampers, hardening and half gaps, by parameter name.
 
     Springs of the wrist are among them, which stage 1 may find. The rest of the robot, above all its geometry, has other parameters than
     the model and can be judged by measured points alone.
@@ -24,6 +25,8 @@ def counterparts(robot: HardRobot) -> dict[str, float]:
         for component in np.flatnonzero(np.isfinite(arm.springs[j])):
             values[f"{link.joint}.{_SPRINGS[component]}.stiffness"] = float(arm.springs[j, component])
             values[f"{link.joint}.{_SPRINGS[component]}.damping"] = float(arm.dampers[j, component])
+        if np.isfinite(arm.springs[j, 2]):
+            values[f"{link.joint}.drive.hardening"] = float(robot.hardening[j, 2]) * MILLIRADIAN**2
         if j in arm.gaps:
             values[f"{link.joint}.backlash"] = float(robot.gap[j])
     return values

@@ -10,6 +10,7 @@ from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.report.responses_check import misfit_sentences
+from flexcal.report.sections.springs import hardening_sentence
 from flexcal.workflow.bearing_remarks import response_bearings_remarks
 
 _ONE_SIDED = 1.645
@@ -45,6 +46,8 @@ def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, 
             f"the motor of {_listed(moving)} seems to have moved with the arm, held by its controller and not by a brake; the identified "
             "spring then contains the stiffness of the controller; apply the brakes and repeat, or use this spring with care"
         )
+    if hardening := hardening_sentence(estimate):
+        remarks.append(hardening[0].lower() + hardening.rstrip(".")[1:])
     if estimate.misfit is not None:
         remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")
     return (*remarks, *response_bearings_remarks(result.bearings))

@@ -47,6 +47,21 @@ def unseen_springs(estimate: Estimate, names: Sequence[str]) -> tuple[str, ...]:
     )
 
 
+def hardening_sentence(estimate: Estimate) -> str:
+    """What the drives harden by, where that was estimated; "" otherwise."""
+    names = [name for name in estimate.parameters.names if name.endswith(".drive.hardening")]
+    if not names:
+        return ""
+    shares = (
+        f"{name.split('.')[0]} {percent(estimate.values[name])} ± {percent(estimate.std(name) or 0.0)}"
+        for name in names
+    )
+    return (
+        "The drives harden under load: at a twist of 1 mrad the torque exceeds what the stiffness gives by "
+        f"{', '.join(shares)} (1σ). The stiffness is that at no load; rest positions and responses are computed with both."
+    )
+
+
 def _row(
     estimate: Estimate,
     name: str,

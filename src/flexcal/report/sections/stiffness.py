@@ -13,7 +13,7 @@ from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.notation import percent, significant
 from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text
 from flexcal.report.sections.responses import levels_block
-from flexcal.report.sections.springs import spring_table, unseen_springs
+from flexcal.report.sections.springs import hardening_sentence, spring_table, unseen_springs
 from flexcal.report.study import TwoStageStudy
 from flexcal.units import DEGREE
 
@@ -29,6 +29,8 @@ def stiffness_section(study: TwoStageStudy) -> Section:
         spring_table(estimate, stiffness, "stiffness", study.truth, published, source),
         spring_table(estimate, damping, "damping", study.truth, published, source),
     ]
+    if hardening := hardening_sentence(estimate):
+        blocks.append(Text((), "Hardening", (hardening,)))
     if unseen:
         blocks.append(Text((), "Not determined by these data", unseen))
     blocks += [
