@@ -51,3 +51,17 @@ def test_the_series_is_right_between_its_nodes(rng: np.random.Generator) -> None
 
 def test_no_error_at_all_is_no_distance() -> None:
     assert distance_quantile(np.zeros((1, 3)))[0] == 0 and mean_distance(np.zeros((1, 3)))[0] == 0
+
+
+def test_estimated_variances_have_longer_tails(rng: np.random.Generator) -> None:
+    """Vectors whose common variance was estimated with 8 degrees of freedom, against drawn ones."""
+    std, freedom = np.array([2.0, 1.0, 0.4]), 8
+    estimated = rng.chisquare(freedom, 200_000) / freedom
+    length = np.linalg.norm(std * rng.standard_normal((200_000, 3)), axis=1) / np.sqrt(estimated)
+    for share in (0.5, 0.95):
+        at = np.quantile(length, share)
+        below = distance_probability(np.array([at]), std[None] ** 2, freedom)[0]
+        assert below == pytest.approx(share, abs=0.004)
+    assert distance_probability(np.array([3.0]), std[None] ** 2, np.inf)[0] == pytest.approx(
+        distance_probability(np.array([3.0]), std[None] ** 2)[0], abs=1e-12
+    )

@@ -11,11 +11,21 @@ from flexcal.elasticity.reference_motion import ReferenceMotion
 from flexcal.model import RobotModel
 from flexcal.model.closed_loop import multisine_torque
 from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.hardening import REFERENCE_TWIST, twist_of
+from flexcal.model.hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_of
 from flexcal.model.linearisation import linearise
 
 PHASES = 64
 """Instants of the reference motion at which the torque is looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Hardened:
+    """Stiffness over that at no load along the reference motion, `ratio` (phases, E), and its derivatives by the hardening and by the
+    logarithm of the stiffness."""
+
+    ratio: np.ndarray
+    by_hardening: np.ndarray
+    by_stiffness: np.ndarray
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,11 +62,18 @@ class DriveTorque:
         density = np.exp(-0.5 * (self.slow / self.size) ** 2) / (np.sqrt(2 * np.pi) * self.size)
         return 2 * self.stiffness * density
 
-    def hardening_stiffness(self, hardening: np.ndarray) -> np.ndarray:
-        """What hardening adds to the stiffness of each drive along the reference motion, relative, per unit of it, (phases, E).
+    def hardened(self, stiffness: np.ndarray, hardening: np.ndarray) -> Hardened:
+        """Drives of some `stiffness` (E,) N m/rad at no load and `hardening` (E,) along the reference motion.
 
         The torque k θ (1 + h (θ/θ₁)²) of a twist with the mean θ̄ and Gaussian about it, 1σ s, has the equivalent stiffness
-        k (1 + 3 h (θ̄² + s²)/θ₁²) (Bussgang 1952). θ̄ is the twist that drives of `hardening` h (E,) have under the slow torque.
+        k (1 + 3 h (θ̄² + s²)/θ₁²) (Bussgang 1952); θ̄ is the twist under the slow torque.
         """
-        twist = twist_of(self.slow, self.stiffness, hardening)
-        return 3 * (twist**2 + (self.size / self.stiffness) ** 2) / REFERENCE_TWIST**2
+        twist, size = twist_of(self.slow, stiffness, hardening), self.size / stiffness
+        square = 3 * (twist**2 + size**2) / REFERENCE_TWIST**2
+        falls = 6 * twist * twist_by_hardening(twist, hardening) / REFERENCE_TWIST**2
+        linear = self.slow / stiffness / tangent_ratio(twist, hardening)  # -∂θ̄/∂log k
+        return Hardened(
+            1 + hardening * square,
+            square + hardening * falls,
+            -6 * hardening * (twist * linear + size**2) / REFERENCE_TWIST**2,
+        )

@@ -101,8 +101,11 @@ def identify_stiffness(
     first = first_fit(model, data, x)
     harder = with_hardening(model, data, first)
     if harder is not data:
-        data = harder
-        first = first_fit(model, data, data.parameters(model)[0].coordinates(first.estimate.values))
+        # linear drives may have led the fit astray; so both where it ended and where it began are starts
+        parameters, began = harder.parameters(model)[0], data.parameters(model)[0].with_coordinates(x)
+        starts = (first.estimate.values, {item.name: item.value for item in began})
+        fits = [first_fit(model, harder, parameters.coordinates(values)) for values in starts]
+        data, first = harder, min(fits, key=lambda fit: fit.estimate.reduced_chi2)
     progress("fitting", 0.3)
 
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.elasticity.drive_torque import DriveTorque
+from flexcal.elasticity.drive_torque import DriveTorque, Hardened
 from flexcal.elasticity.naming import half_gap_name, hardening_name, pose_labels, viscous_name
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
@@ -31,8 +31,8 @@ class PoseModel:
     """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
 
     `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
-    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` and
-    `hardening_stiffness` (phases, E) are the same for drives that harden: relative stiffness, per unit of hardening. `delays` (E,)
+    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` maps
+    the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,)
     are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
     """
 
@@ -42,8 +42,8 @@ class PoseModel:
     robot_names: dict[str, int]
     gaps: dict[int, int]
     gap_compliance: np.ndarray
-    hardening: dict[int, int]
-    hardening_stiffness: np.ndarray
+    hardening: dict[int, tuple[int, int]]
+    torque: DriveTorque | None
     delays: np.ndarray
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
@@ -66,26 +66,35 @@ class PoseModel:
 
     def stiffness_ratio(self, natural: np.ndarray) -> np.ndarray:
         """Stiffness and damping (phases, E) of every drive along the reference motion over those at no load with its gap closed."""
-        return self._harder(natural) / self._softer(natural)
+        return self._hardened(natural).ratio / self._softer(natural)
 
     def slopes(self, natural: np.ndarray) -> list[tuple[int, int, float]]:
-        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by it: gaps, hardening."""
-        harder, softer = self._harder(natural), self._softer(natural)
-        mean = np.mean(harder / softer, axis=0)
-        by_gap = -np.mean(harder * self.gap_compliance / softer**2, axis=0) / mean
-        by_hardening = np.mean(self.hardening_stiffness / softer, axis=0) / mean
-        return [
-            (axis, number, float(slope[axis]))
-            for numbers, slope in ((self.gaps, by_gap), (self.hardening, by_hardening))
-            for axis, number in numbers.items()
-        ]
+        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by it or, for the
+        stiffness at no load, by its logarithm beyond its own: gaps, hardening."""
+        hardened, softer = self._hardened(natural), self._softer(natural)
+        mean = np.mean(hardened.ratio / softer, axis=0)
+        by_gap = -np.mean(hardened.ratio * self.gap_compliance / softer**2, axis=0) / mean
+        by_hardening, by_stiffness = (
+            np.mean(slope / softer, axis=0) / mean for slope in (hardened.by_hardening, hardened.by_stiffness)
+        )
+        slopes = [(axis, number, float(by_gap[axis])) for axis, number in self.gaps.items()]
+        for axis, (hardening, stiffness) in self.hardening.items():
+            slopes.append((axis, hardening, float(by_hardening[axis])))
+            slopes.append((axis, stiffness, float(by_stiffness[axis])))
+        return slopes
 
     def _softer(self, natural: np.ndarray) -> np.ndarray:
-        return 1.0 + self.gap_compliance * _by_axis(self.gaps, natural, self.gap_compliance.shape[1])
+        half_gap = np.zeros(self.gap_compliance.shape[1])
+        half_gap[list(self.gaps)] = natural[list(self.gaps.values())]
+        return 1.0 + self.gap_compliance * half_gap
 
-    def _harder(self, natural: np.ndarray) -> np.ndarray:
-        axes = self.hardening_stiffness.shape[1]
-        return 1.0 + self.hardening_stiffness * _by_axis(self.hardening, natural, axes)
+    def _hardened(self, natural: np.ndarray) -> Hardened:
+        """All drives harden, or none."""
+        if self.torque is None or not self.hardening:
+            none = np.zeros_like(self.gap_compliance)
+            return Hardened(none + 1.0, none, none)
+        numbers = np.array([self.hardening[axis] for axis in sorted(self.hardening)])
+        return self.torque.hardened(natural[numbers[:, 1]], natural[numbers[:, 0]])
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +128,14 @@ class ResponseModel:
             if half_gap_name(joint.name) in parameters
         }
         hardening = {
-            axis: parameters.index(hardening_name(joint.name))
+            axis: (
+                parameters.index(hardening_name(joint.name)),
+                parameters.index(f"{joint.name}.drive.stiffness"),
+            )
             for axis, joint in enumerate(robot.driven)
             if hardening_name(joint.name) in parameters
         }
-        poses, unchanged = [], np.zeros((1, len(robot.driven)))
+        poses = []
         for response, label in zip(responses, labels, strict=True):
             names: dict[str, int] = {}
             for number, name in enumerate(parameters.names):
@@ -141,9 +153,9 @@ class ResponseModel:
                     response.payload,
                     names,
                     gaps,
-                    unchanged,
+                    np.zeros((1, len(robot.driven))),
                     hardening,
-                    unchanged,
+                    None,
                     at,
                 )
             )
@@ -158,14 +170,7 @@ class ResponseModel:
             loaded = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan)
             mean = pose.stiffness_ratio(natural).mean(axis=0)
             loaded = replace(loaded, stiffness=loaded.stiffness / mean)  # at no load
-            hardening = _by_axis(pose.hardening, natural, len(mean))
-            poses.append(
-                replace(
-                    pose,
-                    gap_compliance=loaded.gap_compliance(),
-                    hardening_stiffness=loaded.hardening_stiffness(hardening),
-                )
-            )
+            poses.append(replace(pose, gap_compliance=loaded.gap_compliance(), torque=loaded))
         return replace(self, poses=tuple(poses))
 
     def predict(self, x: np.ndarray) -> list[Prediction]:
@@ -196,31 +201,22 @@ class ResponseModel:
             return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
         change = change * phase[..., None]
         drive_changes = {axis: np.zeros_like(response) for axis in pose.changing}
-        numbers, blocks = [], []
+        blocks: dict[int, np.ndarray] = {}
         for k, name in enumerate(names):
             slope = known[name]  # ∂/∂ log of it
             if name in pose.robot_names:
-                numbers.append(pose.robot_names[name])
-                log = self.parameters[numbers[-1]].scale == "log"
-                blocks.append(change[..., k] * (slope if log else 1.0))
+                number = pose.robot_names[name]
+                log = self.parameters[number].scale == "log"
+                blocks[number] = change[..., k] * (slope if log else 1.0)
             if name in softened:
                 drive_changes[softened[name]] += change[..., k] * slope
         for axis, number, by_parameter in pose.slopes(values):
-            numbers.append(number)
-            blocks.append(drive_changes[axis] * by_parameter)
+            blocks[number] = blocks.get(number, 0.0) + drive_changes[axis] * by_parameter
         for axis in np.flatnonzero(pose.delays >= 0):
-            numbers.append(pose.delays[axis])
-            late = np.zeros_like(response)
-            late[:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[numbers[-1]]
-            blocks.append(late)
-        return Prediction(response, np.stack(blocks, axis=-1), np.array(numbers))
-
-
-def _by_axis(numbers: dict[int, int], natural: np.ndarray, axes: int) -> np.ndarray:
-    """Natural values (axes,) of one parameter an axis, 0 where an axis has none."""
-    values = np.zeros(axes)
-    values[list(numbers)] = natural[list(numbers.values())]
-    return values
+            number = int(pose.delays[axis])
+            blocks[number] = np.zeros_like(response)
+            blocks[number][:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[number]
+        return Prediction(response, np.stack(list(blocks.values()), axis=-1), np.array(list(blocks)))
 
 
 def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:
