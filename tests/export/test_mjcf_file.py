@@ -55,3 +55,14 @@ def test_only_what_mjcf_has_no_place_for_is_lost(tx90l: RobotModel, tmp_path: Pa
     np.testing.assert_allclose([error.mean, error.max], [missed.mean(), missed.max()], rtol=1e-6)
     assert "cannot carry backlash (alone" in (tmp_path / "robot.xml").read_text()
     assert write_mjcf(tx90l, tmp_path / "robot.xml").lost == ()
+
+
+def test_linear_springs_in_place_of_drives_that_harden_are_told(tx90l: RobotModel, tmp_path: Path) -> None:
+    hard = tx90l.with_values({"joint_2.drive.hardening": 0.2})
+    export = write_mjcf(hard, tmp_path / "robot.xml")
+    assert export.lost == ("hardening of drives",)
+    q, _ = random_poses(hard, None, np.random.default_rng(0))
+    missed = np.linalg.norm(tool_positions(hard, q)[0] - tool_positions(tx90l, q)[0], axis=1)
+    error = export.loss.error
+    assert error is not None and error.max > 1e-5
+    np.testing.assert_allclose([error.mean, error.max], [missed.mean(), missed.max()], rtol=1e-6)

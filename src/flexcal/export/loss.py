@@ -17,6 +17,7 @@ BACKLASH = "backlash"
 GRAVITY_COMPLIANCE = "gravity compliance"
 LATERAL_COMPLIANCE = "lateral gravity compliance"
 TRANSMISSION = "transmission error"
+HARDENING = "hardening of drives"
 GEOMETRY = "axis misalignments and lengths"
 AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
 """The terms beyond rigid geometry, which hardly any format has a place for."""
@@ -176,6 +177,8 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
         return replace(model, gravity_compliance=np.zeros_like(model.gravity_compliance))
     if term == LATERAL_COMPLIANCE and model.lateral_compliance.any():
         return replace(model, lateral_compliance=np.zeros_like(model.lateral_compliance))
+    if term == HARDENING and model.hardening.any():
+        return replace(model, hardening=np.zeros_like(model.hardening))
     if term == TRANSMISSION and model.transmission.any():
         return replace(model, transmission=np.zeros_like(model.transmission))
     return model

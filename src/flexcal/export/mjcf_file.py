@@ -10,7 +10,14 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.export.exported import Exported, Rendered, write_rendered
-from flexcal.export.loss import BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION, ToolMap
+from flexcal.export.loss import (
+    BACKLASH,
+    GRAVITY_COMPLIANCE,
+    HARDENING,
+    LATERAL_COMPLIANCE,
+    TRANSMISSION,
+    ToolMap,
+)
 from flexcal.export.mjcf import mjcf_spec
 from flexcal.model import RobotModel
 from flexcal.model.names import SPRINGS
@@ -68,7 +75,7 @@ def render_mjcf(model: RobotModel) -> Rendered:
     return Rendered(
         text,
         mjcf_tool(model, text),
-        (BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION),
+        (BACKLASH, GRAVITY_COMPLIANCE, HARDENING, LATERAL_COMPLIANCE, TRANSMISSION),
         "<!--",
         about=about,
         remarks=tuple(remarks),
