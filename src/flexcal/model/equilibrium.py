@@ -193,13 +193,11 @@ def static_equilibrium(
     load = gravity_torque(model, q, masses)
     free = transmission_error(model, q) - load * model.gravity_compliance
     loose = model.backlash > 0
-    sprung = [i for i, component in axes if component == 2]
-    hardening, softer = model.hardening[sprung], np.ones((len(q), len(sprung)))
-    if hardening.any():
-        linear = load[:, sprung] / model.stiffness[sprung, 2]
-        twist = twist_of(load[:, sprung], model.stiffness[sprung, 2], hardening)
-        free[:, sprung] += linear - twist
-        softer = 1 / tangent_ratio(twist, hardening)
+    drives = [k for k, (_, component) in enumerate(axes) if component == 2]
+    sprung = [axes[k][0] for k in drives]
+    hardening = model.hardening[sprung]
+    twist = twist_of(load[:, sprung], stiffness[drives], hardening)
+    free[:, sprung] += load[:, sprung] / stiffness[drives] - twist
     rest = np.sign(load) if flank is None else flank
     for last in (False,) * (_FLANK_PASSES - 1) + (True,):
         slack = free - rest * model.backlash
@@ -217,9 +215,7 @@ def static_equilibrium(
         slopes = lateral_slopes(model, q, masses)
         deflection[:, :, :2] += np.matmul(model.lateral_compliance[:, None, :], slopes)[:, :, 0]
     if sensitivities and hardening.any():
-        derivatives[0][:, [k for k, (_, component) in enumerate(axes) if component == 2]] *= softer[
-            :, :, None
-        ]
+        derivatives[0][:, drives] /= tangent_ratio(twist, hardening)[:, :, None]
     has_backlash = np.zeros(model.n)
     has_backlash[list(model.backlash_joints)] = 1.0
     return Equilibrium(
