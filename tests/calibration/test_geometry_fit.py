@@ -268,7 +268,7 @@ def test_the_fit_without_backlash_is_worse(simulate: Callable, tx90l: RobotModel
         calibrate(tx90l, simulated.poses),
         calibrate(tx90l, simulated.poses, terms=("kinematic",)),
     )
-    assert unexplained(with_) < 5e-6 < 1e-5 < unexplained(without)
+    assert unexplained(with_) < 8e-6 and unexplained(without) > 2 * unexplained(with_)
     assert abs(with_.estimate.values["joint_2.backlash"] - 3e-4) < 4 * with_.estimate.std("joint_2.backlash")  # type: ignore[operator]
 
 

@@ -22,9 +22,9 @@ def drawn(visits: np.ndarray) -> LinearFit:
     rng = np.random.default_rng(4)
     cells = ErrorCells(visits, np.arange(30) // 6, (7 * np.arange(30)) % 4, np.arange(30) % 11)
     sigma = rng.uniform(1e-5, 3e-5, (30, 3))
-    parts = (rng.normal(size=(30, 3, k)) for k in (5, 2, 3))
-    free, tied, turns = parts
-    return LinearFit(4e-5 * rng.normal(size=(30, 3)), free, 1e-5 * tied, sigma, turns, cells)
+    parts = (rng.normal(size=(30, 3, k)) for k in (5, 2, 3, 4))
+    free, tied, turns, waves = parts
+    return LinearFit(4e-5 * rng.normal(size=(30, 3)), free, 1e-5 * tied, waves, sigma, turns, cells)
 
 
 def derivative(fit: LinearFit, name: str) -> np.ndarray:
@@ -34,6 +34,8 @@ def derivative(fit: LinearFit, name: str) -> np.ndarray:
         return np.eye(90)
     if name == "share":
         return np.diag(fit.sigma.ravel() ** 2)
+    if name == "transmission":
+        return fit.waves.reshape(90, -1) @ fit.waves.reshape(90, -1).T
     labels = cells.pose if name in ("pose", "angular") else cells.blocks[name]
     same = np.kron(labels[:, None] == labels[None], np.ones((3, 3)))
     turns = fit.turns.reshape(90, -1)
@@ -43,7 +45,12 @@ def derivative(fit: LinearFit, name: str) -> np.ndarray:
 @pytest.mark.parametrize("visits", [ONE_POINT, SEVERAL_POINTS])
 @pytest.mark.parametrize(
     "names",
-    [("robot",), ("robot", "pose", "angular", "workspace", "order", "command"), ("robot", "order", "share")],
+    [
+        ("robot",),
+        ("robot", "pose", "angular", "transmission", "workspace", "order", "command"),
+        ("robot", "order", "share"),
+        ("robot", "transmission", "share"),
+    ],
 )
 def test_likelihood_and_its_derivatives(visits: np.ndarray, names: tuple[str, ...]) -> None:
     fit = drawn(visits)
@@ -82,15 +89,17 @@ def test_visits_have_the_covariance_of_their_points(visits: np.ndarray) -> None:
 
 
 def test_components_are_those_of_a_search_without_derivatives() -> None:
+    """The likelihood is multiplied by the standard deviation of the only model error."""
     fit = drawn(ONE_POINT)
     rng = np.random.default_rng(5)
     wandering = 5e-5 * rng.normal(size=(4, 3))[fit.cells.blocks["order"]]
     fit = replace(fit, residual=fit.residual + wandering, cells=ErrorCells(ONE_POINT, order=fit.cells.order))
+    fit = replace(fit, waves=np.zeros((30, 3, 0)))
     sums = PointSums.of(fit)
 
     def deviance(x: np.ndarray) -> float:
         scatter = Scatter(share=1.0, robot=float(x[0]) * 1e-5, order=float(x[1]) * 1e-5)
-        return RestrictedLikelihood.of(sums, ("order",), scatter).deviance
+        return RestrictedLikelihood.of(sums, ("order",), scatter).deviance - 2 * np.log(abs(x[1]))
 
     best = minimize(deviance, [3.0, 3.0], method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-10})
     found, _ = fit.scatter(stated=True)

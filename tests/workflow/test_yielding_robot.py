@@ -92,6 +92,7 @@ def test_compliance_that_is_not_there_is_not_taken(tmp_path: Path, poses: int) -
         yaml = write_robot(folder, robot.bodies)
         false += calibrate_robot(yaml, [robot.write(folder / "poses.csv", poses)]).selected.terms != (
             "kinematic",
+            "transmission",
         )
     assert false <= (2 if poses < 40 else 1)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import get_args
 
 import numpy as np
@@ -57,26 +57,16 @@ class BearingAxes:
         return self.declared is not None and self.preferred not in (None, self.declared)
 
 
-def compare_bearings(
-    model: RobotModel, terms: tuple[str, ...], fit: Callable[[RobotModel, tuple[str, ...]], Calibration]
-) -> BearingAxes | None:
-    """Compare `fit`, of a robot and its `terms`, with a fit of the other bearing axes.
+def compare_bearings(model: RobotModel, fit: Callable[[RobotModel], Calibration]) -> BearingAxes | None:
+    """Compare the `fit` of a robot with that of the same robot with the other bearing axes.
 
-    A preference for others than the bearings of `model` must hold with transmission errors in both fits, too: bearings of the wrong kind
-    can take a part of those up. None for a robot without bearings, or where one of the two has no fit.
+    Both are to have transmission errors: bearings of the wrong kind can take a part of those up. None for a robot without bearings, or
+    where one of the two has no fit.
     """
     if not model.has_bearings:
         return None
-
-    def compared(terms: tuple[str, ...]) -> BearingAxes:
-        before, after = (fit(model.with_bearings(bearings), terms) for bearings in get_args(Bearings))
-        return BearingAxes.compare(model.config.bearings, before, after)
-
-    wider = tuple(dict.fromkeys((*terms, *(f"transmission_{order}" for order in model.harmonics))))
     try:
-        found = compared(terms)
-        if found.preferred in (None, model.bearings) or compared(wider).preferred == found.preferred:
-            return found
+        before, after = (fit(model.with_bearings(bearings)) for bearings in get_args(Bearings))
     except FlexcalError:
         return None
-    return replace(found, preferred=None)
+    return BearingAxes.compare(model.config.bearings, before, after)

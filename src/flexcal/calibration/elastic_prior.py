@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.data import PoseSet
-from flexcal.estimation import Parameters
+from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.model.declared import declared, uncertain_inertials, uncertain_payload
-from flexcal.model.names import SPRINGS
+from flexcal.model.names import SPRINGS, unit_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +37,16 @@ class ElasticPrior:
             if name.endswith("drive.stiffness"):
                 covariance[k, k] += secant_scale**2
         return cls(Parameters(items), covariance)
+
+    def beside(self, waves: Mapping[str, float], std: float) -> ElasticPrior:
+        """With the `waves` of transmission errors, each with its size over that of order 1, whose 1σ is `std` rad; none where that is 0."""
+        if not waves or std == 0:
+            return self
+        items = Parameters(Parameter(name, unit_of(name), 0.0) for name in waves)
+        size, own = len(self.parameters), std * np.array(list(waves.values()))
+        covariance = np.diag(np.concatenate([np.zeros(size), own**2]))
+        covariance[:size, :size] = self.covariance
+        return ElasticPrior(self.parameters + items, covariance)
 
 
 NOTHING_ELASTIC = ElasticPrior(Parameters(), np.zeros((0, 0)))

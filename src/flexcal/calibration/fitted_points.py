@@ -11,6 +11,7 @@ import numpy as np
 from flexcal.calibration.elastic_prior import ElasticPrior
 from flexcal.calibration.error_cells import ErrorCells
 from flexcal.calibration.flanks import require_both_flanks
+from flexcal.calibration.folds import are_different
 from flexcal.calibration.geometry_fit import GeometryFit, PlainLoss
 from flexcal.calibration.marginal_fit import marginalised
 from flexcal.calibration.practical import Undetermined, undetermined
@@ -18,8 +19,8 @@ from flexcal.calibration.prediction import Prediction, predict
 from flexcal.calibration.registration import register
 from flexcal.calibration.scatter import Scatter, joint_turns, whitened
 from flexcal.calibration.structure import kinematic_identifiability, random_identifiability, require_enough
-from flexcal.calibration.terms import geometric_parameters, plausible_size
-from flexcal.calibration.variance_components import LinearFit
+from flexcal.calibration.terms import LEAST_POSES, geometric_parameters, plausible_size, random_waves
+from flexcal.calibration.variance_components import TRANSMISSION, LinearFit
 from flexcal.data import PoseSet
 from flexcal.estimation import Estimate, Identifiability, Loss, Parameter, Parameters
 from flexcal.estimation.identifiability import RANK_TOLERANCE
@@ -67,7 +68,12 @@ class PointFit:
         marginalised: bool,
         progress: Callable[[int, float], None] | None,
     ) -> PointFit:
-        """Raises `FlexcalError` for a backlash seen from one flank and for too few poses."""
+        """Without the term `transmission` where there are fewer than 20 different poses, which do not tell its variance.
+
+        Raises `FlexcalError` for a backlash seen from one flank and for too few poses.
+        """
+        if not are_different(poses.q, LEAST_POSES):
+            terms = tuple(term for term in terms if term != TRANSMISSION)
         bare = replace(model, station=np.zeros_like(model.station))
         start = register(model, poses, predict(bare, poses, elastic=elastic).position)
         if "backlash" in terms:
@@ -82,6 +88,11 @@ class PointFit:
             seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
             structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
         return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)
+
+    @cached_property
+    def waves(self) -> dict[str, float]:
+        """Waves of transmission errors that have one variance, with their sizes over that of order 1."""
+        return random_waves(self.start, self.poses, self.geometric) if TRANSMISSION in self.terms else {}
 
     @cached_property
     def cells(self) -> ErrorCells:
@@ -135,10 +146,10 @@ class PointFit:
                 replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
             )
         whitening = scatter.weights(self.poses.sigma, turns)
-        flank = at.rest.flank
+        flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
         for _ in range(_FLANK_PASSES):
-            task = GeometryFit(self.start, self.poses, kept, self.prior, flank, self.elastic, whitening)
-            if self.marginalised and len(self.prior.parameters):
+            task = GeometryFit(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
+            if self.marginalised and len(prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
             else:
                 estimate = task.reestimated(loss=loss, progress=self.progress)
@@ -196,6 +207,9 @@ class FittedPoints:
         values, vectors = np.linalg.eigh(prior.covariance + np.diag(wide))
         tied = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
         residual = self.residuals + slopes @ (moved.coordinates() - moved.prior_mean())
+        names = tuple(self.fit.waves)
+        waves = self.at.jacobian(names)
+        residual = residual + waves @ np.array([estimate.values.get(name, 0.0) for name in names])
         columns = self.at.jacobian(self.task.kept.names)
         free = ~np.isfinite(self.task.kept.prior_std())
         known = self.task.kept.prior_std()[~free]
@@ -212,6 +226,7 @@ class FittedPoints:
             residual[rows],
             basis.reshape(int(rows.sum()), 3, -1),
             tied[rows],
+            (waves * np.array(list(self.fit.waves.values())))[rows],
             poses.sigma[rows],
             self.turns[rows],
             self.fit.cells.subset(rows),
@@ -312,11 +327,13 @@ class FittedPoints:
         return -estimate.covariance @ own.T @ self.task.columns(self.at, tuple(names))
 
     def _identifiable(self) -> tuple[bool, ...]:
-        """Those of the estimate, less what a declared prior alone determines."""
+        """Those of the estimate, less what a declared prior, or the variance of transmission errors, alone determines."""
         estimate = self.estimate
         stds = np.sqrt(np.diag(estimate.covariance))
+        waves = {name: size * self.scatter.transmission for name, size in self.fit.waves.items()}
+        beforehand = {p.name: p.prior_std for p in self.task.kept} | waves
         return tuple(
-            known and (p.name not in self.task.kept or bool(std < 0.8 * self.task.kept[p.name].prior_std))
+            known and bool(std < 0.8 * beforehand.get(p.name, np.inf))
             for p, known, std in zip(estimate.parameters, estimate.identifiable, stds, strict=True)
         )
 
@@ -325,11 +342,21 @@ class FittedPoints:
         instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma**2)))
         robot, robot_std = self._together("robot", "pose")
         model, model_std = self._together("workspace", "order", "command")
-        values = (instrument, scatter.share, robot, scatter.angular, model, scatter.pose)
-        angular_std, pose_std = (self.spread.get(name, 0.0) for name in ("angular", "pose"))
+        values = (
+            instrument,
+            scatter.share,
+            robot,
+            scatter.angular,
+            model,
+            scatter.pose,
+            scatter.transmission,
+        )
+        angular_std, pose_std, wave_std = (
+            self.spread.get(name, 0.0) for name in ("angular", "pose", "transmission")
+        )
         # the points of the fit are all that speaks for a stated sigma
         share_std = scatter.share / np.sqrt(2 * max(self.estimate.degrees_of_freedom, 1))
-        known = np.array([0.0, share_std, robot_std, angular_std, model_std, pose_std])
+        known = np.array([0.0, share_std, robot_std, angular_std, model_std, pose_std, wave_std])
         items = (
             Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
             for key, value in zip(SCATTER, values, strict=True)

@@ -18,6 +18,15 @@ def single_poses(q: np.ndarray) -> np.ndarray:
     return np.unique(result, return_inverse=True)[1]
 
 
+def are_different(q: np.ndarray, count: int) -> bool:
+    """Whether there are at least `count` different poses, as `single_poses` tells them, among joint positions (N, n)."""
+    for _ in range(count):
+        if not len(q):
+            return False
+        q = q[np.abs(q - q[0]).max(axis=1) >= _SAME]
+    return True
+
+
 def order_folds(samples: int, folds: int) -> np.ndarray:
     """Fold number (samples,) of consecutive blocks of nearly equal size."""
     return (np.arange(samples) * folds) // samples

@@ -79,7 +79,7 @@ def calibrate(
     model: RobotModel,
     poses: PoseSet,
     *,
-    terms: Sequence[str] = ("kinematic", "backlash"),
+    terms: Sequence[str] = ("kinematic", "backlash", "transmission"),
     elastic: bool = True,
     elasticity: Literal["reestimated", "marginalised"] = "reestimated",
     secant_scale: float = 0.0,
@@ -92,6 +92,10 @@ def calibrate(
     inertia (stage 1) is their prior, so give the model without an earlier calibration on the same poses. It enters by re-estimating those
     parameters, or, marginalised, through the residual covariance R + J Σ Jᵀ; both give the same estimate. `secant_scale` lets each
     drive's stiffness under gravity differ from the tangent one. Without `elastic` the arm is fitted as rigid.
+
+    The term `transmission`, transmission errors of all revolute joints as waves in the joint position, is a random effect: all waves are
+    normal with one variance, which falls with the square of their order and is estimated with those of the scatter (best linear unbiased
+    prediction). Few poses leave them near zero and uncertain. `transmission_1`… are free waves of one order.
 
     Points are weighted by the sum of three variances, those of instrument, robot and model error, which restricted maximum
     likelihood finds from the points; a stated sigma is that of the instrument alone. `loss` "cauchy" finds outliers; "auto" takes it
@@ -150,7 +154,7 @@ def _calibration(found: FittedPoints) -> Calibration:
     return Calibration(
         model=calibrated,
         estimate=estimate,
-        prior=fit.prior,
+        prior=found.task.prior,
         identifiability=fit.identifiability,
         undetermined=found.held,
         scatter=found.scatter,

@@ -21,9 +21,10 @@ if TYPE_CHECKING:
 class PointSums:
     """Columns of a linear fit by visits to poses, and the sums that make scalar products of the columns that blocks share.
 
-    `columns` (G, 3 T, p + 1) are those of the fit and, the last, its residual; `structures` are ∂V/∂variance of the components that
-    visits have on their own, (G, 3 T, 3 T) or as diagonals (G, 3 T); `blocks` says which of K blocks are a component's; `sums` (K, G T)
-    and `pairs` (K K, G T T) add rows, and pairs of rows of one visit, that belong to a block, and to a pair of blocks.
+    `columns` (G, 3 T, p + w + 1) are those of the fit, w waves of transmission errors and, the last, its residual; `structures` are
+    ∂V/∂variance of the components that visits have on their own, (G, 3 T, 3 T) or as diagonals (G, 3 T); `blocks` says which of K blocks
+    are a component's; `sums` (K, G T) and `pairs` (K K, G T T) add rows, and pairs of rows of one visit, that belong to a block, and to a
+    pair of blocks.
     """
 
     fit: LinearFit
@@ -38,7 +39,9 @@ class PointSums:
         from scipy.sparse import csr_matrix
 
         cells = fit.cells
-        columns = cells.gathered(np.concatenate([fit.free, fit.tied, fit.residual[:, :, None]], axis=2))
+        columns = cells.gathered(
+            np.concatenate([fit.free, fit.tied, fit.waves, fit.residual[:, :, None]], axis=2)
+        )
         turned = cells.gathered(fit.turns)
         structures = {
             "robot": cells.gathered(np.ones(fit.residual.shape)),
@@ -99,7 +102,10 @@ class PointSums:
         return (self.sums.T @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
 
     def index(self, name: str) -> np.ndarray:
-        """Numbers of the columns of a component's blocks."""
+        """Numbers of the columns of a component: of its blocks, or of the waves."""
+        if name not in self.blocks:
+            last = self.columns.shape[2] - 1
+            return np.arange(last - self.fit.waves.shape[2], last)
         first = self.columns.shape[2] + 3 * self.blocks[name]
         return (first[:, None] + np.arange(3)).ravel()
 
@@ -133,10 +139,11 @@ class RestrictedLikelihood:
         inverse = np.swapaxes(whitening, 1, 2) @ whitening
         gram = sums.gram(inverse)
         last = sums.columns.shape[2] - 1
-        shared = [name for name in sums.blocks if name in names]
-        used = np.concatenate([np.arange(last), *(sums.index(name) for name in shared)])
-        stds = [np.full(3 * len(sums.blocks[name]), getattr(scatter, name)) for name in shared]
-        sizes = np.concatenate([np.ones(last), *stds])
+        fixed = np.arange(last - fit.waves.shape[2])
+        shared = {name: sums.index(name) for name in names if name not in sums.structures}
+        used = np.concatenate([fixed, *shared.values()])
+        stds = [np.full(len(own), getattr(scatter, name)) for name, own in shared.items()]
+        sizes = np.concatenate([np.ones(len(fixed)), *stds])
         normal = gram[np.ix_(used, used)] * sizes * sizes[:, None]
         known = np.arange(fit.free.shape[2], len(used))
         normal[known, known] += 1.0
@@ -157,7 +164,7 @@ class RestrictedLikelihood:
         result = np.empty(len(self.names))
         whole = cho_solve((self.lower, True), np.eye(len(self.lower)))
         for k, name in enumerate(self.names):
-            if name in self.sums.blocks:
+            if name not in self.sums.structures:
                 own = self.sums.index(name)
                 across = solve_triangular(
                     self.lower, (self.gram[np.ix_(own, self.used)] * self.sizes).T, lower=True
@@ -204,5 +211,8 @@ class RestrictedLikelihood:
             own = sums.index(name) - sums.columns.shape[2]
             every[own] = sums.block_sums(weighted)[own, 0]
             return sums.spread(every)[:, :, None]
+        if name not in sums.structures:
+            waves = sums.columns[:, :, sums.index(name)]
+            return waves @ np.einsum("gik,gij->kj", waves, weighted)
         structure = sums.structures[name]
         return structure[:, :, None] * weighted if structure.ndim == 2 else np.matmul(structure, weighted)

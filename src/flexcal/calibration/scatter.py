@@ -13,7 +13,7 @@ from flexcal.model import RobotModel
 _SMALLEST = 1e-6
 """Standard deviation (m) that no instrument on an arm goes below: it stands beside priors where simulated points have no noise."""
 _SMALLEST_TURN = 1e-7
-"""Angle (rad) beside which a change of the repeatability of the joints is judged."""
+"""Angle (rad) beside which a change of an error of the joints is judged."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +23,7 @@ class Scatter:
     `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
     from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
     repeatability; `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
-    order, and to all visits of one command.
+    order, and to all visits of one command; `transmission` rad, of a wave of order 1 of a joint's transmission error (`waves`).
     """
 
     share: float
@@ -33,6 +33,7 @@ class Scatter:
     workspace: float = 0.0
     order: float = 0.0
     command: float = 0.0
+    transmission: float = 0.0
 
     @property
     def model(self) -> float:
@@ -43,7 +44,8 @@ class Scatter:
         """Whether every component is where it was, to a share `tolerance` of the whole."""
         own, other = (np.array([s.robot, s.pose, s.workspace, s.order, s.command]) for s in (self, before))
         same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
-        turned = abs(self.angular - before.angular) <= tolerance * (self.angular + _SMALLEST_TURN)
+        angles = ((self.angular, before.angular), (self.transmission, before.transmission))
+        turned = all(abs(a - b) <= tolerance * (a + _SMALLEST_TURN) for a, b in angles)
         return bool(same) and turned and abs(self.share - before.share) <= tolerance
 
     def independent(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
@@ -108,7 +110,7 @@ def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """
-    instrument, share, robot, angular, _, pose = model.scatter
+    instrument, share, robot, angular, _, pose, _ = model.scatter
     if not model.scatter.any():
         return Scatter(share=1.0, robot=0.0) if stated else None
     if not stated:

@@ -10,12 +10,11 @@ from flexcal.calibration.folds import order_folds, single_poses, workspace_folds
 from flexcal.calibration.geometric_calibration import calibrate
 from flexcal.calibration.term_candidates import candidates
 from flexcal.calibration.term_trials import ConsideredTerm, TermTrials, not_tried
+from flexcal.calibration.terms import LEAST_POSES
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 
 FOLDS = 8
-LEAST_POSES = 20
-"""Different poses that a choice of terms needs."""
 MANY_POSES = 10 * FOLDS
 """Different poses from which whole folds are left out, rather than single poses."""
 
@@ -49,6 +48,9 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     more in folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base
     terms to all poses. Compliances that are not supported for all joints are tried joint by joint, and must then lower the criterion by
     2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
+
+    The random effects `transmission` are none of the terms: beside them compliance of every joint, which moves the points much alike,
+    would not be found.
     """
     base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
     alone = single_poses(poses.q)

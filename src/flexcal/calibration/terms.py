@@ -12,6 +12,9 @@ from flexcal.model import RobotModel, carried_mass, gravity_torque
 from flexcal.model.equilibrium import gravity_moments
 from flexcal.model.names import GEOMETRY, LATERAL, unit_of
 
+LEAST_POSES = 20
+"""Different poses that a choice of terms needs, and the variance of transmission errors."""
+
 TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6}
 """Size of a change that matters (1σ of manufacture), by unit: what makes parameters of different units comparable."""
 
@@ -31,9 +34,10 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared
-    with it. `gravity_compliance`, `lateral_compliance`, `transmission_1`…: one or two for every revolute joint on the way, compliances
-    only where no spring is declared in their place and gravity loads the axis: by moments that vary by more than 1 % of those that vary
-    most. `<joint>.gravity_compliance` is that of one joint.
+    with it; `transmission` none, its waves being random effects (`random_waves`). `gravity_compliance`, `lateral_compliance`,
+    `transmission_1`…: one or two for every revolute joint on the way, compliances only where no spring is declared in their place and
+    gravity loads the axis: by moments that vary by more than 1 % of those that vary most. `<joint>.gravity_compliance` is that of one
+    joint.
     """
     joints = moving_joints(model, poses)
     names: list[str] = []
@@ -56,7 +60,7 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
     loaded = loaded_compliances(model, poses) if any(t.endswith(PER_JOINT) for t in terms) else frozenset()
     for term in terms:
         owner, _, kind = term.rpartition(".")
-        if kind in ("kinematic", "backlash"):
+        if kind in ("kinematic", "backlash", "transmission"):
             continue
         own = [model.joint_index(owner)] if owner else free_joints(model, kind, joints)
         for i in own:
@@ -64,6 +68,21 @@ def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]
             seen = [name for name in every if name in loaded or kind not in PER_JOINT]
             further |= dict.fromkeys(every if owner and not seen else seen)
     return Parameters([*items, *(_parameter(model, name) for name in further)])
+
+
+def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
+    """The waves of the term `transmission`, each with its size over that of order 1, which is 1 / order.
+
+    Those of every revolute joint on the way to a measured target that are not among the `free` parameters.
+    """
+    joints = free_joints(model, "transmission", moving_joints(model, poses))
+    every = {
+        f"{model.joints[i].name}.{key}": 1.0 / order
+        for i in joints
+        for order in model.harmonics
+        for key in _keys(f"transmission_{order}")
+    }
+    return {name: size for name, size in every.items() if name not in free}
 
 
 def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int]:

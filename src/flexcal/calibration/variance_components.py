@@ -19,6 +19,8 @@ _LARGEST = 30.0
 """Variance over that about the fit, which no component exceeds."""
 _NEGLIGIBLE = 1e-4
 """Share of the total variance below which a component is zero."""
+TRANSMISSION = "transmission"
+"""The component of transmission errors."""
 _SMALLEST = 1e-9
 """Share of the total variance that bounds a component from below."""
 _STEPS, _HALVINGS = 60, 30
@@ -32,12 +34,14 @@ _ARMIJO = 1e-4
 class LinearFit:
     """A fit linearised at its solution: `residual` (N, 3) m = `free` x + `tied` z + error, z standard normal a priori.
 
-    `free` (N, 3, p) and `tied` (N, 3, t) m; `sigma` (N, 3) m as stated, `turns` (N, 3, r) m/rad; `cells` say which points share an error.
+    `free` (N, 3, p) and `tied` (N, 3, t) m; `waves` (N, 3, w) m/rad move the points with the waves of transmission errors; `sigma` (N, 3) m
+    as stated, `turns` (N, 3, r) m/rad; `cells` say which points share an error.
     """
 
     residual: np.ndarray
     free: np.ndarray
     tied: np.ndarray
+    waves: np.ndarray
     sigma: np.ndarray
     turns: np.ndarray
     cells: ErrorCells
@@ -48,7 +52,8 @@ class LinearFit:
         Their scalar products are those under the marginal covariance of the residual, the `tied` numbers integrated out.
         """
         whitening = np.linalg.inv(np.linalg.cholesky(scatter.jointly(self.sigma, self.turns, self.cells)))
-        tied = np.concatenate([self.tied, scatter.shared(self.cells)], axis=2)
+        waves = scatter.transmission * self.waves
+        tied = np.concatenate([self.tied, waves, scatter.shared(self.cells)], axis=2)
         both = np.concatenate([self.free, tied, self.residual[:, :, None], columns], axis=2)
         size, count = self.free.shape[2], tied.shape[2]
         white = np.matmul(whitening, self.cells.gathered(both)).reshape(-1, both.shape[2])
@@ -64,21 +69,23 @@ class LinearFit:
 
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
         """
-        names = ["robot", *(["pose"] if self.cells.several else []), "angular", *self.cells.blocks]
+        shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
+        names = ["robot", *(["pose"] if self.cells.several else []), "angular", *shared]
         total = self._mean_square()
-        lever = float(np.mean(self.turns**2)) * max(self.turns.shape[2], 1) or 1.0
-        scale = np.array([total / lever if name == "angular" else total for name in names])
+        levers = {
+            name: _lever(moved) for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
+        }
+        scale = np.array([total / levers.get(name, 1.0) for name in names])
         share = 1.0 if stated else 0.0
         variances, likelihood = self._maximum(names, scale, share)
         stated_square = float(np.mean(self.sigma**2))
         if stated and total < stated_square:
             # the points scatter less than the instrument alone should: its sigma may be too large
-            blocks = len(self.cells.blocks)
-            shared = names[len(names) - blocks :]
-            sizes = np.append(np.full(blocks, total), total / stated_square)
+            own = scale[len(names) - len(shared) :]
+            sizes = np.append(own, total / stated_square)
             alone = self._maximum([*shared, "share"], sizes, None)[1]
             if alone - likelihood > _CLEAR_GAIN:
-                names, scale = ["robot", *shared], np.full(1 + blocks, total)
+                names, scale = ["robot", *shared], np.append(total, own)
                 sizes = np.append(scale, total / stated_square)
                 narrower, likelihood = self._maximum([*names, "share"], sizes, None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
@@ -91,22 +98,37 @@ class LinearFit:
     def _supported(
         self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
     ) -> tuple[list[str], np.ndarray, np.ndarray]:
-        """The components that the data support: the others are taken out one by one while that costs no more than chance gains."""
+        """Model error, and the components of repeatability that the data support: others are taken out one by one while that costs no
+        more than chance gains.
+        """
         seen = [k for k in range(len(names)) if k == 0 or variances[k] > _NEGLIGIBLE * scale[k]]
         names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
         while len(names) > 1:
             trials = []
             for k in range(1, len(names)):
+                if self._favour(names[k]):
+                    continue
                 rest = [i for i in range(len(names)) if i != k]
                 near = variances[rest] / scale[rest]
                 near[0] += variances[k] / scale[k] / 2
                 found = self._maximum([names[i] for i in rest], scale[rest], share, near)
                 trials.append((found[1], found[0], rest))
+            if not trials:
+                break
             best, kept, rest = max(trials, key=lambda trial: trial[0])
             if likelihood - best > _SUPPORTED:
                 break
             names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
         return names, scale, variances
+
+    def _favour(self, name: str) -> float:
+        """Power of a standard deviation by which the likelihood is multiplied: 1 of transmission errors, together 1 of other model errors.
+
+        Few poses would often put these at zero, which claims to know that there are none (Chung, Rabe-Hesketh, Dorie, Gelman & Liu 2013).
+        """
+        if name == TRANSMISSION:
+            return 1.0
+        return 1.0 / len(self.cells.blocks) if name in self.cells.blocks else 0.0
 
     def _mean_square(self) -> float:
         """Variance of a coordinate about the fit, m²; the parameters take their degrees of freedom."""
@@ -120,7 +142,8 @@ class LinearFit:
     ) -> tuple[np.ndarray, float]:
         """Variances (k,) of the greatest restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
 
-        Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`.
+        Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
+        likelihood is multiplied by each standard deviation to the power of `_favour`.
         """
         start = np.full(len(names), 0.7 / len(names)) if near is None else near
         largest = np.full(len(names), _LARGEST)
@@ -128,13 +151,19 @@ class LinearFit:
             start[-1], largest[-1] = 0.5, min(1.0 / float(scale[-1]), _LARGEST)
         x = np.clip(start, _SMALLEST, largest)
         at = self._at(names, x * scale, share)
+        favoured = np.array([self._favour(name) for name in names])
+
+        def deviance(x: np.ndarray, at: RestrictedLikelihood) -> float:
+            return at.deviance - float(favoured @ np.log(x))
+
         for _ in range(_STEPS):
-            slope = at.slopes * scale
-            step = _step(x, slope, at.information * scale * scale[:, None], largest)
+            slope = at.slopes * scale - favoured / x
+            information = at.information * scale * scale[:, None] + np.diag(favoured / x**2)
+            step = _step(x, slope, information, largest)
             for _ in range(_HALVINGS):
                 tried = np.clip(x + step, _SMALLEST, largest)
                 after = self._at(names, tried * scale, share)
-                if after.deviance <= at.deviance + _ARMIJO * float(slope @ (tried - x)):
+                if deviance(tried, after) <= deviance(x, at) + _ARMIJO * float(slope @ (tried - x)):
                     break
                 step /= 2
             else:
@@ -143,7 +172,7 @@ class LinearFit:
             x, at = tried, after
             if still:
                 break
-        return x * scale, -0.5 * at.deviance
+        return x * scale, -0.5 * deviance(x, at)
 
     @cached_property
     def _sums(self) -> PointSums:
@@ -165,6 +194,11 @@ class LinearFit:
         spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0))
         stds = spread / (2 * np.sqrt(variances[seen]))
         return dict(zip(named, stds.tolist(), strict=True))
+
+
+def _lever(moved: np.ndarray) -> float:
+    """Mean square of a coordinate (m²) that columns (N, 3, k) make together; 1 where there are none."""
+    return float((moved**2).sum()) / (3 * len(moved)) or 1.0
 
 
 def _step(x: np.ndarray, slope: np.ndarray, information: np.ndarray, largest: np.ndarray) -> np.ndarray:

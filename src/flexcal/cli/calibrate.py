@@ -43,7 +43,7 @@ class Calibrate:
         tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
     ] = ()
     """auto, or some of: kinematic, backlash, gravity_compliance, lateral_compliance, transmission; JOINT.gravity_compliance is that of
-    one joint."""
+    one joint. auto: those that cross-validation supports, and transmission."""
     loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
     """Loss function; cauchy is robust and lists outliers; auto uses it where there are outliers."""
     secant_scale: Annotated[float, arg(metavar="STD")] = 0.0

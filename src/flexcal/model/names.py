@@ -14,7 +14,7 @@ FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck"
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
-SCATTER = ("instrument", "instrument_share", "robot", "angular", "model", "pose")
+SCATTER = ("instrument", "instrument_share", "robot", "angular", "model", "pose", "transmission")
 
 _UNITS = {
     "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
@@ -26,7 +26,7 @@ _UNITS = {
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     "warm_up": "N m s/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
-    "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m",
+    "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad",
 }  # fmt: skip
 
 

@@ -27,6 +27,7 @@ from flexcal.calibration import (
 )
 from flexcal.calibration.geometry_fit import LossName
 from flexcal.calibration.terms import PER_JOINT
+from flexcal.calibration.variance_components import TRANSMISSION
 from flexcal.data import read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance, read_estimates
@@ -222,7 +223,7 @@ def calibrate_robot(
     base = ("kinematic", "backlash") if model.backlash_joints else ("kinematic",)
     rigid = fit(model, base, "rigid fit", elastic=False)
     bearings = compare_bearings(
-        model, base, lambda robot_, chosen: fit(robot_, chosen, "bearing axes", elastic=True)
+        model, lambda robot_: fit(robot_, (*base, TRANSMISSION), "bearing axes", elastic=True)
     )
     if bearings is not None and bearings.declared is None and bearings.preferred is not None:
         model = model.with_bearings(bearings.preferred)
@@ -232,7 +233,7 @@ def calibrate_robot(
         good = np.setdiff1d(np.arange(len(poses)), rigid.estimate.outliers)
         selection = select_terms(model, poses.subset(good))
         progress("terms", 1.0)
-        model, wanted = selection.model, selection.terms
+        model, wanted = selection.model, _with_random_waves(selection.terms)
     elastic = bool(model.elastic)
     same = not elastic and tuple(wanted) == base
     selected = rigid if same else fit(model, wanted, "selected fit", elastic=elastic)
@@ -267,6 +268,11 @@ def calibrate_robot(
     return result
 
 
+def _with_random_waves(terms: Sequence[str]) -> tuple[str, ...]:
+    """Selected terms with all transmission errors as random effects, in place of those of single orders."""
+    return (*(term for term in terms if not term.startswith(TRANSMISSION)), TRANSMISSION)
+
+
 def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | None:
     """The terms to fit, None for those that cross-validation supports."""
     declared = model.config.geometry.terms
@@ -274,7 +280,7 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
     if asked == (AUTO,):
         return None
     harmonics = tuple(f"transmission_{order}" for order in model.harmonics)
-    known = ("kinematic", "backlash", *PER_JOINT, "transmission", *harmonics)
+    known = ("kinematic", "backlash", *PER_JOINT, TRANSMISSION, *harmonics)
     for term in asked:
         owner, _, kind = term.rpartition(".")
         if owner:
@@ -287,5 +293,4 @@ def _terms(model: RobotModel, given: Sequence[str] | None) -> tuple[str, ...] | 
         raise FlexcalError(
             f"the term backlash is asked for but {model.path} names no joint with it; add `geometry: {{backlash: [joint]}}`."
         )
-    full = [t for term in asked for t in (harmonics if term == "transmission" else (term,))]
-    return tuple(dict.fromkeys(["kinematic", *full]))
+    return tuple(dict.fromkeys(["kinematic", *asked]))

@@ -39,6 +39,7 @@ from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
 
 CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)
+RIGID_TERMS = ("kinematic", "backlash")
 VERIFICATION_POSES = 150
 
 TIMED = ("dynamics", "frequency", "stage1", "poses", "stage2", "verification", "cad_alone")
@@ -144,7 +145,9 @@ def run_two_stage(
         measured = robot_in_cell.measure(chosen)
         calibration = calibrate(elastic, measured)
         progress("stage2", 0.5)
-        rigid = tuple(calibrate(believed, robot_in_cell.measure(p), elastic=False) for p in for_rigid)
+        rigid = tuple(
+            calibrate(believed, robot_in_cell.measure(p), terms=RIGID_TERMS, elastic=False) for p in for_rigid
+        )
         progress("stage2", 1.0)
     write_poses(out / "calibration_poses.csv", measured)
     options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}

@@ -40,7 +40,9 @@ def terms_section(considered: Sequence[ConsideredTerm], by: str) -> Section:
             if by == "poses"
             else "Neighbours in time and neighbours in space are left out together: left out at random, a pose would have near twins in "
             "the fit, and every term would be flattered."
-        ),
+        )
+        + " Transmission errors, taken here or not, are random effects of the calibration: waves in the position of every revolute joint, "
+        "with one variance that is estimated from the points.",
         (
             Table(
                 "table-terms",
