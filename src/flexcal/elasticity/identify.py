@@ -11,7 +11,7 @@ from flexcal.data import MultisinePlan
 from flexcal.elasticity.fit import FINE, ResponseData, ResponseFit, final_fit, first_fit, fit_responses
 from flexcal.elasticity.hardening_drives import with_hardening
 from flexcal.elasticity.held_joints import HeldJoints
-from flexcal.elasticity.misfit import misfit_of_fit, misfit_std
+from flexcal.elasticity.misfit import INERTIALS, misfit_of_fit, misfit_std
 from flexcal.elasticity.model_error import Tolerances
 from flexcal.elasticity.naming import held_inertia_name
 from flexcal.elasticity.parameters import check_responses
@@ -188,7 +188,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
     exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the profile likelihood is error of the
     springs alone, independent of each other: masses and centres of mass, whose moments are known far better than each of them, stay as
-    they are correlated.
+    they are correlated. Where these took up a part of the misfit they count as not identifiable.
     """
     problem, fitted = fit.problem, fit.estimate
     posterior = fitted.covariance
@@ -214,7 +214,11 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
         name: flag and size
         for name, flag, size in zip(fitted.parameters.names, fitted.identifiable, sized, strict=True)
     }
+    absorbing = misfit is not None and misfit.inertials > 0
     known = tuple(
-        flag and small.get(name.replace(".damping", ".stiffness"), True) for name, flag in small.items()
+        flag
+        and small.get(name.replace(".damping", ".stiffness"), True)
+        and not (absorbing and name.endswith(INERTIALS))
+        for name, flag in small.items()
     )
     return replace(fitted, covariance=covariance, identifiable=known, misfit=misfit)

@@ -30,6 +30,31 @@ FAR = 3.0
 """Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""
 
 
+INERTIALS = (".mass", ".com_x", ".com_y", ".com_z")
+CERTAIN = 1e-3
+"""Chance of so large a move of masses and centres of mass where the model is right."""
+
+
+def moved_inertials(fit: ResponseFit) -> float:
+    """How far masses and centres of mass moved, root mean square in standard deviations of what was known of them; 0 where by chance.
+
+    Where the model is right the squared distance, in the metric of the prior covariance, is at most χ² distributed with as many degrees of
+    freedom as there are of them. A larger one is a conflict of prior and data (Evans & Moshonov 2006).
+    """
+    from scipy.special import chdtri
+
+    parameters = fit.estimate.parameters
+    own = [k for k, name in enumerate(parameters.names) if name.endswith(INERTIALS)]
+    if not own:
+        return 0.0
+    assert fit.problem.prior_covariance is not None
+    known = fit.problem.prior_covariance[np.ix_(own, own)]
+    std = np.sqrt(np.diag(known))
+    off = (parameters.coordinates() - parameters.prior_mean())[own] / std
+    square = float(off @ np.linalg.pinv(known / std / std[:, None], hermitian=True) @ off)
+    return float(np.sqrt(square / len(own))) if square > chdtri(len(own), CERTAIN) else 0.0
+
+
 def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> Misfit | None:
     """Where the residual of `fit` exceeds what noise and model error explain; None where it does not."""
     powers = _line_powers(fit)
@@ -54,6 +79,7 @@ def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> M
         high_hz=float(response.frequencies_hz[band][-1]),
         axis=axis,
         far=far,
+        inertials=moved_inertials(fit),
         severe=peak > SEVERE or estimate.reduced_chi2 > SEVERE_CHI2 or bool(far),
     )
 

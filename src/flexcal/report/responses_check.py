@@ -39,13 +39,19 @@ def misfit_sentences(misfit: Misfit) -> str:
     if misfit.far:
         springs = ", ".join(spring_label(name) for name in misfit.far)
         far = f"More than a factor of 3 from robot.yaml: {springs}. "
+    moved = ""
+    if misfit.inertials > 0:
+        moved = (
+            f"Masses and centres of mass moved by {misfit.inertials:.1f} standard deviations of what was known of them (root mean square): "
+            "they take up a part of what the model lacks, and are given without intervals. "
+        )
     cause = (
         "The model lacks a mode or has wrong parameters. Possible causes: elasticity of base, tool or payload, wrong bearing axes, "
         "or a plan.yaml that does not belong to the recordings. "
     )
     if misfit.severe:
-        return f"{where}{far}{cause}Do not use these springs; their intervals are at least as wide as robot.yaml's tolerance."
-    return f"{where}{far}{cause}The intervals of all springs were widened accordingly."
+        return f"{where}{far}{cause}{moved}Do not use these springs; their intervals are at least as wide as robot.yaml's tolerance."
+    return f"{where}{far}{cause}{moved}The intervals of all springs were widened accordingly."
 
 
 def misfit_document(misfit: Misfit | None) -> dict[str, Any] | None:
