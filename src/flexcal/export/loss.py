@@ -21,6 +21,8 @@ HARDENING = "hardening of drives"
 GEOMETRY = "axis misalignments and lengths"
 AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
 """The terms beyond rigid geometry, which hardly any format has a place for."""
+_CALIBRATED = (GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
+"""Those that a calibration fits beside the geometry, which makes up for them where it is fitted alone."""
 
 SAMPLES = 2000
 _AGREED = 1e-9
@@ -97,8 +99,11 @@ class Loss:
             )
         off = self.error.in_millimetres()
         carrying = f", carrying {self.payload:.3g} kg" if self.payload > 0 else ""
+        alone = any(term.name in _CALIBRATED for term in self.terms)
+        instead = ("A calibration with --terms kinematic makes up for a part of that by the geometry.",)
         return (
             f"This format cannot carry {named}.",
+            *(instead if alone else ()),
             f"The tool is off by {off['mean_mm']:.3f} mm on average, {off['p95_mm']:.3f} mm in 95 % of poses and "
             f"{off['max_mm']:.3f} mm at most, over {self.poses} random poses of the {self.within}{carrying}.",
         )

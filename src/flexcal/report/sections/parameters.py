@@ -11,8 +11,14 @@ from flexcal.report.page import FigureBlock, Table
 
 
 def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[FigureBlock, ...]:
-    """The named parameters as bars with intervals, compliances in a figure of their own; nothing where none can be drawn."""
-    shown = shown_parameters(estimate, names)
+    """The named parameters as bars with intervals, compliances and waves of transmission errors, named or not, in figures of their own.
+
+    Nothing where none can be drawn.
+    """
+    waves = shown_parameters(
+        estimate, [name for name in estimate.parameters.names if ".transmission_" in name]
+    )
+    shown = [name for name in shown_parameters(estimate, names) if name not in waves]
     yielding = [name for name in shown if estimate.parameters[name].unit == "rad/(N m)"]
     rigid = [name for name in shown if name not in yielding]
     blocks = []
@@ -30,6 +36,14 @@ def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[Figur
             "Compliances under gravity",
             "compliance / (µrad/(N m))",
             "Turn of a joint per torque; 10 µrad/(N m) is a stiffness of 100 kN m/rad.",
+        ),
+        (
+            waves,
+            "transmission",
+            "Transmission errors",
+            "amplitude of a sine or cosine / (0.5 mrad)",
+            "Waves of order 1, 2 and 3 in the joint position, shrunk towards zero as far as the points say little of them; those of which "
+            "they say nothing are left out.",
         ),
     ):
         if part:
