@@ -80,11 +80,11 @@ class LinearFit:
         variances, likelihood = self._maximum(names, scale, share)
         stated_square = float(np.mean(self.sigma**2))
         if stated and total < stated_square:
-            # the points scatter less than the instrument alone should: its sigma may be too large
+            # the points scatter less than the instrument alone should: its sigma may be too large, even if nothing else errs
             own = scale[len(names) - len(shared) :]
             sizes = np.append(own, total / stated_square)
-            alone = self._maximum([*shared, "share"], sizes, None)[1]
-            if alone - likelihood > _CLEAR_GAIN:
+            alone = self._maximum([*shared, "share"], sizes, None, favour=False)[1]
+            if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
                 names, scale = ["robot", *shared], np.append(total, own)
                 sizes = np.append(scale, total / stated_square)
                 narrower, likelihood = self._maximum([*names, "share"], sizes, None)
@@ -138,12 +138,18 @@ class LinearFit:
         return float(left @ left) / max(rows - size, 1) + 1e-24
 
     def _maximum(
-        self, names: list[str], scale: np.ndarray, share: float | None, near: np.ndarray | None = None
+        self,
+        names: list[str],
+        scale: np.ndarray,
+        share: float | None,
+        near: np.ndarray | None = None,
+        *,
+        favour: bool = True,
     ) -> tuple[np.ndarray, float]:
         """Variances (k,) of the greatest restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
 
         Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
-        likelihood is multiplied by each standard deviation to the power of `_favour`.
+        likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any.
         """
         start = np.full(len(names), 0.7 / len(names)) if near is None else near
         largest = np.full(len(names), _LARGEST)
@@ -151,7 +157,7 @@ class LinearFit:
             start[-1], largest[-1] = 0.5, min(1.0 / float(scale[-1]), _LARGEST)
         x = np.clip(start, _SMALLEST, largest)
         at = self._at(names, x * scale, share)
-        favoured = np.array([self._favour(name) for name in names])
+        favoured = np.array([self._favour(name) if favour else 0.0 for name in names])
 
         def deviance(x: np.ndarray, at: RestrictedLikelihood) -> float:
             return at.deviance - float(favoured @ np.log(x))

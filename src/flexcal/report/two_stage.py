@@ -18,7 +18,7 @@ from flexcal.report.checks import (
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import millimetres, ratio
-from flexcal.report.page import Check, Page, Rung, Status, Verdict
+from flexcal.report.page import TRUTH, Check, Page, Rung, Status, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.responses_check import check_responses
 from flexcal.report.sections.comparison import comparison_section
@@ -124,7 +124,7 @@ def truth_checks(study: TwoStageStudy) -> tuple[Check, ...]:
         coverage(study.geometry, study.kept, study.truth),
     )
     covered, total = (sum(pair[k] for pair in pairs) for k in (0, 1))
-    return (check_truth(covered, total).named("truth"),) if total else ()
+    return (check_truth(covered, total).named(TRUTH),) if total else ()
 
 
 def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
