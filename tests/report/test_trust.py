@@ -81,10 +81,10 @@ def test_expected_cross_validation_error_is_that_of_linear_regression(rng: np.ra
     expected = np.sqrt(1.1 / 0.9)
     assert np.mean(ratios) == pytest.approx(expected, rel=0.02)
     observed = 1e-4 * float(np.mean(ratios))
-    assert check_left_out(1e-4, (observed, observed), 0.1).status == "good"
-    assert check_left_out(1e-4, (observed, 1.4 * observed), 0.1).status == "care"
+    assert check_left_out(1e-4, observed, 0.1).status == "good"
+    assert check_left_out(1e-4, 1.4 * observed, 0.1).status == "care"
     assert check_left_out(1e-4, None, 0.1).status == "unknown"
-    assert check_left_out(1e-4, (1e-4, 1e-4), 1.0).status == "unknown"
+    assert check_left_out(1e-4, 1e-4, 1.0).status == "unknown"
 
 
 def test_bad_checks_are_named(study: TwoStageStudy) -> None:

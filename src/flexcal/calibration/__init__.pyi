@@ -18,7 +18,7 @@ from .registration import register, rigid_motion
 from .scaled_errors import ErrorScale, error_scale, prediction_document
 from .scatter import Scatter
 from .sources import error_sources
-from .term_selection import TermSelection, select_terms
+from .term_selection import CrossValidation, TermSelection, cross_validated, select_terms
 from .term_trials import ConsideredTerm
 from .terms import geometric_parameters
 from .verification import ErrorCovariance, Verification, verify, verify_jointly
@@ -31,6 +31,7 @@ __all__ = [
     "BearingAxes",
     "Calibration",
     "ConsideredTerm",
+    "CrossValidation",
     "Drift",
     "ElasticPrior",
     "ErrorCovariance",
@@ -54,6 +55,7 @@ __all__ = [
     "calibrate",
     "common_way",
     "compare_bearings",
+    "cross_validated",
     "drift_of_poses",
     "enough_for_points",
     "error_scale",

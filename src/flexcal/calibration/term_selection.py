@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from flexcal.calibration.folds import order_folds, single_poses, workspace_folds
-from flexcal.calibration.geometric_calibration import calibrate
+from flexcal.calibration.geometric_calibration import Calibration, calibrate
 from flexcal.calibration.term_candidates import candidates
 from flexcal.calibration.term_trials import ConsideredTerm, TermTrials, not_tried
 from flexcal.calibration.terms import LEAST_POSES
@@ -40,6 +40,39 @@ class TermSelection:
         )
 
 
+@dataclass(frozen=True)
+class CrossValidation:
+    """`mean` error (m) of a fit at poses left out of it: `by` "poses" one by one, or by "folds", the larger of both kinds.
+
+    `freedom` is the number of parameters of the fit, the trace of its hat matrix.
+    """
+
+    by: str
+    mean: float
+    freedom: float
+
+
+def cross_validated(fit: Calibration) -> CrossValidation | None:
+    """The fit with all its terms, linear about itself and without its outliers; None with fewer than 20 different poses."""
+    rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
+    inside = replace(fit, poses=fit.poses.subset(rows), residuals=fit.residuals[rows])
+    folds, distinct = _folds(inside.poses)
+    if distinct < LEAST_POSES:
+        return None
+    many = distinct >= MANY_POSES
+    trials = TermTrials(inside, fit.model, fit.terms, folds, many=many)
+    left = trials.fit(fit.terms)
+    mean = max(float(left.distances[kind].mean()) for kind in trials.deciding)
+    return CrossValidation("folds" if many else "poses", mean, left.freedom)
+
+
+def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
+    """Folds (N,) in measuring order, in the workspace, and of single poses, and how many of these there are."""
+    alone = single_poses(poses.q)
+    folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
+    return folds, len(np.unique(alone))
+
+
 def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
 
@@ -53,14 +86,12 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     would not be found.
     """
     base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
-    alone = single_poses(poses.q)
-    distinct = len(np.unique(alone))
+    folds, distinct = _folds(poses)
     if distinct < LEAST_POSES:
         more = LEAST_POSES - distinct
         return TermSelection(base, model, (), "nothing", _too_few(distinct, more))
     open_terms = candidates(model, poses)
     rigid = calibrate(model, poses, terms=base, elastic=bool(model.elastic))
-    folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
     trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
     chosen, rows = base, [trials.start()]
     left: dict[str, ConsideredTerm] = {}

@@ -78,15 +78,14 @@ class LinearFit:
         scale = np.array([total / levers.get(name, 1.0) for name in names])
         share = 1.0 if stated else 0.0
         variances, likelihood = self._maximum(names, scale, share)
-        stated_square = float(np.mean(self.sigma**2))
-        if stated and total < stated_square:
-            # the points scatter less than the instrument alone should: its sigma may be too large, even if nothing else errs
+        if stated:
+            # the points may scatter less than the instrument alone should, even if nothing else errs
             own = scale[len(names) - len(shared) :]
-            sizes = np.append(own, total / stated_square)
+            sizes = np.append(own, total / float(np.mean(self.sigma**2)))
             alone = self._maximum([*shared, "share"], sizes, None, favour=False)[1]
             if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
                 names, scale = ["robot", *shared], np.append(total, own)
-                sizes = np.append(scale, total / stated_square)
+                sizes = np.append(scale, sizes[-1])
                 narrower, likelihood = self._maximum([*names, "share"], sizes, None)
                 variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
         names, scale, variances = self._supported(names, scale, variances, likelihood, share)

@@ -87,8 +87,9 @@ class Map:
         console.say(f"worst at {place} m (base frame): 95 % bound {worst['p95_mm']:.3f} mm")
         if (check := document["verification"]) is not None:
             console.say(
-                f"errors at {check['poses']} poses are {check['factor']:.2f} ({check['low']:.2f} to {check['high']:.2f}) times "
-                f"the predicted size, {100 * check['inside_95_percent']:.0f} % within the bound for 95 %: {_VERDICTS[check['verdict']]}"
+                f"errors at {check['poses']} poses are {check['ratio']:.2f} ({check['ratio_low']:.2f} to {check['ratio_high']:.2f}) times "
+                f"the predicted size, {100 * check['inside_95_percent']:.0f} % within the bound for 95 %: "
+                + _VERDICTS[check["verdict"]].format(check["applied"])
             )
         for remark in document["remarks"]:
             console.say(remark)
@@ -104,7 +105,7 @@ class Map:
 
 _VERDICTS = {
     "right": "the prediction holds",
-    "optimistic": "it is too optimistic, and the map is multiplied by this factor",
-    "unknown": "the instrument's noise is included, so the prediction cannot be judged; the map is multiplied by this factor",
+    "optimistic": "it is too optimistic, and the map, which has no noise of the instrument, is multiplied by {:.2f}",
+    "unknown": "the instrument's noise is included, so the prediction cannot be judged; the map is multiplied by {:.2f}",
     "cautious": "it is conservative, and the map is unchanged",
 }

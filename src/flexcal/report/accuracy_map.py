@@ -200,8 +200,8 @@ def _observed(study: MapStudy) -> Section:
     found = study.verification
     scale = study.scale
     rows = (
-        ("observed over predicted size", f"{scale.factor:.2f}"),
-        ("95 % interval", f"{scale.low:.2f} to {scale.high:.2f}"),
+        ("observed over predicted size", f"{scale.ratio:.2f}"),
+        ("95 % interval", f"{scale.ratio_low:.2f} to {scale.ratio_high:.2f}"),
         ("effective degrees of freedom", f"{scale.freedom:.0f}"),
         ("poses within the bound for 95 %", f"{100 * scale.inside:.0f} %"),
         ("poses within the bound for 50 %", f"{100 * float((scale.probability <= 0.5).mean()):.0f} %"),

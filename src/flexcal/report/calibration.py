@@ -12,7 +12,7 @@ from flexcal.estimation import Estimate
 from flexcal.report.bearings_check import check_bearings
 from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
 from flexcal.report.checks import check_drift, check_error_budget, check_left_out, check_outliers, check_rank
-from flexcal.report.considered_terms import considered_terms, left_out_errors
+from flexcal.report.considered_terms import considered_terms
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, RIGID, ArmPoses, MeasuredPoints
@@ -29,6 +29,7 @@ from flexcal.report.sections.residuals import residuals_section
 from flexcal.report.sections.terms import terms_section
 from flexcal.report.trust import Trust
 from flexcal.report.two_stage import HEADLINES
+from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,11 +130,11 @@ def calibration_checks(
 ) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
     found, errors = determined(results), points.statistics(CALIBRATED)
-    left_out = left_out_errors(results)
+    validated = results["cross_validation"]
+    left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
+    share = 1.0 if validated is None else validated["parameters"] / (3 * errors.poses)
     return (
-        check_left_out(errors.mean, left_out, found.rank / (3 * errors.poses)).named(
-            "left_out", independent=True
-        ),
+        check_left_out(errors.mean, left_out, share).named("left_out", independent=True),
         check_error_budget(estimate, results["variances"], hardly_fits=results["fit"]["hardly_fits"]).named(
             "residual"
         ),

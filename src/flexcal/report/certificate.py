@@ -125,11 +125,10 @@ def _judgement(results: Mapping[str, Any]) -> str:
         "unknown": "The predicted uncertainty cannot be judged: these numbers contain instrument noise of unknown size.",
         "cautious": "The predicted uncertainty was larger than needed.",
     }[found["verdict"]]
-    beyond = "" if found["verdict"] == "unknown" else "beyond the scatter of the measurements, "
     return (
         f"{words} After compensation {100 * found['inside_95_percent']:.0f} % of the measurements lie within the bound predicted for 95 % "
-        f"of them; {beyond}errors are {found['factor']:.2f} times as large as the calibration predicts (95 % "
-        f"interval {found['low']:.2f} to {found['high']:.2f})."
+        f"of them; errors are {found['ratio']:.2f} times as large as the calibration predicts (95 % "
+        f"interval {found['ratio_low']:.2f} to {found['ratio_high']:.2f})."
     )
 
 

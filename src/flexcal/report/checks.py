@@ -205,11 +205,11 @@ def check_truth(covered: int, total: int) -> Check:
     return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
 
 
-def check_left_out(mean: float, left_out: tuple[float, float] | None, share: float) -> Check:
-    """Whether cross-validation errors are as small as expected from those of the fit.
+def check_left_out(mean: float, left_out: float | None, share: float) -> Check:
+    """Whether the cross-validation error is as small as expected from that of the fit.
 
-    `mean` is the mean error (m) of the fit, `left_out` those of poses left out by order and by region, `share` the number of parameters
-    over that of measured coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and
+    `mean` is the mean error (m) of the fit, `left_out` that of poses left out, `share` the number of parameters over that of measured
+    coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and
     prediction errors of variance σ² (1 + p/n), to first order.
     """
     question = "Are poses left out of the fit predicted?"
@@ -221,13 +221,13 @@ def check_left_out(mean: float, left_out: tuple[float, float] | None, share: flo
         )
     expected = float(np.sqrt((1 + share) / (1 - share))) * mean
     answer = (
-        f"In cross-validation the mean error is {millimetres(max(left_out))} mm; expected from {millimetres(mean)} mm in the fit are "
+        f"In cross-validation the mean error is {millimetres(left_out)} mm; expected from {millimetres(mean)} mm in the fit are "
         f"{millimetres(expected)} mm."
     )
-    if max(left_out) > CHANCE * expected:
+    if left_out > CHANCE * expected:
         return Check(
             question,
-            f"{answer} It is {max(left_out) / expected:.2f} times as large: the model overfits or lacks a term.",
+            f"{answer} It is {left_out / expected:.2f} times as large: the model overfits or lacks a term.",
             "care",
         )
     return Check(question, answer, "good")

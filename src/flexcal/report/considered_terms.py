@@ -30,15 +30,6 @@ def considered_terms(results: Mapping[str, Any]) -> tuple[ConsideredTerm, ...]:
     return tuple(_considered(row) for row in results["term_selection"])
 
 
-def left_out_errors(results: Mapping[str, Any]) -> tuple[float, float] | None:
-    """Mean errors (m) of the chosen terms at left-out poses: by order and by place, or twice that of single poses where these decided."""
-    taken = [row for row in considered_terms(results) if row.taken]
-    if not taken:
-        return None
-    alone = results["term_selection_by"] == "poses"
-    return (taken[-1].single, taken[-1].single) if alone else (taken[-1].order, taken[-1].workspace)
-
-
 def _considered(row: Mapping[str, Any]) -> ConsideredTerm:
     order, workspace, single, largest = (
         _number(row[f"{key}_mm"]) * MILLIMETRE for key in ("order", "workspace", "single", "largest")

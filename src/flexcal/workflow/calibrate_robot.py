@@ -13,11 +13,13 @@ import numpy as np
 from flexcal.calibration import (
     BearingAxes,
     Calibration,
+    CrossValidation,
     Drift,
     ErrorsBefore,
     TermSelection,
     calibrate,
     compare_bearings,
+    cross_validated,
     hardly_fits,
     point_uncertainty,
     probable_robot,
@@ -68,8 +70,9 @@ class RobotCalibration:
     """What `calibrate_robot` found.
 
     `before` are the errors of the uncalibrated robot; `rigid` is the fit without elasticity and further terms, `selected` the one that is
-    stored in the file `estimates`; `selection` is None where the terms were given. `command` is the command line, where there was one.
-    `bearings` says which bearing axes the points prefer; `stiffness` is what stage 1 left in the estimates, where it did.
+    stored in the file `estimates`; `selection`, and `validated`, the errors of `selected` at poses left out, are None where the terms were
+    given. `command` is the command line, where there was one. `bearings` says which bearing axes the points prefer; `stiffness` is what
+    stage 1 left in the estimates, where it did.
     """
 
     before: ErrorsBefore
@@ -81,6 +84,7 @@ class RobotCalibration:
     command: str = ""
     bearings: BearingAxes | None = None
     stiffness: Estimate | None = None
+    validated: CrossValidation | None = None
 
     @property
     def points(self) -> MeasuredPoints:
@@ -135,6 +139,13 @@ class RobotCalibration:
             "terms": list(selected.terms),
             "term_selection": [considered_document(row) for row in chosen.considered] if chosen else [],
             "term_selection_by": chosen.by if chosen else None,
+            "cross_validation": None
+            if self.validated is None
+            else {
+                "by": self.validated.by,
+                "mean_mm": self.validated.mean / MILLIMETRE,
+                "parameters": self.validated.freedom,
+            },
             "before": before,
             "points": self.found_points,
             "calibration": {
@@ -251,7 +262,16 @@ def calibrate_robot(
     target = source if out is None else out / ESTIMATES
     before = robot_before(model, poses).errors(poses)
     result = RobotCalibration(
-        before, rigid, selection, selected, estimate, target, command, bearings, blocks.get("stiffness")
+        before,
+        rigid,
+        selection,
+        selected,
+        estimate,
+        target,
+        command,
+        bearings,
+        blocks.get("stiffness"),
+        None if selection is None else cross_validated(selected),
     )
     store_block(source, target, blocks, "calibration", estimate)
     if out is not None:
