@@ -309,3 +309,30 @@ def test_marginalised_and_reestimated_springs_are_stored_alike(
     shift = np.abs(one.parameters.coordinates() - other.parameters.coordinates())
     assert (shift <= 1e-3 * std + 1e-12).all()
     np.testing.assert_allclose(np.diag(other.covariance), std**2, rtol=1e-3, atol=1e-30)
+
+
+def test_poses_of_the_fit_are_known_in_another_file(run, ur5_folder: Path, some: Path) -> None:
+    """A verification on a part of the fitted poses is no independent check, whatever the file is called and holds besides."""
+    robot = ur5_folder / "robot.yaml"
+    assert run("calibrate", robot, some, "--terms", "kinematic").status == 0
+    header, rows = read_csv(some)
+    fresh_header, fresh = read_csv(ur5_folder / "random.csv")
+    assert header == fresh_header
+    both = np.vstack([rows[:30], fresh])
+    both[:, 0] = np.arange(len(both))
+    mixed = write_csv(ur5_folder / "mixed.csv", header, both)
+    found = run("verify", robot, mixed, "--json").document
+    assert found["fitted"] == [f"30 of these {30 + len(fresh)} points"]
+    assert found["verdict"]["trusted"] is None
+    assert run("verify", robot, ur5_folder / "random.csv", "--json").document["fitted"] == []
+
+
+def test_the_next_step_follows_the_verdict(run, ur5_folder: Path, some: Path) -> None:
+    robot = ur5_folder / "robot.yaml"
+    assert run("calibrate", robot, some, "--terms", "kinematic").status == 0
+    assert "next: flexcal export urdf" in run("verify", robot, ur5_folder / "random.csv").out
+    header, rows = read_csv(ur5_folder / "random.csv")
+    rows[:, header.index("x")] += 0.5
+    moved = run("verify", robot, write_csv(ur5_folder / "moved.csv", header, rows))
+    assert "Trusted: no" in moved.out
+    assert "next: mend what the verdict names" in moved.out

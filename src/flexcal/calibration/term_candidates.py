@@ -17,9 +17,12 @@ from flexcal.calibration.terms import (
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel, carried_mass, gravity_torque
 from flexcal.model.equilibrium import gravity_moments
+from flexcal.model.flank import certain_flank
 
 _CLEAR = 0.2
 """Share of its largest gravity torque that a joint must carry on both sides for a backlash to be considered."""
+_KNOWN = 0.5
+"""Share of the poses at which the flank of a joint must be certain for its backlash to be considered."""
 _LOAD = 1e-3
 """N m: a robot whose gravity loads are below that has none."""
 
@@ -70,10 +73,13 @@ def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
                 n for n in names if loaded & set(geometric_parameters(model, poses, [n]).names)
             )
     if not model.backlash_joints:
-        wider = _with_backlash(model, torque, joints)
+        known = certain_flank(model, poses.q, torque, masses).mean(axis=0) > _KNOWN
+        wider = _with_backlash(model, torque, [i for i in joints if known[i]])
         if wider is None:
             reason = (
                 "gravity loads no joint from both sides, so backlash is not identifiable beside an offset"
+                if _with_backlash(model, torque, joints) is None
+                else "masses are not known well enough to tell the flank that a joint rests on at most poses"
             )
             excluded.append(("backlash", _without_load(model) if most < _LOAD else reason))
         else:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from tyro.conf import arg
 
@@ -11,6 +11,9 @@ from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import with_estimates
 from flexcal.cli.options import Estimates, Json, MaybePath, PoseFiles, Robot, require_files, require_robot
+
+if TYPE_CHECKING:
+    from flexcal.report.page import Status
 
 
 @dataclass(frozen=True)
@@ -72,9 +75,18 @@ class Verify:
         console.say(found.trust.sentence)
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
+        console.finish(document, self._next(found.trust.status))
+
+    def _next(self, status: Status) -> str:
+        """The next step after a verdict."""
         where = with_estimates(self.estimates)
-        console.finish(
-            document,
+        if status == "bad":
+            return "mend what the verdict names, and verify again; do not use this calibration before that"
+        if status == "unknown":
+            return (
+                f"flexcal verify {self.robot} MORE_POSES…{where} (flexcal design poses --random plans some)"
+            )
+        return (
             f"flexcal export urdf {self.robot}{where} --out calibrated.urdf, or flexcal compensate {self.robot} TARGETS.csv{where}; "
-            f"flexcal map {self.robot}{where} --verification {self.poses[0]} predicts the accuracy elsewhere",
+            f"flexcal map {self.robot}{where} --verification {self.poses[0]} predicts the accuracy elsewhere"
         )

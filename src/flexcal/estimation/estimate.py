@@ -43,7 +43,7 @@ class Estimate:
     `outliers` are labels of groups, or row numbers where the problem has no groups. `covariance_freedom` are the degrees of freedom of a
     covariance that the scatter of few batches gave; without it the noise level's stand for them. `misfit` says where a fit to frequency
     responses does not explain them. `ranges` are those of the conditions, by name, that the data cover: the estimate says little outside
-    them.
+    them. `measurements` are digests of those that a calibration was fitted to.
     """
 
     parameters: Parameters
@@ -62,6 +62,7 @@ class Estimate:
     misfit: Misfit | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    measurements: str = ""
 
     @property
     def values(self) -> dict[str, float]:

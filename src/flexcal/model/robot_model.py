@@ -214,7 +214,8 @@ class RobotModel:
         """Index of one of the instrument's places; raises `FlexcalError` that lists the names."""
         if name not in self.stations:
             raise FlexcalError(
-                f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations)}; add it under `stations:`."
+                f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations)}; declare it under `stations:`, "
+                "and the others there too."
             )
         return self.stations.index(name)
 

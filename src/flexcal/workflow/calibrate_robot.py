@@ -51,6 +51,7 @@ from flexcal.workflow.calibrated_ranges import joint_extents
 from flexcal.workflow.calibrated_robot import TARGETS, TARGETS_BETWEEN
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.fitted_points import measurement_digests
 from flexcal.workflow.point_files import write_arm, write_loads, write_points
 from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import (
@@ -257,7 +258,10 @@ def calibrate_robot(
     } | ({"bearings": model.bearings} if model.has_bearings else {})
     origin = provenance([robot, bare.urdf, *files], options, source if blocks else None, tuple(blocks))
     estimate = replace(
-        selected.estimate, provenance=origin, ranges=joint_extents(selected.model, selected.poses.q)
+        selected.estimate,
+        provenance=origin,
+        ranges=joint_extents(selected.model, selected.poses.q),
+        measurements=measurement_digests(poses),
     )
     target = source if out is None else out / ESTIMATES
     before = robot_before(model, poses).errors(poses)

@@ -39,7 +39,8 @@ from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, unmeasured_remark
-from flexcal.workflow.verify_robot import fitted_files, verification_poses
+from flexcal.workflow.fitted_points import fitted_among
+from flexcal.workflow.verify_robot import verification_poses
 
 _FAR = 0.25
 """rad or m: a measured pose farther than this from the joint positions of its target belongs to another one."""
@@ -236,7 +237,7 @@ def certify_robot(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
         ),
-        fitted_files(calibrated, [after]),
+        fitted_among(calibrated, [after], visited[after][0]),
         command,
     )
     write_certificate(

@@ -41,9 +41,10 @@ from flexcal.workflow.calibrated_robot import (
     unmeasured_remark,
 )
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.fitted_points import fitted_among
 from flexcal.workflow.pose_choice import box_corners, working_file, working_volume
 from flexcal.workflow.refit_remarks import proposed_refit, refit_remarks
-from flexcal.workflow.verify_robot import fitted_files, verification_poses
+from flexcal.workflow.verify_robot import verification_poses
 
 _WORST = 5
 _APART = 0.1
@@ -169,14 +170,13 @@ def map_accuracy(
     model = calibrated.model
     stations = [s for s in model.stations if found_station(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
-    scale, before, study = _verified(calibrated, verification)
+    scale, before, study, fitted = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
     found = accuracy_map(reach, q, progress=progress).scaled(applied_factor(scale))
     worst = _worst(found)
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
-    fitted = fitted_files(calibrated, verification)
     place = working_file(working)
     origin = provenance(
         [robot, calibrated.nominal.urdf, *verification, *(() if place is None else (place,))],
@@ -231,10 +231,10 @@ def _poses(
 
 def _verified(
     calibrated: CalibratedRobot, files: Sequence[Path]
-) -> tuple[ErrorScale | None, ErrorsBefore | None, Verification | None]:
-    """How large errors at the poses of the `files` are against their prediction, those before, and the verification."""
+) -> tuple[ErrorScale | None, ErrorsBefore | None, Verification | None, tuple[str, ...]]:
+    """How large errors at the poses of the `files` are against their prediction, those before, the verification, and what was fitted."""
     if not files:
-        return None, None, None
+        return None, None, None, ()
     poses = verification_poses(calibrated, files)
     found, covariance = verify_jointly(calibrated.model, poses)
     if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
@@ -242,7 +242,7 @@ def _verified(
         named = " and ".join(str(file) for file in files)
         raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
     before = robot_before(calibrated.nominal, poses).errors(poses)
-    return error_scale(found, covariance), before, found
+    return error_scale(found, covariance), before, found, fitted_among(calibrated, files, poses)
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:

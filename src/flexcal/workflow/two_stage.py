@@ -29,6 +29,7 @@ from flexcal.report.two_stage import two_stage_checks
 from flexcal.workflow.demo_cells import CellName, open_cell
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.fitted_files import write_fitted
+from flexcal.workflow.fitted_points import measurement_digests
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.report_folder import report_folder, two_stage_study
@@ -152,7 +153,8 @@ def run_two_stage(
     write_poses(out / "calibration_poses.csv", measured)
     options = {"plan": plan, "seed": seed, "inertias_known": inertias_known}
     options |= {"bearings": elastic.bearings} if elastic.has_bearings else {}
-    stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, calibration.estimate)
+    geometry = replace(calibration.estimate, measurements=measurement_digests(measured))
+    stored = _store(out, (robot, nominal.urdf), files, options, stiffness.estimate, geometry)
     calibration = replace(calibration, estimate=stored)
     exported = write_urdf(calibration.model, out / "calibrated.urdf")
     with watch.stage("verification"):

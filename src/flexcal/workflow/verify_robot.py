@@ -24,7 +24,7 @@ from flexcal.calibration import (
 )
 from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
-from flexcal.estimates_file import provenance, sha256_of
+from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
@@ -34,6 +34,7 @@ from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_ranges import outside_ranges
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.fitted_points import fitted_among
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.refit_remarks import proposed_refit, refit_document, refit_remarks
@@ -165,7 +166,7 @@ def verify_robot(
     model = calibrated.probable if unmeasured else calibrated.model
     before = robot_before(bare, poses).errors(poses)
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
-    fitted = fitted_files(calibrated, files)
+    fitted = fitted_among(calibrated, files, poses)
     known = all(found_station(model, station) for station in poses.stations)
     stands = verify_jointly(model, poses) if known else None
     anew = refitted(model, poses, refit) if refit else None
@@ -212,12 +213,6 @@ def verification_poses(
                 "or fit it to these poses: 'flexcal verify' with --refit station."
             )
     return poses
-
-
-def fitted_files(calibrated: CalibratedRobot, files: Sequence[Path]) -> tuple[str, ...]:
-    """Names of the `files` that the calibration was made from."""
-    known = calibrated.blocks["calibration"].provenance.values()
-    return tuple(file.name for file in files if sha256_of(file) in known)
 
 
 def _rms(distance: np.ndarray) -> float:

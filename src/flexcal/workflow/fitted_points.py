@@ -1,0 +1,39 @@
+"""Comparison of measured points with those that a calibration was fitted to."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data import PoseSet
+from flexcal.estimates_file import sha256_of
+from flexcal.workflow.calibrated_robot import CalibratedRobot
+
+_DIGITS = 8
+_RESOLUTION = 1e-7
+"""rad or m: measurements that differ by less are one, in whatever file and unit they are."""
+
+
+def measurement_digests(poses: PoseSet) -> str:
+    """Eight hexadecimal digits for every measurement, of its joint positions and its point, one after the other."""
+    rows = np.round(np.hstack([poses.q, poses.position]) / _RESOLUTION).astype("<i8")
+    return "".join(f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
+
+
+def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
+    """Those of the `files`, or how many of the `poses` in them, that the calibration was fitted to, in words."""
+    estimate = calibrated.blocks["calibration"]
+    known = estimate.provenance.values()
+    named = tuple(file.name for file in files if sha256_of(file) in known)
+    if named:
+        return named
+    fitted, here = set(_split(estimate.measurements)), _split(measurement_digests(poses))
+    again = sum(digest in fitted for digest in here)
+    return (f"{again} of these {len(here)} points",) if again else ()
+
+
+def _split(digests: str) -> list[str]:
+    return [digests[k : k + _DIGITS] for k in range(0, len(digests), _DIGITS)]
