@@ -107,7 +107,7 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
         HEADLINES[trust.status],
         f"{_was(before)}At the same {after.poses} points the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
         f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
-        three_facts(before, after, trust, "points"),
+        three_facts(before, after, trust, "points of the fit"),
         tuple(rungs),
         f"Error of the robot at the {after.poses} measured points",
         checks,
