@@ -265,7 +265,7 @@ def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.nd
         misfit=fit.misfit,
         provenance=dict(block.provenance),
         ranges=dict(block.ranges),
-        measurements=block.measurements or "",
+        measurements=tuple((block.measurements or "").split()),
     )
 
 
@@ -300,7 +300,7 @@ def _stored(estimate: Estimate, covariance: np.ndarray) -> StoredBlock:
         ),
         covariance_sha256=_sha256(covariance),
         ranges={str(key): (float(low), float(high)) for key, (low, high) in estimate.ranges.items()},
-        measurements=estimate.measurements or None,
+        measurements=" ".join(estimate.measurements) or None,
         provenance={str(key): str(value) for key, value in estimate.provenance.items()},
     )
 

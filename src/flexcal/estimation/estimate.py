@@ -62,7 +62,7 @@ class Estimate:
     misfit: Misfit | None = None
     provenance: Mapping[str, str] = field(default_factory=dict)
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
-    measurements: str = ""
+    measurements: tuple[str, ...] = ()
 
     @property
     def values(self) -> dict[str, float]:

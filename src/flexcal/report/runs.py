@@ -74,7 +74,18 @@ class Comparison:
     def shared(self) -> tuple[str, ...]:
         """Names of measurements, and of blocks of estimates, that both runs used."""
         known = set(self.second.data.values())
-        return tuple(name for name, digest in self.first.data.items() if digest in known)
+        named = tuple(name for name, digest in self.first.data.items() if digest in known)
+        return named or self._common
+
+    @property
+    def _common(self) -> tuple[str, ...]:
+        """How many of the measured points both fitted, in words, whatever files they were in."""
+        first, second = (
+            set(run.estimates["calibration"].measurements if "calibration" in run.estimates else ())
+            for run in (self.first, self.second)
+        )
+        count = len(first & second)
+        return (f"{count} of the same measured points",) if count else ()
 
     def document(self) -> dict[str, object]:
         """What machines read; lengths in millimetres, `probability` and scores as `ParameterChanges` has them."""

@@ -51,7 +51,7 @@ from flexcal.workflow.calibrated_ranges import joint_extents
 from flexcal.workflow.calibrated_robot import TARGETS, TARGETS_BETWEEN
 from flexcal.workflow.calibration_remarks import calibration_remarks, outliers_of
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.fitted_points import measurement_digests
+from flexcal.workflow.fitted_measurements import measurement_digests
 from flexcal.workflow.point_files import write_arm, write_loads, write_points
 from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import (

@@ -39,7 +39,7 @@ from flexcal.report.prediction_checks import prediction_checks
 from flexcal.report.trust import Trust
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, unmeasured_remark
-from flexcal.workflow.fitted_points import fitted_among
+from flexcal.workflow.fitted_measurements import fitted_among
 from flexcal.workflow.verify_robot import verification_poses
 
 _FAR = 0.25

@@ -41,7 +41,7 @@ from flexcal.workflow.calibrated_robot import (
     unmeasured_remark,
 )
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.fitted_points import fitted_among
+from flexcal.workflow.fitted_measurements import fitted_among
 from flexcal.workflow.pose_choice import box_corners, working_file, working_volume
 from flexcal.workflow.refit_remarks import proposed_refit, refit_remarks
 from flexcal.workflow.verify_robot import verification_poses

@@ -29,7 +29,7 @@ from flexcal.report.two_stage import two_stage_checks
 from flexcal.workflow.demo_cells import CellName, open_cell
 from flexcal.workflow.designed_frequency import PlanName, designed_excitation, response_sensors, unplaced_plan
 from flexcal.workflow.fitted_files import write_fitted
-from flexcal.workflow.fitted_points import measurement_digests
+from flexcal.workflow.fitted_measurements import measurement_digests
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.report_folder import report_folder, two_stage_study

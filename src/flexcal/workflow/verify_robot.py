@@ -34,7 +34,7 @@ from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_ranges import outside_ranges
 from flexcal.workflow.calibrated_robot import CalibratedRobot, calibrated_robot, found_station
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.fitted_points import fitted_among
+from flexcal.workflow.fitted_measurements import fitted_among
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.refit_remarks import proposed_refit, refit_document, refit_remarks

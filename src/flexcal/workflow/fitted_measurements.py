@@ -12,15 +12,14 @@ from flexcal.data import PoseSet
 from flexcal.estimates_file import sha256_of
 from flexcal.workflow.calibrated_robot import CalibratedRobot
 
-_DIGITS = 8
 _RESOLUTION = 1e-7
 """rad or m: measurements that differ by less are one, in whatever file and unit they are."""
 
 
-def measurement_digests(poses: PoseSet) -> str:
-    """Eight hexadecimal digits for every measurement, of its joint positions and its point, one after the other."""
+def measurement_digests(poses: PoseSet) -> tuple[str, ...]:
+    """Eight hexadecimal digits for every measurement, of its joint positions and its point."""
     rows = np.round(np.hstack([poses.q, poses.position]) / _RESOLUTION).astype("<i8")
-    return "".join(f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
+    return tuple(f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
 
 
 def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
@@ -30,10 +29,6 @@ def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: Pose
     named = tuple(file.name for file in files if sha256_of(file) in known)
     if named:
         return named
-    fitted, here = set(_split(estimate.measurements)), _split(measurement_digests(poses))
-    again = sum(digest in fitted for digest in here)
-    return (f"{again} of these {len(here)} points",) if again else ()
-
-
-def _split(digests: str) -> list[str]:
-    return [digests[k : k + _DIGITS] for k in range(0, len(digests), _DIGITS)]
+    fitted = set(estimate.measurements)
+    again = sum(digest in fitted for digest in measurement_digests(poses))
+    return (f"{again} of these {len(poses)} points",) if again else ()
