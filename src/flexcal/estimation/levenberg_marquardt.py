@@ -13,11 +13,11 @@ _FIRST_DAMPING = 1e-3
 _LARGEST_DAMPING = 1e14
 _SMALLEST_DAMPING = 1e-18
 _ROUNDING = 1e-13
-_STATIONARY = 1e-4
+_STATIONARY = 1e-3
 _EXACT = 1e-16
 _CANNOT_STEP = {
     True: ("converged", "the cost no longer changes beyond rounding"),
-    False: ("stalled", "no step lowers the cost; check the Jacobian against finite differences"),
+    False: ("stalled", "no step lowers the cost, although it is not at a minimum"),
 }
 
 
@@ -52,8 +52,8 @@ def minimise(
     at one and pushed outwards rests for that step. Directions without information are not moved.
 
     Converged: the relative offset ‖Qᵀb‖/‖b‖ (Bates & Watts 1981) or the scaled step is below `tolerance`, or the cost no
-    longer changes beyond rounding. Stalled: no step lowers the cost although the relative offset is above 1e-4 and the
-    cost not yet 1e-16 of the first one. Raises FlexcalError when the start itself cannot be evaluated.
+    longer changes beyond rounding. Stalled: no step lowers the cost although the relative offset is above 1e-3, which Bates and Watts
+    suggest, and the cost not yet 1e-16 of the first one. Raises FlexcalError when the start itself cannot be evaluated.
     """
     lower, upper = objective.problem.parameters.bounds()
     x = np.clip(x, lower, upper)
