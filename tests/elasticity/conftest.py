@@ -33,9 +33,23 @@ def poses(examples: Path) -> dict[str, np.ndarray]:
 
 @pytest.fixture(scope="session")
 def stiff(tx90l: RobotModel) -> RobotModel:
-    """The TX90L with no backlash declared."""
+    """The TX90L with no backlash declared, and with torques that are those measured."""
     geometry = replace(tx90l.config.geometry, backlash=())
-    return replace(tx90l, config=replace(tx90l.config, geometry=geometry))
+    prior = replace(tx90l.config.prior, torque_constant=0.0)
+    return replace(tx90l, config=replace(tx90l.config, geometry=geometry, prior=prior))
+
+
+@pytest.fixture(scope="session")
+def shaken() -> Callable[[FrequencyResponse, float], FrequencyResponse]:
+    """A response with a resonance at 45 Hz of something that shakes along with joint 2, like a cell's base or a loose payload."""
+
+    def make(response: FrequencyResponse, share: float) -> FrequencyResponse:
+        ratio = response.frequencies_hz / 45.0
+        extra = np.ones((len(ratio), 3, 3), complex)
+        extra[:, 1, 1] += share * ratio**2 / (1 - ratio**2 + 0.06j * ratio)
+        return replace(response, response=response.response * extra)
+
+    return make
 
 
 @pytest.fixture(scope="session")

@@ -182,13 +182,22 @@ def _searched_fit(
     return final_fit(model, data, first)
 
 
+def _by_torque_constants(fit: ResponseFit) -> np.ndarray:
+    """Covariance (p, p) of the logarithms of stiffness and damping from the torque constants: one error for all springs of a joint."""
+    names = fit.estimate.parameters.names
+    joints = [name.split(".")[0] if name.endswith((".stiffness", ".damping")) else "" for name in names]
+    same = np.array([[own == other != "" for other in joints] for own in joints], dtype=float)
+    return fit.residual.model.robot.prior.torque_constant**2 * same
+
+
 def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     """The estimate with the covariance for measurements whose variance is `Tolerances.inflation` f times what weighs them.
 
     That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
     exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the profile likelihood is error of the
     springs alone, independent of each other: masses and centres of mass, whose moments are known far better than each of them, stay as
-    they are correlated. Where these took up a part of the misfit they count as not identifiable.
+    they are correlated. Where these took up a part of the misfit they count as not identifiable. No spring is known better than the
+    torque constant of its joint: the responses are accelerations by the torques that a controller believes in.
     """
     problem, fitted = fit.problem, fit.estimate
     posterior = fitted.covariance
@@ -208,7 +217,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     factor = np.maximum(factor, np.sqrt(excess)) * profile_stretch(problem, fitted)
     springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])
     alone = np.where(springs, (factor**2 - excess) * np.diag(covariance), 0.0)
-    covariance = excess * covariance + np.diag(alone)
+    covariance = excess * covariance + np.diag(alone) + _by_torque_constants(fit)
     sized = known_to_a_factor_of_two(fitted.parameters, covariance)
     small = {
         name: flag and size

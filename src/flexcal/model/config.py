@@ -56,7 +56,8 @@ class PayloadConfig:
 
 @dataclass(frozen=True)
 class PriorConfig:
-    """How far nominal values may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative), stiffness (relative).
+    """How far nominal values may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative), stiffness (relative), and the
+    torque constants behind the motor torques that a controller gives (relative; 0 for torques that were measured).
 
     `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name; a geometric
     parameter without is estimated from the measurements alone.
@@ -66,13 +67,16 @@ class PriorConfig:
     com: float = 0.010
     rotor_inertia: float = 0.05
     stiffness: float = 0.3
+    torque_constant: float = 0.02
     length: float | None = None
     angle: float | None = None
     parameters: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if self.mass < 0 or self.com < 0:
-            raise FlexcalError("the prior's mass and com must not be negative (0: known exactly).")
+        if min(self.mass, self.com, self.torque_constant) < 0:
+            raise FlexcalError(
+                "the prior's mass, com and torque_constant must not be negative (0: known exactly)."
+            )
         single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
         named = single | {"length": self.length, "angle": self.angle} | self.parameters
         for name, value in named.items():
