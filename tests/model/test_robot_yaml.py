@@ -49,7 +49,7 @@ MISTAKES = [
     (INERTIA, "rotor_inertia: [6.4, 9.8, .nan, 0.53, 0.11, 0.087]", ["rotor_inertia", "finite"]),
     (INERTIA, "rotor_inertia: [6.4, 9.8, -1.49, 0.53, 0.11, 0.087]", ["rotor_inertia must not be negative", "-1.49"]),
     (RATIO, "ratio: [45, 45, 0, 60, 60, 45]", ["ratio of 0"]),
-    (PRIOR, "prior: {mass: -0.07}", ["mass and com must not be negative"]),
+    (PRIOR, "prior: {mass: -0.07}", ["mass, com and torque_constant must not be negative"]),
     (PRIOR, "prior: {rotor_inertia: 0}", ["rotor_inertia must be positive"]),
     (PAYLOAD, PAYLOAD.replace("6.0", "-6"), ["mass and mass_std must not be negative"]),
     # lengths
