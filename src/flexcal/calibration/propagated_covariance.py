@@ -11,7 +11,7 @@ from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, carried_mass, gravity_torque, point_kinematics
 from flexcal.model.equilibrium import elastic_axes, lateral_slopes, spring_loads
 from flexcal.model.hardening import tangent_ratio, twist_by_hardening, twist_of
-from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
+from flexcal.model.names import GEOMETRY, INERTIALS, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 
 _GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance", *LATERAL)
@@ -214,7 +214,7 @@ def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
 
 
 def _is_elastic(name: str) -> bool:
-    return name.endswith((".stiffness", ".hardening", ".mass", ".com_x", ".com_y", ".com_z"))
+    return name.rpartition(".")[2] in ("stiffness", "hardening", *INERTIALS)
 
 
 def _is_geometric(name: str) -> bool:

@@ -8,6 +8,7 @@ from flexcal.calibration.prediction import predict
 from flexcal.calibration.propagated_covariance import Propagation, covariance_root, moving_parameters
 from flexcal.calibration.scatter import joint_turns
 from flexcal.data import PoseSet
+from flexcal.model.names import INERTIALS
 
 PARAMETERS = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")
 REPEATABILITY, MODEL_ERROR = "repeatability", "model error"
@@ -23,7 +24,7 @@ def source_of(name: str) -> str:
         return "payload"
     if key in ("stiffness", "hardening"):
         return "springs"
-    if key in ("mass", "com_x", "com_y", "com_z"):
+    if key in INERTIALS:
         return "link masses"
     return "backlash" if key == "backlash" else "geometry"
 

@@ -22,10 +22,10 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
 from flexcal.estimation.student import student_quantile
 from flexcal.model import Payload
-from flexcal.model.names import unit_of
+from flexcal.model.names import INERTIALS, MOMENTS, unit_of
 from flexcal.model.regressor import INERTIAL
 
-BODY = ("mass", "com_x", "com_y", "com_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+BODY = (*INERTIALS, *MOMENTS)
 """Of a payload in its frame: inertia about the centre of mass."""
 _ROUNDS = 4
 """Fits, each weighted by the noise that the one before leaves."""

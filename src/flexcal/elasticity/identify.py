@@ -11,7 +11,7 @@ from flexcal.data import MultisinePlan
 from flexcal.elasticity.fit import FINE, ResponseData, ResponseFit, final_fit, first_fit, fit_responses
 from flexcal.elasticity.hardening_drives import with_hardening
 from flexcal.elasticity.held_joints import HeldJoints
-from flexcal.elasticity.misfit import INERTIALS, misfit_of_fit, misfit_std
+from flexcal.elasticity.misfit import misfit_of_fit, misfit_std
 from flexcal.elasticity.model_error import Tolerances
 from flexcal.elasticity.naming import held_inertia_name
 from flexcal.elasticity.parameters import check_responses
@@ -24,7 +24,7 @@ from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.further_springs import with_brakes, with_drive_springs
-from flexcal.model.names import spring_names
+from flexcal.model.names import INERTIALS, spring_names
 from flexcal.progress import Progress, silent
 
 SPRING_VALUES = (".stiffness", ".damping", ".hardening")
@@ -227,7 +227,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     known = tuple(
         flag
         and small.get(name.replace(".damping", ".stiffness"), True)
-        and not (absorbing and name.endswith(INERTIALS))
+        and not (absorbing and name.rpartition(".")[2] in INERTIALS)
         for name, flag in small.items()
     )
     return replace(fitted, covariance=covariance, identifiable=known, misfit=misfit)

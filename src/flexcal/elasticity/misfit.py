@@ -10,6 +10,7 @@ from flexcal.elasticity.fit import ResponseFit
 from flexcal.estimation import Misfit
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.names import INERTIALS
 
 BAND_LINES = 8
 """Neighbouring lines over which the residual is averaged."""
@@ -30,7 +31,6 @@ FAR = 3.0
 """Factor between a stiffness and its start from which it has hardly found the right mode, where the fit is poor too."""
 
 
-INERTIALS = (".mass", ".com_x", ".com_y", ".com_z")
 CERTAIN = 1e-3
 """Chance of so large a move of masses and centres of mass where the model is right."""
 
@@ -44,7 +44,7 @@ def moved_inertials(fit: ResponseFit) -> float:
     from scipy.special import chdtri
 
     parameters = fit.estimate.parameters
-    own = [k for k, name in enumerate(parameters.names) if name.endswith(INERTIALS)]
+    own = [k for k, name in enumerate(parameters.names) if name.rpartition(".")[2] in INERTIALS]
     if not own:
         return 0.0
     assert fit.problem.prior_covariance is not None

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.model.equilibrium import gravity_regressor, payload_batch
+from flexcal.model.names import INERTIALS
 from flexcal.model.robot_model import RobotModel
 
 CERTAIN = 3.0
@@ -33,7 +34,7 @@ def gravity_torque_std(
     rows: list[np.ndarray] = []
     declared: list[float] = []
     for k, joint in enumerate(model.joints):
-        names += [f"{joint.link}.{key}" for key in ("mass", "com_x", "com_y", "com_z")]
+        names += [f"{joint.link}.{key}" for key in INERTIALS]
         rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.com[k])
         rows += [model.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
         declared += [model.prior.mass * model.mass[k], *[model.prior.com] * 3]

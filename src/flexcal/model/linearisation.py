@@ -11,7 +11,7 @@ from flexcal.errors import FlexcalError
 from flexcal.model.elastic_arm import ElasticArm, moved_inertia
 from flexcal.model.equilibrium import Equilibrium, elastic_axes, static_equilibrium
 from flexcal.model.hardening import tangent_ratio, twist_of
-from flexcal.model.names import SPRINGS
+from flexcal.model.names import INERTIALS, SPRINGS
 from flexcal.model.robot_model import RobotModel
 
 
@@ -151,7 +151,7 @@ def _derivatives(
             unit = np.zeros((size, size))
             unit[r, r] = 1.0
             result[name] = (unit, zero, zero) if key == "rotor_inertia" else (zero, unit, zero)
-        elif key in ("mass", "com_x", "com_y", "com_z"):
+        elif key in INERTIALS:
             mass, stiffness = _by_inertia(robot, arm, at, owner, key)
             load = _load_by_inertia(robot, arm, rest, owner, key)
             more_mass, more_stiffness = moved(-rest.compliance[0] @ load)

@@ -20,6 +20,7 @@ from flexcal.estimation import Estimate
 from flexcal.export.urdf import write_urdf
 from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
+from flexcal.model.names import INERTIALS
 from flexcal.progress import Progress, silent
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.fitted_response import fitted_responses
@@ -256,6 +257,4 @@ def _store(
 
 
 def _inertias(truth: dict[str, float]) -> dict[str, float]:
-    return {
-        name: value for name, value in truth.items() if name.endswith((".mass", ".com_x", ".com_y", ".com_z"))
-    }
+    return {name: value for name, value in truth.items() if name.rpartition(".")[2] in INERTIALS}
