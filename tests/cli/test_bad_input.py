@@ -311,7 +311,10 @@ def test_estimates_that_are_another_file(
     at = 2 if verb[0] == "export" else 1
     sentence = refused(run, ur5_folder, *verb[:at], "robot.yaml", *verb[at:], "--estimates", named)
     assert what in sentence
-    assert "takes the estimates.yaml that 'flexcal calibrate' wrote, or the folder with it" in sentence
+    assert (
+        "takes the estimates.yaml that 'flexcal calibrate' or another identification wrote, or the folder with it"
+        in sentence
+    )
 
 
 def test_verify_from_a_station_that_was_not_calibrated(run, ur5_folder: Path) -> None:

@@ -173,4 +173,25 @@ def test_a_frame_beside_a_declared_one(arm: Path, run: Run) -> None:
 
 def test_nothing_in_the_hand(arm: Path, run: Run) -> None:
     outcome = run("identify", "payload", arm / "robot.yaml", arm / "other.csv", "--free", arm / "free.csv")
-    assert outcome.status == 2 and "the torques contain no payload" in outcome.err
+    assert outcome.status == 2 and "no payload can be told from zero" in outcome.err
+
+
+def test_a_mass_that_no_body_has_is_called_impossible(arm: Path, run: Run) -> None:
+    """Loaded and free exchanged: the robot's own dynamics hold the payload."""
+    outcome = run("identify", "payload", arm / "robot.yaml", arm / "free.csv", "--free", arm / "loaded.csv")
+    assert outcome.status == 2 and "mass of the payload is negative (-4" in outcome.err
+    assert "identified with a payload" in outcome.err
+
+
+def test_estimates_of_another_folder(arm: Path, run: Run) -> None:
+    """The folder of `identify dynamics --out` serves as it is, and takes the payload; nothing appears beside robot.yaml."""
+    robot, loaded, own = arm / "robot.yaml", arm / "loaded.csv", arm / "own"
+    said = run("identify", "dynamics", robot, arm / "free.csv", "--out", own).err
+    assert run("identify", "payload", robot, loaded).status == 2
+    outcome = run("identify", "payload", robot, loaded, "--estimates", own, "--json")
+    assert outcome.status == 0, outcome.err + said
+    assert outcome.document["parameters"]["payload.mass"]["estimate"] == pytest.approx(HELD[0], rel=0.01)
+    assert set(read_estimates(own / "estimates.yaml")) == {"dynamics", "payload"}
+    assert not (arm / "estimates.yaml").exists()
+    nowhere = run("identify", "payload", robot, loaded, "--estimates", arm / "nowhere.yaml")
+    assert nowhere.status == 2 and "nowhere.yaml does not exist" in nowhere.err

@@ -154,3 +154,22 @@ def test_bad_files_are_refused_in_a_sentence(
 def test_unknown_tip_is_suggested(run, tmp_path: Path) -> None:
     outcome = run("init", robot(tmp_path, chain("left", 6)), "--out", tmp_path, "--tip", "left_66")
     assert outcome.status == 2 and "did you mean 'left_6'" in outcome.err
+
+
+def test_units_of_joints_that_slide(run, tmp_path: Path) -> None:
+    """deg suits no joint that slides, and one unit no robot that does both; its template still loads."""
+    urdf = robot(
+        tmp_path,
+        chain("arm", 2),
+        chain("arm", 3).split("</joint>")[2].replace("revolute", "prismatic") + "</joint>",
+    )
+    run("init", urdf, "--out", tmp_path)
+    path = tmp_path / "robot.yaml"
+    text = path.read_text()
+    assert (
+        "unit: deg" not in text
+        and "#   q: {columns: [J1, J2, J3], gain: [0.01745329252, 0.01745329252, 0.001]}" in text
+    )
+    assert "N m; of arm_joint_3: kg, N s/m, N." in text and "- joint: arm_joint_2" in text
+    path.write_text(text.replace("# signals:", "signals:").replace("#   q: {", "  q: {"))
+    assert RobotModel.from_yaml(path).config.signals["q"].gain[2] == 0.001

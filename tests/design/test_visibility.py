@@ -1,4 +1,5 @@
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from flexcal.design import (
 from flexcal.design.visibility import blocked, station_position
 from flexcal.errors import FlexcalError
 from flexcal.model import point_kinematics
-from flexcal.model.config import AcceptanceConfig
+from flexcal.model.config import AcceptanceConfig, StationConfig
 from flexcal.model.rotations import rpy_rotation
 from flexcal.units import DEGREE
 
@@ -76,6 +77,14 @@ def test_acceptance_is_an_angle_about_the_axis(tx90l, rng):
     angle = np.arccos(np.sum(motion.orientation[:, :, 2] * towards, axis=1) / np.linalg.norm(towards, axis=1))
     np.testing.assert_array_equal(narrow, free & (angle <= 40 * DEGREE))
     assert 0 < narrow.sum() < free.sum()
+
+
+def test_a_station_without_a_place_is_only_a_name(ur5) -> None:
+    """Calibration finds the place; a line of sight cannot do without."""
+    config = replace(ur5.config, stations={"tracker": StationConfig()})
+    assert station_position(replace(ur5, config=config)) is None
+    with pytest.raises(FlexcalError, match="line_of_sight needs the station's xyz"):
+        StationConfig(line_of_sight=True)
 
 
 def test_without_a_declared_station_everything_is_seen(ur5, rng):

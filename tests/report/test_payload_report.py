@@ -112,6 +112,7 @@ def test_the_verdict_turns_with_the_results(study: PayloadStudy) -> None:
         return [check.status for check in checks]
 
     assert statuses() == ["good"] * 6 and payload_page(fine).verdict.status == "good"
+    assert statuses(robot_mass_kg=0.5)[2] == "bad" and statuses(robot_mass_kg=0.0)[2] == "good"
     error = fine.results["error_percent"]
     for train, best, status in (
         (6.1, 2.0, "care"),

@@ -96,7 +96,11 @@ def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
 
 def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
     """The robot in the instrument's frame, where that is the base frame or at the declared stations; None where it is neither."""
-    places = {name: np.array(station.xyz) for name, station in model.config.stations.items()}
+    places = {
+        name: np.array(station.xyz)
+        for name, station in model.config.stations.items()
+        if station.xyz is not None
+    }
     beside = model.with_values(
         {
             f"station.{name}.{axis}": -float(value)

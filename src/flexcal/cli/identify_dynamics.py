@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
-from flexcal.cli.next_step import with_estimates
+from flexcal.cli.next_step import after_dynamics, with_estimates
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 from flexcal.errors import InputError
 
@@ -139,17 +139,23 @@ class IdentifyDynamics:
         console.finish(document, self._next(found))
 
     def _next(self, found: RobotDynamics) -> str:
-        """Frequency responses for an elastic robot; else validation, and then a URDF if the inertials are physically consistent."""
-        if found.train.observation.model.elastic:
-            return f"flexcal design frequency {self.robot} --out frequency.yaml"
+        """Payload and frequency responses for an elastic robot; else validation, the payload where one is declared, and then a URDF if the
+        inertials are physically consistent."""
+        where = with_estimates(self.out)
+        model = found.train.observation.model
+        payload = (
+            f"record logs with the payload and flexcal identify payload {self.robot} LOADED.parquet{where}"
+        )
+        if model.elastic:
+            return after_dynamics(self.robot, model, payload)
         verb = f"flexcal identify dynamics {self.robot} {' '.join(map(str, self.logs))}"
         if not (self.hold_out or self.validate):
             kept = "" if self.estimator == "wls" else f" --estimator {self.estimator}"
             return f"{verb} --validate other.parquet{kept}"
         if found.bodiless:
             return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
-        where = with_estimates(self.out)
-        return f"flexcal export urdf {self.robot}{where} --out identified.urdf"
+        urdf = f"flexcal export urdf {self.robot}{where} --out identified.urdf"
+        return urdf if model.nominal_payload is None else f"{payload}; or {urdf}"
 
 
 def _share(text: str) -> float:

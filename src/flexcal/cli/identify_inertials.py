@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
-from flexcal.cli.next_step import reading_elsewhere
+from flexcal.cli.next_step import after_dynamics, reading_elsewhere
 from flexcal.cli.options import Json, MaybePath, Robot, require_robot
 
 
@@ -53,6 +53,5 @@ class IdentifyInertials:
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
             console.say(reading_elsewhere(self.robot, found.estimates))
-        springs = f"flexcal design frequency {self.robot} --out frequency.yaml"
-        poses = f"flexcal design poses {self.robot} --count 40 --out poses.yaml"
-        console.finish(document, springs if found.nominal.elastic else poses)
+        loaded = f"flexcal design trajectory {self.robot} --loaded --out holding.yaml, for the payload"
+        console.finish(document, after_dynamics(self.robot, found.nominal, loaded))

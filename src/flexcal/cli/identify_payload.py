@@ -41,6 +41,15 @@ class IdentifyPayload:
         arg(metavar="FRAME", help_behavior_hint="(default: as robot.yaml declares it, else the last link)"),
     ] = ""
     """URDF frame of the values."""
+    estimates: Annotated[
+        MaybePath,
+        arg(
+            metavar="FILE",
+            help="estimates.yaml of the robot's own dynamics, or the folder of 'identify dynamics --out'; "
+            "without --out the block payload is added to it.",
+            help_behavior_hint="(default: beside robot.yaml)",
+        ),
+    ] = None
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Number of logs read in parallel, each in its own process."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
@@ -62,6 +71,7 @@ class IdentifyPayload:
                 self.logs,
                 free=self.free,
                 frame=self.frame,
+                estimates=self.estimates,
                 out=self.out,
                 command=command_line(),
                 jobs=self.jobs,
@@ -83,7 +93,9 @@ class IdentifyPayload:
         console.finish(document, self._next(found))
 
     def _next(self, found: RobotPayload) -> str:
-        where = with_estimates(self.out)
+        where = with_estimates(self.out or self.estimates)
         if "calibration" in found.blocks:
             return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
+        if found.declared.elastic and "stiffness" not in found.blocks:
+            return f"flexcal design frequency {self.robot} --out frequency.yaml"
         return f"flexcal design poses {self.robot} --count 40 --out poses.yaml"

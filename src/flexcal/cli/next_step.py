@@ -4,8 +4,12 @@ from __future__ import annotations
 
 from os.path import relpath
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from flexcal.errors import InputError
+
+if TYPE_CHECKING:
+    from flexcal.model import RobotModel
 
 
 def measuring(plan: Path, robot: Path, folder: str) -> str:
@@ -28,6 +32,16 @@ def on_the_robot(robot: Path, poses: str) -> str:
 def with_estimates(place: Path | None) -> str:
     """The option by which another verb finds estimates that are not beside robot.yaml; empty where they are."""
     return "" if place is None else f" --estimates {place}"
+
+
+def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
+    """What follows the robot's own dynamics: the payload by `loaded`, where one is declared and not identified, and springs or poses."""
+    springs = f"flexcal design frequency {robot} --out frequency.yaml"
+    poses = f"flexcal design poses {robot} --count 40 --out poses.yaml"
+    onward = springs if model.elastic else poses
+    if model.nominal_payload is None:
+        return onward
+    return f"{loaded}; or, where the declared payload is weighed, {onward}"
 
 
 def reading_elsewhere(robot: Path, estimates: Path) -> str:

@@ -27,7 +27,7 @@ def station_position(model: RobotModel, station: str | None = None) -> np.ndarra
             f"there is no station '{station}' in {model.path}; there are {', '.join(model.stations)}."
         )
     entry = declared.get(model.stations[0] if station is None else station)
-    return None if entry is None else np.array(entry.xyz)
+    return None if entry is None or entry.xyz is None else np.array(entry.xyz)
 
 
 def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = STANDARD) -> np.ndarray:

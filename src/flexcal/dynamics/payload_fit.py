@@ -27,6 +27,8 @@ from flexcal.model.regressor import INERTIAL
 
 BODY = (*INERTIALS, *MOMENTS)
 """Of a payload in its frame: inertia about the centre of mass."""
+_UNSEEN = 5e-3
+"""Mass over that of all links, below which errors of the model make a mass that is not there."""
 _ROUNDS = 4
 """Fits, each weighted by the noise that the one before leaves."""
 
@@ -74,7 +76,8 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
 
     The intervals include the uncertainty of the robot, and errors correlated in time and between joints (`score_covariance`).
     What the motion does not tell of the payload stays as declared, and so does inertia whose intervals tell no body from a point
-    (`told_moments`). Raises `FlexcalError` as `residual_noise` does, and where the mass is not above zero for sure.
+    (`told_moments`). Raises `FlexcalError` as `residual_noise` does, and where the 95 % interval of the mass contains zero
+    or lies below it.
     """
     held, noise = equations.held, first_noise(equations)
     found = _solve(equations, noise, np.zeros(len(INERTIAL)))
@@ -91,10 +94,17 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
             "the payload's mass is not identifiable beside the robot's own inertia in this motion; move the joints that lift "
             "it, or give --free logs."
         )
+    most, robot = 2 * float(found.values[0]) - least, float(equations.data.observation.model.mass.sum())
+    if most < -_UNSEEN * robot:
+        raise FlexcalError(
+            f"the estimated mass of the payload is negative ({found.values[0]:.3g} kg, 95 % interval {least:.3g} to {most:.3g} kg), as of "
+            "no body: the robot's own dynamics were identified with a payload, are of another robot, or the torques have another sign "
+            "or scale in these logs."
+        )
     if not least > 0:
         raise FlexcalError(
-            f"the torques contain no payload: its estimated mass is {found.values[0]:.3g} kg, with an upper 95 % limit of "
-            f"{2 * found.values[0] - least:.3g} kg; check that it was held, the signs of the torques and the robot's own dynamics."
+            f"no payload can be told from zero: its estimated mass is {found.values[0]:.3g} kg, with an upper 95 % limit of {most:.3g} kg; "
+            "check that it was held, the signs of the torques and the robot's own dynamics."
         )
     nearest = nearest_body(found.values, found.root, found.unseen)
     body = of_body(nearest.parameters)

@@ -99,7 +99,8 @@ def read_description(robot: Path) -> ArmDescription:
             bearing[j] = turning[j].rotation.T @ _of_rpy(elastic.frame_rpy)
     index = {link.name: k for k, link in enumerate(links)}
     (point, declared), *_ = config.points.items()
-    station, place = next(iter(config.stations.items()), ("tracker", None))
+    station, entry = next(iter(config.stations.items()), ("tracker", None))
+    place = None if entry is None else entry.xyz
     held = config.payload
 
     def drive(values: tuple[float, ...] | None, otherwise: float = 0.0) -> np.ndarray:
@@ -118,7 +119,7 @@ def read_description(robot: Path) -> ArmDescription:
         gaps=tuple(names.index(name) for name in config.geometry.backlash),
         gravity=np.array(config.gravity, dtype=float),
         point=(point, index[declared.frame], np.array(declared.xyz, dtype=float)),
-        station=(station, np.zeros(3) if place is None else np.array(place.xyz, dtype=float)),
+        station=(station, np.zeros(3) if place is None else np.array(place, dtype=float)),
         payload=0.0 if held is None else held.mass,
         payload_std=0.0 if held is None else held.mass_std,
         held_link=-1 if held is None else index[held.frame],

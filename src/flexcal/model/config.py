@@ -192,10 +192,14 @@ class DynamicsConfig:
 
 @dataclass(frozen=True)
 class StationConfig:
-    """Where the instrument stands, in the robot's base frame (m)."""
+    """Where the instrument stands, in the robot's base frame (m), for planning; the calibration estimates it, and needs none."""
 
-    xyz: Triple
+    xyz: Triple | None = None
     line_of_sight: bool = False
+
+    def __post_init__(self) -> None:
+        if self.line_of_sight and self.xyz is None:
+            raise FlexcalError("line_of_sight needs the station's xyz (m in the base frame).")
 
 
 @dataclass(frozen=True)

@@ -22,7 +22,7 @@ def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     return (
         _check_torques(results["error_percent"]).named("torques"),
         _check_body(results["body_rise"]).named("bodies"),
-        _check_mass(results["parameters"]["payload.mass"]).named("mass"),
+        _check_mass(results["parameters"]["payload.mass"], results.get("robot_mass_kg", 0.0)).named("mass"),
         _check_told(results["parameters"]).named("payload_parameters"),
         _check_declared(results["parameters"]["payload.mass"], results["declared"]).named(
             "declared_mass", independent=True
@@ -71,8 +71,15 @@ def _check_body(rise: float) -> Check:
     return Check(question, "Yes: mass and inertia are physically consistent.", "good")
 
 
-def _check_mass(mass: Mapping[str, float]) -> Check:
+def _check_mass(mass: Mapping[str, float], robot: float) -> Check:
     question = "Is the mass known well?"
+    if 0 < robot < mass["low"]:
+        return Check(
+            question,
+            f"No: {significant(mass['estimate'], 3)} kg is more than all links of the robot together ({significant(robot, 3)} kg): no "
+            "robot lifts that; check that the torques are in N m at the joints, and the robot's own dynamics.",
+            "bad",
+        )
     share = 100 * mass["std"] / mass["estimate"]
     if share > 100 * _WIDE:
         return Check(

@@ -76,7 +76,7 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
     """
     if estimates is None:
         return nominal.path.parent / nominal.config.estimates
-    expected = f"--estimates takes the {ESTIMATES} that 'flexcal calibrate' wrote, or the folder with it"
+    expected = f"--estimates takes the {ESTIMATES} that 'flexcal calibrate' or another identification wrote, or the folder with it"
     if estimates.is_dir():
         if not (estimates / ESTIMATES).is_file():
             raise InputError(f"{estimates} holds no {ESTIMATES}; {expected}.")

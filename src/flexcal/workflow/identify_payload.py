@@ -28,6 +28,7 @@ from flexcal.model.stored import PAYLOAD_FRAME, with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.payload_checks import payload_checks
 from flexcal.report.trust import Trust
+from flexcal.workflow.calibrated_robot import stored_estimates
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_systems import read_logs
 from flexcal.workflow.log_torques import require_joint_torques
@@ -91,6 +92,7 @@ class RobotPayload:
                 "best": 100 * fit.own_error,
                 "per_joint": dict(zip(joints, 100 * fit.joint_errors, strict=True)),
             },
+            "robot_mass_kg": float(self.declared.mass.sum()),
             "body_rise": fit.rise,
             "other_payloads": other_payloads(fit.estimate, self.blocks),
             "signals": {
@@ -125,6 +127,7 @@ def identify_robot_payload(
     *,
     free: Sequence[Path] = (),
     frame: str = "",
+    estimates: Path | None = None,
     out: Path | None = None,
     command: str = "",
     jobs: int = 1,
@@ -134,7 +137,8 @@ def identify_robot_payload(
 
     `logs` and `free` are files, or folders of trajectories as 'measure' leaves them. Of the robot itself its estimates tell, all blocks
     but that of the payload, or the logs `free` without payload, or both together. The values are in the frame that robot.yaml declares
-    for the payload, else in the URDF frame `frame`, else in that of the last link. With `out`, estimates, results.json, predictions.npz
+    for the payload, else in the URDF frame `frame`, else in that of the last link. `estimates` is read (and written) in place of those
+    beside robot.yaml: a file, or the folder that another identification wrote. With `out`, estimates, results.json, predictions.npz
     and report.html go to that folder. Raises `FlexcalError` where neither tells of the robot's dynamics, a log does not fit the robot,
     says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and as
     `identify_payload` does; nothing is written then.
@@ -145,13 +149,15 @@ def identify_robot_payload(
     require_distinct(every)
     nominal = recorded_with(RobotModel.from_yaml(robot, estimates=False), [*loaded.plans, *unloaded.plans])
     bare, frame = _held(nominal, frame)
-    source = bare.path.parent / bare.config.estimates
+    source = stored_estimates(bare, estimates)
+    if estimates is not None and not source.exists():
+        raise InputError(f"{source} does not exist; give the estimates.yaml of 'flexcal identify dynamics'.")
     blocks = read_estimates(source, without="payload") if source.exists() else {}
     if "dynamics" not in blocks and not free:
         raise InputError(
             f"{source} has no block 'dynamics', so payload and robot inertia are not identifiable separately; run 'flexcal identify "
             f"dynamics {robot} "
-            "LOGS…' on recordings without payload first, or give such recordings with --free."
+            "LOGS…' on recordings without payload first, give its folder with --estimates, or such recordings with --free."
         )
     _require_news(every, blocks)
     model = with_blocks(bare, blocks, source)

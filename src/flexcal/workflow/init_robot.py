@@ -90,7 +90,13 @@ def _commented(urdf: str, arm: Arm, model: RobotModel) -> str:
     rows = [f"#   q{i:<3}{joint.name:<{width}}  {_range(joint)}" for i, joint in enumerate(model.joints, 1)]
     others = f"; also on it: {', '.join(arm.frames[1:])}" if arm.frames[1:] else ""
     zeros, gains = ", ".join(["0"] * n), ", ".join(["1.0"] * n)
-    first = _text(model.joint_names[min(1, n - 1)])
+    turning = [joint.name for joint in model.joints if joint.kind != "prismatic"]
+    sliding = [joint.name for joint in model.joints if joint.kind == "prismatic"]
+    first = _text((turning or sliding)[min(1, len(turning or sliding) - 1)])
+    per = "m" if not turning else "rad"
+    force = "N" if not turning else "N m"
+    amplifier = f"{force}/A at the joint" + (" (N/A where it slides)" if turning and sliding else "")
+    also = f"; of {', '.join(map(_text, sliding))}: kg, N s/m, N" if turning and sliding else ""
     columns = ", ".join(f"J{i}" for i in range(1, n + 1))
     held = f"\n# Movable joints that are no part of the arm stand still, here (rad or m):\n{_locked(arm)}"
     return f"""# {model.name}: {n} joints. Units are m, rad, kg, s, N m. Complete `points:` before you measure; all else may wait.
@@ -120,13 +126,13 @@ gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot 
 # Joints with backlash, to have it found from the measured points.
 # geometry: {{terms: auto, backlash: [{first}]}}
 
-# Drives, referred to the joint, one number a joint: kg m², N m s/rad, N m.
+# Drives, referred to the joint, one number a joint: {"kg m², N m s/rad, N m" if turning else "kg, N s/m, N"}{also}.
 # drives:
 #   rotor_inertia: [{zeros}]
 #   viscous: [{zeros}]
 #   coulomb: [{zeros}]
 
-# Elastic joints, for the frequency experiments: a first guess of stiffness (N m/rad) and damping (N m s/rad).
+# Elastic joints, for the frequency experiments: a first guess of stiffness ({force}/{per}) and damping ({force} s/{per}).
 # elastic:
 #   - joint: {first}
 #     drive: {{stiffness: 1.0e5, damping: 100}}
@@ -134,9 +140,20 @@ gravity: [0, 0, -9.81]         # in the robot's base frame; turn it for a robot 
 
 # Only for files that are read as they are; 'flexcal import' makes files in the usual columns and units instead.
 # signals:
-#   q: {{columns: [{columns}], unit: deg}}
-#   tau: {{columns: [{columns.replace("J", "I")}], unit: A, gain: [{gains}]}}     # N m/A at the joint
+#   q: {{columns: [{columns}], {_position_unit(model)}
+#   tau: {{columns: [{columns.replace("J", "I")}], unit: A, gain: [{gains}]}}     # {amplifier}
 """
+
+
+def _position_unit(model: RobotModel) -> str:
+    """The rest of the line of q under `signals:`: one unit where all joints move alike, else a factor to rad or m for every joint."""
+    slides = [joint.kind == "prismatic" for joint in model.joints]
+    if all(slides):
+        return "unit: mm}"
+    if not any(slides):
+        return "unit: deg}"
+    factors = ", ".join("0.001" if slide else f"{DEGREE:.10g}" for slide in slides)
+    return f"gain: [{factors}]}}     # from deg, and from mm of what slides"
 
 
 def _range(joint: Joint) -> str:
