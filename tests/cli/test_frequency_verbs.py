@@ -409,3 +409,15 @@ def test_a_pose_without_response_is_named(run, recorded: Path, tmp_path: Path) -
     (tmp_path / "responses" / "response_pose_1.npz").unlink()
     done = run("identify", "stiffness", robot, tmp_path / "responses")
     assert done.status == 0 and "poses of the plan without a response, not used in the fit: 1" in done.out
+
+
+def test_a_plan_asks_for_everything_at_once(tx90l_folder: Path, capsys) -> None:
+    robot = tx90l_folder / "robot.yaml"
+    text = robot.read_text("utf-8")
+    robot.write_text(
+        "".join(line for line in text.splitlines(True) if not line.startswith("controller")), "utf-8"
+    )
+    (tx90l_folder / "frequency_poses.csv").unlink(missing_ok=True)
+    assert main(["design", "frequency", str(robot), "--out", str(tx90l_folder / "plan.yaml")]) == 2
+    said = capsys.readouterr().err
+    assert "add `controller:" in said and "frequency_poses.csv" in said and "--plan designed" in said

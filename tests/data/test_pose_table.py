@@ -65,6 +65,13 @@ def test_working_points_and_working_poses(tmp_path: Path, tx90l: RobotModel) -> 
         InputError, match=r"line 2, column q2: pose 1, at 2\.9 rad, is outside the limits of joint_2"
     ):
         read_working(poses, tx90l)
+    points.write_text("target,x,y,z\nsmr,0.5,0,0.4\n")
+    np.testing.assert_array_equal(read_working(points, tx90l)[1], [[0.5, 0, 0.4]])
+    poses.write_text("pose,q1,q2,q3,q4,q5,q6,target,unambiguous\n1,0,0.1,0.2,0,0,0,smr,true\n")
+    np.testing.assert_array_equal(read_working(poses, tx90l)[0], [[0, 0.1, 0.2, 0, 0, 0]])
+    points.write_text("target,x,y,z\nsmr,0.5,0,0.4\nball,0.5,0,0.4\n")
+    with pytest.raises(InputError, match=r"line 3, column target: there is no point 'ball'"):
+        read_working(points, tx90l)
     points.write_text("x,y,height\n0.5,0,0.4\n")
     with pytest.raises(InputError, match="column 'pose' is missing"):
         read_working(points, tx90l)

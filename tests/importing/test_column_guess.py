@@ -34,6 +34,14 @@ HEADERS = [
     ("shoulder_pan|shoulder_lift|elbow|wrist_1|wrist_2|wrist_3|pose.position.x|pose.position.y|pose.position.z|"
      "pose.orientation.x|pose.orientation.y|pose.orientation.z|pose.orientation.w",
      {"q": "shoulder_pan", "xyz": "pose.position.x", "quaternion": "pose.orientation.w"}),
+    ("Axe * [deg]|X (mm)|Y (mm)|Z (mm)", {"q": "Axe 1 [deg]", "xyz": "X (mm)"}),
+    ("Punto|Eje *|X|Y|Z", {"pose": "Punto", "q": "Eje 1", "xyz": "X"}),
+    ("Asse * misurato|X|Y|Z", {"q": "Asse 1 misurato", "xyz": "X"}),
+    ("Temps (s)|Axe * mesuré|Couple axe *", {"t": "Temps (s)", "q": "Axe 1 mesuré", "tau": "Couple axe 1"}),
+    ("Eixo * (°)|X|Y|Z", {"q": "Eixo 1 (°)", "xyz": "X"}),
+    ("Gelenk*|X|Y|Z", {"q": "Gelenk1", "xyz": "X"}),
+    ("軸*|X|Y|Z", {"q": "軸1", "xyz": "X"}),
+    ("关节*[deg]|x[mm]|y[mm]|z[mm]", {"q": "关节1[deg]", "xyz": "x[mm]"}),
     ("wrist_3_joint|wrist_2_joint|wrist_1_joint|elbow_joint|shoulder_lift_joint|shoulder_pan_joint|x|y|z",
      {"q": "shoulder_pan_joint", "xyz": "x"}),
 ]  # fmt: skip
@@ -53,7 +61,9 @@ def written_out(header: str) -> list[str]:
 def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
     header = written_out(header)
     columns = {name: rng.uniform(-2, 2, 30) for name in header}
-    columns |= {name: np.arange(30.0) for name in ("pose", "Nr", "Punktnr", "Point") if name in header}
+    columns |= {
+        name: np.arange(30.0) for name in ("pose", "Nr", "Punktnr", "Point", "Punto") if name in header
+    }
     guess = guess_columns(made(columns), ur5)
     assert {quantity: placed.columns[0] for quantity, placed in guess.placed.items()} == expected
     used = [column for placed in guess.placed.values() for column in placed.columns]

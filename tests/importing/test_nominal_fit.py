@@ -65,3 +65,22 @@ def test_a_point_that_sits_elsewhere_is_no_fault(tx90l, measured) -> None:
     found = check_nominal(tx90l, q, at.position + at.orientation @ shift, PLACED)
     assert found is not None and not found.doubtful and found.rms > 0.02
     np.testing.assert_allclose(found.moved, tx90l.point().xyz + shift, atol=2e-3)
+
+
+@pytest.mark.parametrize("noise", [0.0, 2e-3])
+def test_a_camera_on_the_hand_is_said_to_be_unsupported(tx90l, measured, noise) -> None:
+    q, _ = measured
+    at = point_kinematics(tx90l, q, jacobians=False)
+    camera, place = rpy_rotation(np.array([0.3, -0.4, 2.0])), np.array([1.2, 0.3, 0.1])
+    seen = np.einsum("nji,nj->ni", at.orientation, place - at.position) @ camera + np.array([0.05, 0.0, 0.1])
+    seen += np.random.default_rng(2).normal(0, noise, seen.shape)
+    found = check_nominal(tx90l, q, seen, PLACED)
+    assert found is not None and found.doubtful and not found.supported and "eye-in-hand" in found.proposal
+
+
+def test_points_at_random_are_not_said_to_be_seen_from_the_hand(tx90l, measured) -> None:
+    q, points = measured
+    for seed in range(5):
+        shuffled = np.random.default_rng(seed).permutation(points[:12])
+        found = check_nominal(tx90l, q[:12], shuffled, PLACED)
+        assert found is not None and found.doubtful and found.supported

@@ -113,3 +113,44 @@ def test_figures_are_drawn_and_fit_and_nobody_is_shut_out(
 def test_a_long_name_of_a_recording_fits_a_telephone(payload_folder: Path, tmp_path: Path) -> None:
     page = (payload_folder / "report.html").read_text("utf-8")
     seen(page.replace("loaded.csv", f"{'loaded_' * 9}.csv"), tmp_path, 390, "light")
+
+
+WITHOUT_WEBGL = """<!DOCTYPE html><html><body><iframe src="report.html" style="width:500px;height:900px;border:0"></iframe>
+<script>
+const frame = document.querySelector("iframe");
+const look = setInterval(function () {
+  const page = frame.contentDocument.documentElement;
+  if (page.dataset.figures !== "drawn") return;
+  clearInterval(look);
+  const flat = [...frame.contentDocument.querySelectorAll("canvas.flat")];
+  const inked = flat.filter(function (canvas) {
+    const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+    let seen = 0;
+    for (let k = 3; k < data.length; k += 4) seen += data[k] > 0;
+    return seen > 0.005 * data.length / 4;
+  });
+  document.body.dataset.flat = flat.map(canvas => canvas.parentElement.id).join();
+  document.body.dataset.inked = inked.length;
+  document.body.dataset.cut = [...frame.contentDocument.querySelectorAll(".scroll")].filter(
+    r => r.clientWidth && r.scrollWidth > r.clientWidth + 1 && !r.nextElementSibling.classList.contains("sideways")).length;
+  document.body.dataset.hints = frame.contentDocument.querySelectorAll(".sideways").length;
+}, 100);
+</script></body></html>"""
+
+
+def test_figures_in_space_are_drawn_flat_without_webgl_and_cut_tables_say_so(
+    report: Path, tmp_path: Path
+) -> None:
+    page = report.read_text("utf-8")
+    (tmp_path / "report.html").write_text(page, "utf-8")
+    (tmp_path / "frame.html").write_text(WITHOUT_WEBGL, "utf-8")
+    dom = browse(
+        tmp_path / "frame.html", tmp_path / "profile", "--disable-3d-apis", "--window-size=1600,1000"
+    )
+    body = dom[dom.index("<body") : dom.index(">", dom.index("<body"))]
+    found = dict(re.findall(r'data-(\w+)="([^"]*)"', body))
+    spaces = [
+        text for text in re.findall(r'data-specification="[^"]*">(.*?)</script>', page) if '"scene":' in text
+    ]
+    assert len(found["flat"].split(",")) == len(spaces) == int(found["inked"]) > 1
+    assert found["cut"] == "0" and int(found["hints"]) > 0

@@ -12,6 +12,12 @@ from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere
 from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
 
+_CHECK = "check that responses, payload and poses are of this robot, and the start values under `elastic:`"
+_OTHER_START = {
+    "multi-start": f"search a start more widely with --search population; if that ends so too, {_CHECK}",
+    "population": f"try another --seed; if that ends so too, {_CHECK}",
+}
+
 
 @dataclass(frozen=True)
 class IdentifyStiffness:
@@ -71,7 +77,9 @@ class IdentifyStiffness:
             console.show(quantity_table(title, shown, units))
         fit = document["fit"]
         if fit["status"] != "converged":
-            console.say(f"the fit has not converged ({fit['message']}); do not trust it")
+            console.say(
+                f"the fit has not converged ({fit['message']}), so its values and intervals mean nothing: {_OTHER_START[self.search]}"
+            )
         if not fit["reference_motion_modelled"]:
             console.say(
                 "there is no plan.yaml beside the responses: the reference motion is ignored, which biases damping upwards"

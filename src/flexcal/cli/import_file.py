@@ -136,6 +136,8 @@ class Import:
         if not fit.proposal:
             check = f"check the order, units and signs of the columns, and the point's frame in {self.robot}"
             return f"{what}; {check}, or write them with --unchecked."
+        if not fit.supported:
+            return f"{what}; {fit.proposal}."
         options = "".join(f" '{option}'" for option in fit.options)
         return (
             f"{what}; {fit.proposal}"

@@ -46,4 +46,12 @@ def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
 
 def reading_elsewhere(robot: Path, estimates: Path) -> str:
     """How other verbs find estimates that are not beside robot.yaml."""
-    return f"for other verbs to use these estimates, write 'estimates: {relpath(estimates, robot.parent)}' to {robot}"
+    entry = f"'estimates: {relpath(estimates, robot.parent)}'"
+    line = next((i for i, text in enumerate(_lines(robot), start=1) if text.startswith("estimates:")), None)
+    if line is None:
+        return f"for other verbs to use these estimates, add the line {entry} to {robot}"
+    return f"for other verbs to use these estimates, replace the line {line} of {robot} by {entry}"
+
+
+def _lines(file: Path) -> list[str]:
+    return file.read_text("utf-8").splitlines()

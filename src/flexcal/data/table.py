@@ -18,6 +18,8 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     import polars as pl
 
+_SHOWN = 4
+"""Tables named of a folder's."""
 BLOCK_BYTES = 64 * 2**20
 _DECODED = 100_000
 """Rows of Parquet that are decoded together: to slice some, all of their row group is."""
@@ -121,6 +123,8 @@ def open_table(path: str | Path) -> TableFile:
     Raises `InputError` where the file cannot be read, has no header, or names a column twice.
     """
     path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a table{tables_in(path)}.")
     if path.suffix not in (".csv", ".parquet"):
         raise InputError(f"{path}: a table must end in .csv or .parquet; convert it or rename it.")
     with _open(path) as stream:
@@ -148,6 +152,21 @@ def write_table(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
             frame.write_csv(temporary)
         else:
             frame.write_parquet(temporary)
+
+
+def tables_in(folder: Path) -> str:
+    """Which tables a folder holds, for a message; a few of them."""
+    try:
+        tables = [file for file in folder.iterdir() if file.suffix in (".csv", ".parquet")]
+    except OSError:
+        tables = []
+    found = [str(file) for file in sorted(tables, key=lambda file: (file.stem != "poses", file.name))]
+    if not found:
+        return "; there is none in it"
+    if len(found) == 1:
+        return f" in it, {found[0]}"
+    shown = ", ".join(found[:_SHOWN]) + (f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else "")
+    return f" in it: {shown}"
 
 
 def _open(path: Path) -> BinaryIO:

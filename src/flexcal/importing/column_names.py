@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from unicodedata import normalize
 
 _UNITS = {
     "deg": ("deg", "degree", "degrees", "degs", "°", "º", "grad"),
@@ -51,7 +52,7 @@ _AS_WORD = {
 _LAST_WORD = {"m", "s", "a", "n"}
 """Units that it is taken for after other words only, and no number."""
 _BRACKETS = re.compile(r"[\[({<]\s*([^\])}>]*?)\s*[\])}>]\s*$")
-_WORDS = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[θφτσω]")
+_WORDS = re.compile(r"\d+|[A-Z]+(?![a-z])|[A-Z]?[a-z]+|[θφτσω]|[^\W\d_a-zA-Z]+")
 
 
 @dataclass(frozen=True)
@@ -84,7 +85,7 @@ def parse_name(column: str, unit: str | None = None) -> ColumnName:
     bracket = _BRACKETS.search(column)
     if bracket and not bracket[1].isdigit():
         text, found = column[: bracket.start()], found or unit_of(bracket[1])
-    parts = [part.lower() for part in _WORDS.findall(text)]
+    parts = [part.lower() for part in _WORDS.findall(_without_accents(text))]
     if found is None and len(parts) > 1:
         last = parts[-1]
         after_words = len(parts) > 2 or not parts[0].isdigit()
@@ -93,6 +94,11 @@ def parse_name(column: str, unit: str | None = None) -> ColumnName:
     numbers = [int(part) for part in parts if part.isdigit()]
     words = tuple(part for part in parts if not part.isdigit())
     return ColumnName(column, text, words, numbers[-1] if numbers else None, found)
+
+
+def _without_accents(text: str) -> str:
+    """Latin letters without their accents: a column is called Mesuré or Mesure."""
+    return "".join(normalize("NFD", c)[0] if c.isalpha() and c < "\u0250" else c for c in text)
 
 
 def _is_short(parts: list[str]) -> bool:

@@ -7,32 +7,42 @@ def _words(text: str) -> frozenset[str]:
     return frozenset(text.split())
 
 
-JOINT = _words("q j joint joints axis axes ax achse theta th θ jnt gelenk angle angles winkel")
+JOINT = _words("q j joint joints axis axes ax theta th θ jnt angle angles achse achsen gelenk gelenke winkel")
+JOINT |= _words(
+    "axe articulation articulations eje ejes articulacion asse assi giunto giunti eixo eixos junta juntas"
+)
+JOINT |= _words("os gewricht ось оси 軸 轴 軸角度 轴角度 关节 關節 関節 关节角 关节角度 関節角度 축 관절")
 """Of joint positions, whatever stands beside them; the others of `POSITION` are so only with one of these, or a joint's name."""
-POSITION = JOINT | _words("a position positions pos state states value values encoder")
+POSITION = JOINT | _words(
+    "a position positions pos posicion posicao posizione state states value values encoder"
+)
 CARTESIAN = _words("tcp cartesian")
 """Of the tool, so of no joint."""
 NO_JOINT = _words("pose error err dev deviation force voltage limit mode offset digital analog")
 NO_JOINT |= _words("residual correction delta status")
 KINDS = (
     ("ddq", _words("ddq qdd acceleration accelerations acc accel")),
-    ("dq", _words("dq qd velocity velocities vel speed qdot rate")),
-    ("tau", _words("tau τ torque torques effort efforts moment drehmoment")),
+    ("dq", _words("dq qd velocity velocities vel speed qdot rate vitesse velocidad velocidade velocita")),
+    ("tau", _words("tau τ torque torques effort efforts moment drehmoment couple coppia par")),
     ("current", _words("current currents i iq strom amp amps")),
     ("q", POSITION),
 )
 """What one column a joint can be, the most telling words first."""
-MEASURED = _words("actual act ist measured meas feedback fb tracker lt smr")
-COMMANDED = _words("target desired des soll cmd command commanded ref reference nominal nom setpoint")
+MEASURED = _words(
+    "actual act ist measured meas feedback fb tracker lt smr mesure mesuree medido medida misurato misurata"
+)
+COMMANDED = _words(
+    "target desired des soll cmd command commanded ref reference nominal nom setpoint consigne"
+)
 NEUTRAL = MEASURED | COMMANDED | _words("robot arm motor link the of in")
 POINT = {"x": "x", "y": "y", "z": "z", "px": "x", "py": "y", "pz": "z"}
 NO_POINT = _words("force f error err deviation dev delta normal velocity vel v speed acc offset rpy")
 TURN = _words("orientation quaternion quat rotation rot")
 SIGMA = _words("sigma σ std sd uncertainty stddev")
 SINGLE = {
-    "t": _words("t time timestamp stamp datetime zeit zeitstempel uhrzeit seconds secs"),
+    "t": _words("t time timestamp stamp datetime zeit zeitstempel uhrzeit seconds secs temps tiempo tempo"),
     "pose": _words(
-        "pose poses no nr id number index idx measurement point punkt punktnr messpunkt nummer lfd sample row"
+        "pose poses no nr id number index idx measurement point punkt punktnr messpunkt nummer lfd sample row punto ponto"
     ),
     "payload": _words("payload load"),
     "temperature": _words("temperature temp temperatur"),

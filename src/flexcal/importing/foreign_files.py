@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from flexcal.data.table import tables_in
 from flexcal.errors import InputError
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.timestamps import with_times
@@ -36,7 +37,7 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
         return read_ros(path, joints, topic)
     if path.is_dir():
         raise InputError(
-            f"{path} is a folder without metadata.yaml, so no recording of ROS 2; name a file in it."
+            f"{path} is a folder without metadata.yaml, so no recording of ROS 2; name a file{tables_in(path)}."
         )
     if suffix in _TEXT:
         from flexcal.importing.separated_text import read_text

@@ -24,6 +24,14 @@ _ODD = 0.01
 _MADE_GOOD = 0.2
 """What explains a misfit leaves less than this share of it."""
 _FEWEST = 6
+_FEWEST_FROM_HAND = 9
+"""Poses: twice as many numbers as an instrument on the hand and what it sees leave open, less three."""
+_FROM_HAND = (
+    "they fit a point that stands still and is seen from the hand (eye-in-hand), which is not supported: measure a point on the tool with "
+    "an instrument that stands still (a tracker, a fixed camera)"
+)
+_ROTATION = 0.1
+"""How far a matrix may be from a rotation in what it does to lengths."""
 _MOST_ROWS = 60
 _MOST_JOINTS = 8
 _TURNS = (0.0, np.pi / 2, -np.pi / 2, np.pi)
@@ -38,6 +46,7 @@ class Misfit:
 
     point: its name; declared: where it is in its frame (m); moved: where it would have to be to fit best, and `moved_rms` what that leaves.
     proposal: what would explain a misfit, in words, and `options` to say so with --map; empty where nothing simple does, or none is needed.
+    supported: False where what explains it is no data that flexcal can use.
     """
 
     rms: float
@@ -48,6 +57,7 @@ class Misfit:
     point: str = ""
     proposal: str = ""
     options: tuple[str, ...] = ()
+    supported: bool = True
 
     @property
     def doubtful(self) -> bool:
@@ -74,6 +84,10 @@ def check_nominal(
     found = Misfit(rms, moved_rms, declared, declared + shift, model.reach, model.point(point).name)
     if moved_rms < _ODD * model.reach:
         return found
+    if len(q) >= _FEWEST_FROM_HAND and tool.miss_from_hand(q, xyz) < min(
+        _MADE_GOOD * moved_rms, _ODD * model.reach
+    ):
+        return replace(found, proposal=_FROM_HAND, supported=False)
     return _explained(model, tool, q, xyz, placed, found)
 
 
@@ -98,6 +112,21 @@ class _Tool:
                 inward = (xyz - to_centre) @ turn + from_centre - at.position
                 shift = np.einsum("nji,nj->i", frame, inward) / len(q)
         return float(np.sqrt(np.mean(np.sum(left**2, axis=1)))), shift
+
+    def miss_from_hand(self, q: np.ndarray, xyz: np.ndarray) -> float:
+        """Least rms distance (m) with `xyz` seen by an instrument on the hand: p + R (X xyz + c) is one place, whatever X (3, 3) and c.
+
+        Infinite where X is no rotation: then the points are something else.
+        """
+        at = point_kinematics(self.model, q, point=self.point, jacobians=False)
+        turned = np.einsum("nij,nk->nijk", at.orientation, xyz).reshape(-1, 9)
+        columns = [turned, at.orientation.reshape(-1, 3), np.tile(-np.eye(3), (len(q), 1))]
+        system, left = np.concatenate(columns, axis=1), -at.position.reshape(-1)
+        solution, _, rank, _ = np.linalg.lstsq(system, left, rcond=1e-9)
+        turn = solution[:9].reshape(3, 3)
+        if rank < system.shape[1] or np.abs(turn @ turn.T - np.eye(3)).max() > _ROTATION:
+            return np.inf
+        return float(np.sqrt(np.mean(np.sum((system @ solution - left).reshape(-1, 3) ** 2, axis=1))))
 
 
 @dataclass(frozen=True, eq=False)

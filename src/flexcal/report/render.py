@@ -17,6 +17,7 @@ from flexcal.report.palette import DARK, LIGHT, dark_of
 if TYPE_CHECKING:
     from jinja2 import Environment
 
+_SCRIPTS = ("numbers.js", "flat.js", "report.js")
 _MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
 _WORDS = {"good": "good", "care": "take care", "bad": "not good", "unknown": "not known"}
 
@@ -43,7 +44,7 @@ def page_html(page: Page) -> str:
             light=LIGHT,
             dark=DARK,
             style=(folder / "report.css").read_text("utf-8"),
-            script=(folder / "report.js").read_text("utf-8"),
+            script="\n".join((folder / name).read_text("utf-8") for name in _SCRIPTS),
             specifications={block.id: figure_json(block) for block in page.figures},
             dark_colours=script_json(dark_of()),
             document=script_json(_plain(page.document)),

@@ -13,7 +13,8 @@ from flexcal.workflow.pose_remarks import unused_columns
 
 _LOOK = (
     "these data do not fit this robot: look for a column with wrong sign, unit or order, for points of another "
-    "target or robot, and for a wrong xyz under `points:` (flexcal import looks for these)"
+    "target or robot, for a wrong xyz under `points:`, and for points seen by an instrument on the hand (eye-in-hand, "
+    "not supported); flexcal import looks for these"
 )
 
 _OVERSTATED, _UNDERSTATED = 0.5, 2.0
@@ -63,7 +64,10 @@ def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[st
     if hardly_fits(fit) and not cause:
         remarks.append(_LOOK)
     if not fit.estimate.converged:
-        remarks.append(f"the fit has not converged ({fit.estimate.status}); do not trust it")
+        remarks.append(
+            f"the fit has not converged ({fit.estimate.status}), so its values and intervals mean nothing: check the columns with 'flexcal "
+            "import' and the nominal geometry in the URDF, take fewer terms under `geometry:`, or measure more poses, farther apart"
+        )
     return tuple(remarks)
 
 

@@ -17,6 +17,7 @@ from flexcal.design.multisines import room
 from flexcal.design.payload_placement import Placement, payload_placements
 from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.spring_criterion import largest_stiffness_std
+from flexcal.errors import InputError
 from flexcal.frequency import leave_out_detection_lines
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -125,8 +126,11 @@ def plan_frequency_experiments(
     model = RobotModel.from_yaml(robot)
     sensors = response_sensors(robot)
     choice = None
+    placed = kind == "default" or kind == "paper"
+    poses = model.path.parent / "frequency_poses.csv" if placed and poses is None else poses
+    _require_all(model, kind, poses)
     if kind == "default" or kind == "paper":
-        poses = model.path.parent / "frequency_poses.csv" if poses is None else poses
+        assert poses is not None
         plan = frequency_plan(model, poses, kind, seed)
         plan = leave_out_detection_lines(plan) if detection_lines else plan
         flat = planned = PlannedResponses.of(model, plan, sensors)
@@ -155,6 +159,26 @@ def plan_frequency_experiments(
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
     write_frequency_page(page_beside(out), study)
     return found
+
+
+def _require_all(model: RobotModel, kind: PlanName, poses: Path | None) -> None:
+    """Raise `InputError` that names everything that a plan needs and is not there, not one thing after another."""
+    missing = []
+    if not model.driven:
+        missing.append("declares no elastic joint: add `elastic:`")
+    if model.controller is None:
+        n = model.n
+        missing.append(
+            f"declares no controller: add `controller: {{kp: […], kd: […], rate_hz: 4000}}` with {n} gains each"
+        )
+    if poses is not None and not poses.is_file():
+        columns = ", ".join(f"q{i}_deg" for i in range(1, model.n + 1))
+        missing.append(
+            f"has no {poses} for the poses of the plan '{kind}': write it with the columns plan, pose, {columns}, or let --plan designed "
+            "choose the poses"
+        )
+    if missing:
+        raise InputError(f"{model.path} " + "; it ".join(missing) + ".")
 
 
 def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:

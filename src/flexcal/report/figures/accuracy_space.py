@@ -31,7 +31,7 @@ def accuracy_space(found: AccuracyMap) -> go.Figure:
                 "size": 3,
                 "color": single(error),
                 "colorscale": COLOURS,
-                "cmin": float(error.min()),
+                "cmin": 0.0,
                 "cmax": float(np.quantile(error, 0.995)),
                 "colorbar": colour_bar(),
             },

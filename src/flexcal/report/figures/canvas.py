@@ -26,13 +26,14 @@ def panels(
     *,
     legend: bool = True,
     row_gap: float | None = None,
+    column_gap: float = 0.045,
 ) -> go.Figure:
-    """A grid of small panels with one title each, in the report's look."""
+    """A grid of small panels with one title each, in the report's look; gaps are shares of the figure."""
     figure = make_subplots(
         rows,
         columns,
         subplot_titles=tuple(titles) or None,
-        horizontal_spacing=0.045 if columns > 1 else 0.0,
+        horizontal_spacing=column_gap if columns > 1 else 0.0,
         vertical_spacing=(0.26 / rows if row_gap is None else row_gap) if rows > 1 else 0.0,
     )
     _styled(figure, height, legend)

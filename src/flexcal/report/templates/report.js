@@ -8,12 +8,14 @@
   const flatButtons = [["toImage", "zoom2d", "pan2d", "resetScale2d"]];
   const spaceButtons = [["toImage", "zoom3d", "pan3d", "orbitRotation", "resetCameraDefault3d"]];
   const figures = new Map();
+  // Figures in space need WebGL, which remote desktops and locked-down browsers lack.
+  const webgl = Boolean(document.createElement("canvas").getContext("webgl"));
   let printing = false;
   const widths = new ResizeObserver(function (entries) {
     for (const entry of entries) {
       const place = entry.target;
-      const full = place._fullLayout;
-      if (full && Math.abs(full.width - place.clientWidth) > 1) setTimeout(() => draw(place.id), 0);
+      const width = place._fullLayout ? place._fullLayout.width : Number(place.dataset.width || place.clientWidth);
+      if (Math.abs(width - place.clientWidth) > 1) setTimeout(() => draw(place.id), 0);
     }
   });
 
@@ -52,9 +54,7 @@
     return Object.assign(trace, changed);
   }
 
-  function numbers(array) {
-    return new Float32Array(Uint8Array.from(atob(array.bdata), (letter) => letter.charCodeAt(0)).buffer);
-  }
+  const numbers = flexcalNumbers;
 
   function showFactor(slider) {
     const figure = figures.get(slider.dataset.figure);
@@ -87,6 +87,11 @@
     }
     const waiting = place.querySelector(".waiting");
     if (waiting) waiting.remove();
+    if (layout.scene && !webgl) {
+      place.dataset.width = place.clientWidth;
+      drawFlat(place, data, layout);
+      return Promise.resolve();
+    }
     const drawn = Plotly.react(place, data, layout, Object.assign({}, config, {
       displayModeBar: narrow ? false : "hover",
       modeBarButtons: layout.scene ? spaceButtons : flatButtons,
@@ -111,6 +116,22 @@
     place.addEventListener("wheel", function (event) {
       if (!event.ctrlKey) event.stopPropagation();
     }, { capture: true, passive: true });
+  }
+
+  // A table that is cut says so in words where its shadow alone could be overlooked.
+  function sayWide() {
+    for (const region of document.querySelectorAll(".scroll")) {
+      const wide = region.scrollWidth > region.clientWidth + 1;
+      const said = region.nextElementSibling && region.nextElementSibling.classList.contains("sideways");
+      if (wide && !said) {
+        const hint = document.createElement("p");
+        hint.className = "sideways";
+        hint.textContent = "Wider than the screen: scroll the table sideways.";
+        region.after(hint);
+      } else if (!wide && said && region.clientWidth) {
+        region.nextElementSibling.remove();
+      }
+    }
   }
 
   function drawAll() {
@@ -164,6 +185,9 @@
       if (scheme.matches) drawAll();
     });
   }
+
+  const regions = new ResizeObserver(sayWide);
+  for (const region of document.querySelectorAll(".scroll")) regions.observe(region);
 
   window.addEventListener("load", function () {
     // After the first frame; a page in the background draws no frames, there the timer starts.
