@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/*)
 
-.PHONY: install demo test test-all check bench docs clean
+.PHONY: install demo test test-all sanitize check bench docs clean
 
 install: $(VENV)/.installed
 
@@ -32,8 +32,20 @@ demo: install
 test: $(VENV)/.developer
 	$(BIN)/python -m pytest -n 2 --dist loadfile
 
-test-all: $(VENV)/.developer
+test-all: $(VENV)/.developer sanitize
 	$(BIN)/python -m pytest -n 2 --dist loadfile -m ""
+
+# the kernels' tests on a build that checks every access to memory and every undefined operation; needs g++
+SANITIZED := build/sanitize
+PRELOADED = $(foreach library,asan ubsan stdc++,$(shell g++ -print-file-name=lib$(library).so))
+KERNEL_TESTS := tests/test_kernels.py tests/model tests/cell/test_stepping.py
+
+sanitize: $(VENV)/.developer
+	PATH="$(CURDIR)/$(BIN):$$PATH" cmake -S . -B $(SANITIZED) -G Ninja -DCMAKE_BUILD_TYPE=Release -DCMAKE_CXX_COMPILER=g++ -DSANITIZE=ON \
+	  -DPython_EXECUTABLE="$(CURDIR)/$(BIN)/python" -Dnanobind_DIR="$$($(BIN)/python -m nanobind --cmake_dir)" > /dev/null
+	PATH="$(CURDIR)/$(BIN):$$PATH" cmake --build $(SANITIZED)
+	LD_PRELOAD="$(PRELOADED)" ASAN_OPTIONS=detect_leaks=0:alloc_dealloc_mismatch=0 UBSAN_OPTIONS=print_stacktrace=1 \
+	  SANITIZED_KERNELS="$(CURDIR)/$(SANITIZED)" $(BIN)/python -m pytest -q -p no:xdist -p sanitized_kernels -m "" $(KERNEL_TESTS)
 
 check: $(VENV)/.developer docs
 	$(BIN)/ruff check .

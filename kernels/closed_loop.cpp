@@ -86,23 +86,33 @@ std::size_t closed_loop(const SteppedPlant& plant, std::vector<Spring>& springs,
 
 namespace {
 
-std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, State position,
-                                State velocity, State force, Table springs, Table frictions, Indices motors,
-                                Indices twists, Vector proportional, Vector derivative, double tick,
-                                std::size_t substeps, double encoder_resolution, double rate_filter,
-                                Table feed_forward, Table reference, Table reference_rate, Log position_log,
-                                Log torque_log, Log arm_log) {
-    const std::size_t dofs = position.shape(0), count = motors.shape(0), ticks = feed_forward.shape(0);
-    if (velocity.shape(0) != dofs || force.shape(0) != dofs)
-        throw std::invalid_argument("every coordinate of the plant must be a hinge or a slide");
-    if (twists.shape(0) != count || proportional.shape(0) != count || derivative.shape(0) != count)
-        throw std::invalid_argument("one twist, one kp and one kd are needed per motor");
-    if (substeps == 0 || !(tick > 0.0)) throw std::invalid_argument("tick and substeps must be positive");
-    require_shape(springs, dofs, 6, "springs");
-    require_shape(frictions, count, 5, "frictions");
-    for (const Table* table : {&feed_forward, &reference, &reference_rate})
-        require_shape(*table, ticks, count, "a signal");
-    for (const Log* log : {&position_log, &torque_log, &arm_log}) require_shape(*log, ticks, count, "a log");
+std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, nb::handle position_,
+                                nb::handle velocity_, nb::handle force_, nb::handle springs_, nb::handle frictions_,
+                                nb::handle motors_, nb::handle twists_, nb::handle proportional_,
+                                nb::handle derivative_, double tick, std::size_t substeps, double encoder_resolution,
+                                double rate_filter, nb::handle feed_forward_, nb::handle reference_,
+                                nb::handle reference_rate_, nb::handle position_log_, nb::handle torque_log_,
+                                nb::handle arm_log_) {
+    if (!step || !model || !data) throw nb::value_error("step, model and data must be addresses");
+    if (substeps == 0 || !(tick > 0.0)) throw nb::value_error("tick and substeps must be positive");
+    const auto position = written_reals(position_, {any}, "position");  // of hinges and slides: as many as velocities
+    const std::size_t dofs = position.shape(0);
+    const auto velocity = written_reals(velocity_, {dofs}, "velocity");
+    const auto force = written_reals(force_, {dofs}, "force");
+    const auto springs = reals(springs_, {dofs, 6}, "springs");
+    const auto motors = indices(motors_, {any}, "motors");
+    const std::size_t count = motors.shape(0);
+    const auto twists = indices(twists_, {count}, "twists");
+    const auto frictions = reals(frictions_, {count, 5}, "frictions");
+    const auto proportional = reals(proportional_, {count}, "proportional");
+    const auto derivative = reals(derivative_, {count}, "derivative");
+    const auto feed_forward = reals(feed_forward_, {any, count}, "feed_forward");
+    const std::size_t ticks = feed_forward.shape(0);
+    const auto reference = reals(reference_, {ticks, count}, "reference");
+    const auto reference_rate = reals(reference_rate_, {ticks, count}, "reference_rate");
+    const auto position_log = written_reals(position_log_, {ticks, count}, "position_log");
+    const auto torque_log = written_reals(torque_log_, {ticks, count}, "torque_log");
+    const auto arm_log = written_reals(arm_log_, {ticks, count}, "arm_log");
 
     std::vector<Spring> spring(dofs);
     for (std::size_t i = 0; i < dofs; ++i)
@@ -115,7 +125,7 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
         friction[m] = {frictions(m, 0), frictions(m, 1), frictions(m, 2), frictions(m, 3), frictions(m, 4)};
         if (motors(m) < 0 || motors(m) >= static_cast<std::int64_t>(dofs) ||
             twists(m) >= static_cast<std::int64_t>(dofs))
-            throw std::invalid_argument("a motor or twist lies outside the plant's coordinates");
+            throw nb::value_error("a motor or twist lies outside the plant's coordinates");
         motor[m] = static_cast<std::size_t>(motors(m));
         twist[m] = static_cast<std::ptrdiff_t>(twists(m));
         controllers[m] = {proportional(m), derivative(m)};
@@ -139,12 +149,12 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
 
 void bind_closed_loop(nb::module_& m) {
     m.def("closed_loop", &flexcal::closed_loop_binding, nb::arg("step"), nb::arg("model"), nb::arg("data"),
-          nb::arg("position").noconvert(), nb::arg("velocity").noconvert(), nb::arg("force").noconvert(),
+          nb::arg("position"), nb::arg("velocity"), nb::arg("force"),
           nb::arg("springs"), nb::arg("frictions"), nb::arg("motors"), nb::arg("twists"),
           nb::arg("proportional"), nb::arg("derivative"), nb::arg("tick"), nb::arg("substeps"),
           nb::arg("encoder_resolution"), nb::arg("rate_filter"), nb::arg("feed_forward"), nb::arg("reference"),
-          nb::arg("reference_rate"), nb::arg("position_log").noconvert(), nb::arg("torque_log").noconvert(),
-          nb::arg("arm_log").noconvert(),
+          nb::arg("reference_rate"), nb::arg("position_log"), nb::arg("torque_log"),
+          nb::arg("arm_log"),
           "Run the virtual cell's closed loop on a MuJoCo plant; returns the ticks done.\n\n"
           "step, model, data: addresses of mj_step, of an mjModel and an mjData; position, velocity, force: views of\n"
           "its qpos, qvel and qfrc_applied. springs (dofs, 6): stiffness, damping, half gap, cubic, hysteresis torque\n"

@@ -64,21 +64,30 @@ struct Axis {
     double held = 0.0, asked = 0.0;
 };
 
-std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, State angle, State velocity,
-                        State applied, Table hinges, Indices motors, Indices twists, Table frictions, Table errors,
-                        Table gains, double tick, std::size_t substeps, double count, double filter, Table torque,
-                        Table reference, Table reference_rate, Log angle_log, Log torque_log) {
-    const std::size_t size = angle.shape(0), axes = motors.shape(0), ticks = torque.shape(0);
-    if (velocity.shape(0) != size || applied.shape(0) != size)
-        throw std::invalid_argument("every coordinate of the arm must be a hinge");
-    if (twists.shape(0) != axes) throw std::invalid_argument("one twist is needed per motor");
-    require_shape(hinges, size, 6, "hinges");
-    require_shape(frictions, axes, 7, "frictions");
-    require_shape(errors, axes, 9, "errors");
-    require_shape(gains, axes, 3, "gains");
-    for (const Table* table : {&torque, &reference, &reference_rate}) require_shape(*table, ticks, axes, "a signal");
-    for (const Log* log : {&angle_log, &torque_log}) require_shape(*log, ticks, axes, "a log");
-    if (substeps == 0 || !(tick > 0.0)) throw std::invalid_argument("tick and substeps must be positive");
+std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_t data, nb::handle angle_,
+                        nb::handle velocity_, nb::handle applied_, nb::handle hinges_, nb::handle motors_,
+                        nb::handle twists_, nb::handle frictions_, nb::handle errors_, nb::handle gains_, double tick,
+                        std::size_t substeps, double count, double filter, nb::handle torque_, nb::handle reference_,
+                        nb::handle reference_rate_, nb::handle angle_log_, nb::handle torque_log_) {
+    if (!step || !model || !data) throw nb::value_error("step, model and data must be addresses");
+    if (substeps == 0 || !(tick > 0.0)) throw nb::value_error("tick and substeps must be positive");
+    const auto angle = written_reals(angle_, {any}, "angle");  // of hinges: as many as velocities
+    const std::size_t size = angle.shape(0);
+    const auto velocity = written_reals(velocity_, {size}, "velocity");
+    const auto applied = written_reals(applied_, {size}, "applied");
+    const auto hinges = reals(hinges_, {size, 6}, "hinges");
+    const auto motors = indices(motors_, {any}, "motors");
+    const std::size_t axes = motors.shape(0);
+    const auto twists = indices(twists_, {axes}, "twists");
+    const auto frictions = reals(frictions_, {axes, 7}, "frictions");
+    const auto errors = reals(errors_, {axes, 9}, "errors");
+    const auto gains = reals(gains_, {axes, 3}, "gains");
+    const auto torque = reals(torque_, {any, axes}, "torque");
+    const std::size_t ticks = torque.shape(0);
+    const auto reference = reals(reference_, {ticks, axes}, "reference");
+    const auto reference_rate = reals(reference_rate_, {ticks, axes}, "reference_rate");
+    const auto angle_log = written_reals(angle_log_, {ticks, axes}, "angle_log");
+    const auto torque_log = written_reals(torque_log_, {ticks, axes}, "torque_log");
 
     std::vector<ElasticHinge> springs(size);
     for (std::size_t i = 0; i < size; ++i)
@@ -87,7 +96,7 @@ std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_
     for (std::size_t m = 0; m < axes; ++m) {
         if (motors(m) < 0 || motors(m) >= static_cast<std::int64_t>(size) ||
             twists(m) >= static_cast<std::int64_t>(size))
-            throw std::invalid_argument("a motor or twist lies outside the arm's hinges");
+            throw nb::value_error("a motor or twist lies outside the arm's hinges");
         axis[m].motor = static_cast<std::size_t>(motors(m));
         axis[m].twist = static_cast<std::ptrdiff_t>(twists(m));
         axis[m].torque_gain = gains(m, 0);
@@ -151,11 +160,11 @@ std::size_t geared_loop(std::uintptr_t step, std::uintptr_t model, std::uintptr_
 
 void bind_geared_loop(nb::module_& m) {
     m.def("geared_loop", &flexcal::geared_loop, nb::arg("step"), nb::arg("model"), nb::arg("data"),
-          nb::arg("angle").noconvert(), nb::arg("velocity").noconvert(), nb::arg("applied").noconvert(),
+          nb::arg("angle"), nb::arg("velocity"), nb::arg("applied"),
           nb::arg("hinges"), nb::arg("motors"), nb::arg("twists"), nb::arg("frictions"), nb::arg("errors"),
           nb::arg("gains"), nb::arg("tick"), nb::arg("substeps"), nb::arg("count"), nb::arg("filter"),
-          nb::arg("torque"), nb::arg("reference"), nb::arg("reference_rate"), nb::arg("angle_log").noconvert(),
-          nb::arg("torque_log").noconvert(),
+          nb::arg("torque"), nb::arg("reference"), nb::arg("reference_rate"), nb::arg("angle_log"),
+          nb::arg("torque_log"),
           "Run the hard cell's closed loop on a MuJoCo arm of hinges; returns the ticks done.\n\n"
           "step, model, data: addresses of mj_step, of an mjModel and an mjData; angle, velocity, applied: views of its\n"
           "qpos, qvel and qfrc_applied. hinges (d, 6): stiffness, damping, lost motion, hardening (1/rad²), stiffness and\n"

@@ -1,11 +1,11 @@
 // Python's view of the kinematic tree: batches of poses in, arrays out.
 #include <nanobind/nanobind.h>
-#include <nanobind/ndarray.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/vector.h>
 
 #include <memory>
 
+#include "arrays.hpp"
 #include "bindings.hpp"
 #include "equilibrium.hpp"
 #include "kinematics.hpp"
@@ -16,18 +16,7 @@ using namespace flexcal;
 
 namespace {
 
-using Array = nb::ndarray<const double, nb::c_contig, nb::device::cpu>;
-using Places = nb::ndarray<const std::int64_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Rows = nb::ndarray<double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using ReadRows = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 using Result = nb::ndarray<nb::numpy, double>;
-
-void expect(const Array& array, std::initializer_list<std::size_t> shape, const char* name) {
-    bool same = array.ndim() == shape.size();
-    std::size_t k = 0;
-    for (std::size_t extent : shape) same = same && array.shape(k++) == extent;
-    if (!same) throw nb::value_error(name);
-}
 
 struct Buffer {
     std::unique_ptr<double[]> data;
@@ -45,34 +34,36 @@ struct Buffer {
     }
 };
 
-Tree make_tree(const std::vector<int>& parents, const std::vector<bool>& prismatic, Array placements, Array translations, Array normals,
-               Array bearings, bool tilts_first) {
+Tree make_tree(const std::vector<int>& parents, const std::vector<bool>& prismatic, nb::handle placements_, nb::handle translations_,
+               nb::handle normals_, nb::handle bearings_, bool tilts_first) {
     const std::size_t n = parents.size();
-    expect(placements, {n, 3, 3}, "placements must be (n, 3, 3)");
-    expect(translations, {n, 3}, "translations must be (n, 3)");
-    expect(normals, {n, 2, 3}, "normals must be (n, 2, 3)");
-    expect(bearings, {n, 3, 3}, "bearings must be (n, 3, 3)");
+    if (prismatic.size() != n) throw nb::value_error("prismatic must have one value per joint");
+    const auto placements = reals(placements_, {n, 3, 3}, "placements");
+    const auto translations = reals(translations_, {n, 3}, "translations");
+    const auto normals = reals(normals_, {n, 2, 3}, "normals");
+    const auto bearings = reals(bearings_, {n, 3, 3}, "bearings");
     Tree tree;
     tree.tilts_first = tilts_first;
     for (std::size_t i = 0; i < n; ++i) {
-        if (parents[i] >= static_cast<int>(i)) throw nb::value_error("a parent must come before its child");
+        if (parents[i] < -1 || parents[i] >= static_cast<int>(i)) throw nb::value_error("a parent must be -1 or come before its child");
         tree.joints.push_back({parents[i], prismatic[i], rotation(placements.data() + 9 * i), vector3(translations.data() + 3 * i),
                                vector3(normals.data() + 6 * i), vector3(normals.data() + 6 * i + 3), rotation(bearings.data() + 9 * i)});
     }
     return tree;
 }
 
-nb::tuple point(const Tree& tree, int joint, Array placement, Array translation, Array target, Array geometry, Array tool, Array q,
-                Array deflection, bool jacobians) {
-    const std::size_t n = tree.size(), samples = q.shape(0);
+nb::tuple point(const Tree& tree, int joint, nb::handle placement_, nb::handle translation_, nb::handle target_, nb::handle geometry_,
+                nb::handle tool_, nb::handle q_, nb::handle deflection_, bool jacobians) {
+    const std::size_t n = tree.size();
     if (joint < 0 || joint >= static_cast<int>(n)) throw nb::value_error("the point's joint is out of range");
-    expect(placement, {3, 3}, "placement must be (3, 3)");
-    expect(translation, {3}, "translation must be (3,)");
-    expect(target, {3}, "target must be (3,)");
-    expect(geometry, {n, 6}, "geometry must be (n, 6)");
-    expect(tool, {6}, "tool must be (6,)");
-    expect(q, {samples, n}, "q must be (samples, n)");
-    expect(deflection, {samples, n, 3}, "deflection must be (samples, n, 3)");
+    const auto placement = reals(placement_, {3, 3}, "placement");
+    const auto translation = reals(translation_, {3}, "translation");
+    const auto target = reals(target_, {3}, "target");
+    const auto geometry = reals(geometry_, {n, 6}, "geometry");
+    const auto tool = reals(tool_, {6}, "tool");
+    const auto q = reals(q_, {any, n}, "q");
+    const std::size_t samples = q.shape(0);
+    const auto deflection = reals(deflection_, {samples, n, 3}, "deflection");
     Buffer position({samples, 3}), orientation({samples, 3, 3});
     Buffer by_geometry({jacobians ? samples : 0, 6, 6 * (n + 1)}), by_motion({jacobians ? samples : 0, 6, 3 * n});
     const Target hung{joint, rotation(placement.data()), vector3(translation.data()), vector3(target.data())};
@@ -85,17 +76,20 @@ nb::tuple point(const Tree& tree, int joint, Array placement, Array translation,
     return nb::make_tuple(position.release(), orientation.release(), by_geometry.release(), by_motion.release());
 }
 
-nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& axes, Array stiffness, Array geometry, Array mass,
-                      Array first_moment, Array payload, int payload_joint, Array payload_point, Array gravity, Array q, bool sensitivities) {
-    const std::size_t n = tree.size(), samples = q.shape(0), d = axes.size();
-    expect(stiffness, {d}, "stiffness must have one value per elastic axis");
-    expect(geometry, {n, 6}, "geometry must be (n, 6)");
-    expect(mass, {n}, "mass must be (n,)");
-    expect(first_moment, {n, 3}, "first_moment must be (n, 3)");
-    expect(payload, {samples}, "payload must be (samples,)");
-    expect(payload_point, {3}, "payload_point must be (3,)");
-    expect(gravity, {3}, "gravity must be (3,)");
-    expect(q, {samples, n}, "q must be (samples, n)");
+nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& axes, nb::handle stiffness_, nb::handle geometry_,
+                      nb::handle mass_, nb::handle first_moment_, nb::handle payload_, int payload_joint, nb::handle payload_point_,
+                      nb::handle gravity_, nb::handle q_, bool sensitivities) {
+    const std::size_t n = tree.size(), d = axes.size();
+    const auto stiffness = reals(stiffness_, {d}, "stiffness");
+    const auto geometry = reals(geometry_, {n, 6}, "geometry");
+    const auto mass = reals(mass_, {n}, "mass");
+    const auto first_moment = reals(first_moment_, {n, 3}, "first_moment");
+    const auto payload_point = reals(payload_point_, {3}, "payload_point");
+    const auto gravity = reals(gravity_, {3}, "gravity");
+    const auto q = reals(q_, {any, n}, "q");
+    const std::size_t samples = q.shape(0);
+    const auto payload = reals(payload_, {samples}, "payload");
+    if (payload_joint < -1 || payload_joint >= static_cast<int>(n)) throw nb::value_error("the payload's joint is out of range");
     std::vector<ElasticAxis> elastic;
     for (auto [joint, component] : axes) {
         if (joint < 0 || joint >= static_cast<int>(n) || component < 0 || component > 2) throw nb::value_error("no such elastic axis");
@@ -115,38 +109,50 @@ nb::tuple equilibrium(const Tree& tree, const std::vector<std::pair<int, int>>& 
     return nb::make_tuple(deflection.release(), compliance.release(), regressor.release(), coupling.release(), residual);
 }
 
-// rows: of the array that places point into, (rows, samples).
-void expect_motion(const Tree& tree, const Array& geometry, const Array& gravity, const Array& q, const Array& dq, const Array& ddq,
-                   const Places& places, std::size_t rows) {
-    const std::size_t n = tree.size(), samples = q.shape(0);
-    expect(geometry, {n, 6}, "geometry must be (n, 6)");
-    expect(gravity, {3}, "gravity must be (3,)");
-    expect(q, {samples, n}, "q must be (samples, n)");
-    expect(dq, {samples, n}, "dq must be (samples, n)");
-    expect(ddq, {samples, n}, "ddq must be (samples, n)");
-    if (places.shape(0) != n || places.shape(1) != inertial_size * n) throw nb::value_error("places must be (n, 10 n)");
-    for (std::size_t i = 0; i < places.size(); ++i)
-        if (places.data()[i] >= static_cast<std::int64_t>(rows)) throw nb::value_error("a place is beyond the rows");
-}
+// What both directions of the torque regressor take.
+struct States {
+    Contiguous<const double, 1> gravity;
+    Contiguous<const double, 2> geometry, q, dq, ddq;
+    Contiguous<const std::int64_t, 2> places;
+    std::size_t samples;
 
-void torques(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq, Places places, Rows out) {
-    const std::size_t samples = q.shape(0);
-    expect_motion(tree, geometry, gravity, q, dq, ddq, places, out.shape(0));
-    if (out.shape(1) != samples) throw nb::value_error("out must be (rows, samples)");
+    States(const Tree& tree, nb::handle geometry_, nb::handle gravity_, nb::handle q_, nb::handle dq_, nb::handle ddq_, nb::handle places_) {
+        const std::size_t n = tree.size();
+        geometry = reals(geometry_, {n, 6}, "geometry");
+        gravity = reals(gravity_, {3}, "gravity");
+        q = reals(q_, {any, n}, "q");
+        samples = q.shape(0);
+        dq = reals(dq_, {samples, n}, "dq");
+        ddq = reals(ddq_, {samples, n}, "ddq");
+        places = indices(places_, {n, inertial_size * n}, "places");
+    }
+    // rows: of the array that places point into, (rows, samples)
+    void expect_places_below(std::size_t rows) const {
+        for (std::size_t i = 0; i < places.size(); ++i)
+            if (places.data()[i] >= static_cast<std::int64_t>(rows)) throw nb::value_error("a place is beyond the rows");
+    }
+};
+
+void torques(const Tree& tree, nb::handle geometry, nb::handle gravity, nb::handle q, nb::handle dq, nb::handle ddq, nb::handle places,
+             nb::handle out_) {
+    const States at(tree, geometry, gravity, q, dq, ddq, places);
+    const auto out = written_reals(out_, {any, at.samples}, "out");
+    at.expect_places_below(out.shape(0));
     nb::gil_scoped_release release;
-    torque_regressor(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(), places.data(),
-                     static_cast<std::ptrdiff_t>(samples), out.data());
+    torque_regressor(tree, at.geometry.data(), vector3(at.gravity.data()), at.q.data(), at.dq.data(), at.ddq.data(), at.places.data(),
+                     static_cast<std::ptrdiff_t>(at.samples), out.data());
 }
 
-Result torques_adjoint(const Tree& tree, Array geometry, Array gravity, Array q, Array dq, Array ddq, Places places, ReadRows weights) {
-    const std::size_t n = tree.size(), samples = q.shape(0);
-    expect_motion(tree, geometry, gravity, q, dq, ddq, places, weights.shape(0));
-    if (weights.shape(1) != samples) throw nb::value_error("weights must be (rows, samples)");
-    Buffer out({3, samples, n});
+Result torques_adjoint(const Tree& tree, nb::handle geometry, nb::handle gravity, nb::handle q, nb::handle dq, nb::handle ddq,
+                       nb::handle places, nb::handle weights_) {
+    const States at(tree, geometry, gravity, q, dq, ddq, places);
+    const auto weights = reals(weights_, {any, at.samples}, "weights");
+    at.expect_places_below(weights.shape(0));
+    Buffer out({3, at.samples, static_cast<std::size_t>(tree.size())});
     {
         nb::gil_scoped_release release;
-        torque_regressor_adjoint(tree, geometry.data(), vector3(gravity.data()), q.data(), dq.data(), ddq.data(), places.data(),
-                                 weights.data(), static_cast<std::ptrdiff_t>(samples), out.data.get());
+        torque_regressor_adjoint(tree, at.geometry.data(), vector3(at.gravity.data()), at.q.data(), at.dq.data(), at.ddq.data(),
+                                 at.places.data(), weights.data(), static_cast<std::ptrdiff_t>(at.samples), out.data.get());
     }
     return out.release();
 }
@@ -165,7 +171,7 @@ void bind_tree(nb::module_& m) {
              "Deflection (samples, n, 3), compliance (samples, d, d), gravity regressor (samples, d, 4 n), its coupling with geometry "
              "(samples, d, 6 n), largest last Newton step (rad).")
         .def("torque_regressor", &torques, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),
-             nb::arg("places"), nb::arg("out").noconvert(),
+             nb::arg("places"), nb::arg("out"),
              "Joint torques by mass, first moment and inertia of every link, into the rows of out (·, samples) that places (n, 10 n) names; "
              "-1 leaves an entry out, and those that are zero by structure are not written.")
         .def("torque_regressor_adjoint", &torques_adjoint, nb::arg("geometry"), nb::arg("gravity"), nb::arg("q"), nb::arg("dq"), nb::arg("ddq"),

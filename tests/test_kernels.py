@@ -54,8 +54,192 @@ def test_the_triangle_is_that_of_numpy(rows: int, rng: np.random.Generator) -> N
         np.testing.assert_allclose(np.abs(factor[:5, :5]), np.abs(expected), rtol=0, atol=1e-12 * rows)
 
 
-def test_what_does_not_fit_is_refused() -> None:
-    with pytest.raises(ValueError, match="triangle must be"):
-        append(np.zeros((3, 3)), np.zeros((4, 10)))
-    with pytest.raises(TypeError):
-        append(np.zeros((3, 3)), np.zeros((10, 3)).T)
+_SHAPES = {
+    "placement": (3, 3),
+    "translation": (3,),
+    "target": (3,),
+    "geometry": (6, 6),
+    "tool": (6,),
+    "q": (4, 6),
+    "deflection": (4, 6, 3),
+    "stiffness": (2,),
+    "mass": (6,),
+    "first_moment": (6, 3),
+    "payload": (4,),
+    "payload_point": (3,),
+    "gravity": (3,),
+    "dq": (4, 6),
+    "ddq": (4, 6),
+    "places": (6, 60),
+    "out": (5, 4),
+    "weights": (5, 4),
+    "placements": (3, 3, 3),
+    "translations": (3, 3),
+    "normals": (3, 2, 3),
+    "bearings": (3, 3, 3),
+    "triangle": (3, 3),
+    "rows": (3, 10),
+    "position": (4,),
+    "velocity": (4,),
+    "force": (4,),
+    "springs": (4, 6),
+    "frictions": (2, 5),
+    "motors": (2,),
+    "twists": (2,),
+    "proportional": (2,),
+    "derivative": (2,),
+    "feed_forward": (7, 2),
+    "reference": (7, 2),
+    "reference_rate": (7, 2),
+    "position_log": (7, 2),
+    "torque_log": (7, 2),
+    "arm_log": (7, 2),
+    "angle": (4,),
+    "applied": (4,),
+    "hinges": (4, 6),
+    "errors": (2, 9),
+    "gains": (2, 3),
+    "torque": (7, 2),
+    "angle_log": (7, 2),
+}
+_INDICES = {"places", "motors", "twists"}
+_WRITTEN = {
+    "out",
+    "triangle",
+    "rows",
+    "position",
+    "velocity",
+    "force",
+    "position_log",
+    "torque_log",
+    "arm_log",
+}
+_WRITTEN |= {"angle", "applied", "angle_log"}
+_POINT = ("placement", "translation", "target", "geometry", "tool", "q", "deflection")
+_REST = ("stiffness", "geometry", "mass", "first_moment", "payload", "payload_point", "gravity", "q")
+_MOTION = ("geometry", "gravity", "q", "dq", "ddq", "places")
+_LOOP = (
+    "position",
+    "velocity",
+    "force",
+    "springs",
+    "frictions",
+    "motors",
+    "twists",
+    "proportional",
+    "derivative",
+)
+_SIGNALS = ("feed_forward", "reference", "reference_rate", "position_log", "torque_log", "arm_log")
+_GEARED = (
+    "angle",
+    "velocity",
+    "applied",
+    "hinges",
+    "motors",
+    "twists",
+    "frictions",
+    "errors",
+    "gains",
+    "torque",
+)
+_PLANT = {"step": 1, "model": 1, "data": 1, "tick": 1e-3, "substeps": 1}
+_KERNELS = [
+    ("point", _POINT, {"joint": 5, "jacobians": True}),
+    ("equilibrium", _REST, {"axes": [(0, 2), (1, 2)], "payload_joint": 5, "sensitivities": True}),
+    ("torque_regressor", (*_MOTION, "out"), {}),
+    ("torque_regressor_adjoint", (*_MOTION, "weights"), {}),
+    ("build", ("placements", "translations", "normals", "bearings"), {"parents": [-1, 0, 1], "prismatic": [False] * 3}),
+    ("append", ("triangle", "rows"), {}),
+    ("closed_loop", (*_LOOP, *_SIGNALS), {**_PLANT, "encoder_resolution": 0.0, "rate_filter": 1.0}),
+    ("geared_loop", (*_GEARED, *_SIGNALS[1:3], "angle_log", "torque_log"), {**_PLANT, "count": 0.0, "filter": 1.0}),
+]  # fmt: skip
+_EVERY = [(kernel, name) for kernel, arrays, _ in _KERNELS for name in arrays]
+
+
+def _called(tree, kernel: str, changed: dict[str, object]) -> object:
+    """Call a kernel with arrays of the shapes that it takes, except for those `changed`."""
+    _, names, others = next(entry for entry in _KERNELS if entry[0] == kernel)
+    arrays: dict[str, object] = {
+        name: np.full(_SHAPES[name], -1) if name in _INDICES else np.zeros(_SHAPES[name]) for name in names
+    }
+    if "frictions" in names and "hinges" in names:
+        arrays["frictions"] = np.zeros((2, 7))
+    if "stiffness" in names:
+        arrays["stiffness"] = np.full(2, 1e9)
+    owner = tree if hasattr(tree, kernel) else _kernels
+    return getattr(owner, kernel)(**others, **(arrays | changed))
+
+
+@pytest.mark.parametrize(("kernel", "name"), _EVERY, ids=[f"{kernel}-{name}" for kernel, name in _EVERY])
+def test_every_array_of_every_kernel_is_checked(tx90l: RobotModel, kernel: str, name: str) -> None:
+    """Axes, extents, kind and, where it is written, order: one sentence that names the array, and no memory beyond it is read."""
+    right = np.zeros((2, 7)) if (kernel, name) == ("geared_loop", "frictions") else np.zeros(_SHAPES[name])
+    kind = np.int64 if name in _INDICES else np.float64
+    wrong_shapes = [
+        np.array(1.0),
+        right.ravel()[:0],
+        right[None],
+        np.zeros((*right.shape[:-1], right.shape[-1] + 1)),
+    ]
+    for array in wrong_shapes:
+        if name == "rows" and array.ndim == 2:
+            continue  # as many as one likes
+        with pytest.raises(ValueError, match=r"^[a-z_]+ must have the shape .*, not .*$"):
+            _called(tx90l.tree, kernel, {name: array.astype(kind)})
+    wrong_kinds = [
+        right.astype(complex),
+        right.astype(bool),
+        right.astype(str),
+        right.astype(object),
+        right.tolist(),
+    ]
+    for array in [*wrong_kinds, *([right + 0.5] if name in _INDICES else [])]:
+        with pytest.raises(TypeError, match=rf"^{name} must be an? .*array of (real |whole )?numbers$"):
+            _called(tx90l.tree, kernel, {name: array})
+    if name in _WRITTEN:
+        fixed = right.copy()
+        fixed.flags.writeable = False
+        spread = np.zeros((*right.shape, 2))[..., 0]
+        for array in (fixed, spread, right.astype(np.float32)):
+            with pytest.raises(
+                TypeError, match=rf"^{name} must be a writable C-contiguous array of float64$"
+            ):
+                _called(tx90l.tree, kernel, {name: array})
+
+
+def test_what_is_read_is_converted(tx90l: RobotModel, rng: np.random.Generator) -> None:
+    q = rng.integers(-2, 3, (4, 6))
+    expected = _called(tx90l.tree, "point", {"q": q.astype(float)})
+    for array in (q, np.asfortranarray(q.astype(float)), q.astype(np.float32)):
+        found = _called(tx90l.tree, "point", {"q": array})
+        np.testing.assert_array_equal(found[0], expected[0])  # pyright: ignore[reportIndexIssue]
+
+
+@pytest.mark.parametrize(
+    ("kernel", "changed", "words"),
+    [
+        ("point", {"joint": 6}, "joint is out of range"),
+        ("equilibrium", {"payload_joint": 6}, "payload's joint is out of range"),
+        ("equilibrium", {"axes": [(0, 2), (6, 2)]}, "no such elastic axis"),
+        ("equilibrium", {"axes": [(0, 2), (0, 3)]}, "no such elastic axis"),
+        ("torque_regressor", {"places": np.full((6, 60), 5)}, "beyond the rows"),
+        ("torque_regressor_adjoint", {"places": np.full((6, 60), 5)}, "beyond the rows"),
+        ("build", {"prismatic": [False]}, "one value per joint"),
+        ("build", {"parents": [0, 0, 1]}, "before its child"),
+        ("build", {"parents": [-2, 0, 1]}, "before its child"),
+        ("closed_loop", {"step": 0}, "addresses"),
+        ("closed_loop", {"substeps": 0}, "positive"),
+        ("closed_loop", {"tick": float("nan")}, "positive"),
+        ("closed_loop", {"motors": np.array([0, 4])}, "outside"),
+        ("closed_loop", {"motors": np.array([0, 1]), "twists": np.array([4, -1])}, "outside"),
+        ("geared_loop", {"motors": np.array([0, 4])}, "outside"),
+    ],
+)
+def test_indices_and_numbers_are_checked(tx90l: RobotModel, kernel: str, changed: dict, words: str) -> None:
+    others = next(entry[2] for entry in _KERNELS if entry[0] == kernel)
+    plain = {name: value for name, value in changed.items() if name in others}
+    with pytest.MonkeyPatch.context() as patch:
+        for name, value in plain.items():
+            patch.setitem(others, name, value)
+        with pytest.raises(ValueError, match=words):
+            _called(tx90l.tree, kernel, {name: value for name, value in changed.items() if name not in plain})

@@ -240,3 +240,46 @@ def test_what_is_not_written(tmp_path: Path, value: Any) -> None:
     with pytest.raises(FlexcalError, match="data"):
         write_yaml(tmp_path / "a.yaml", {"data": value})
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("depth", [60, 500, 100_000])
+@pytest.mark.parametrize("form", ["deep: {}{}\n", "{}1{}\n"], ids=["brackets", "dashes"])
+def test_depth_is_bounded(tmp_path: Path, depth: int, form: str) -> None:
+    opened, closed = ("[" * depth, "]" * depth) if "deep" in form else ("- " * depth, "")
+    assert "nest more than 50 deep" in fault(tmp_path, form.format(opened, closed))
+
+
+def test_aliases_repeat_a_bounded_number_of_values(tmp_path: Path) -> None:
+    levels = "".join(f"a{k + 1}: &a{k + 1} [{', '.join([f'*a{k}'] * 10)}]\n" for k in range(12))
+    assert "aliases repeat more than 100000 values" in fault(tmp_path, "a0: &a0 [1]\n" + levels)
+    text = "name: &n arm\nelastic:\n- {joint: *n, drive: &d {stiffness: 5}}\n- {joint: b, drive: *d, bearing: *d}\n"
+    config = read(tmp_path, text)
+    assert config.elastic[1] == Joint("b", Spring(5.0), Spring(5.0)) and config.elastic[0].joint == "arm"
+    assert "line 2: an alias refers to itself" in fault(tmp_path, "name: x\nterms: &t [*t]\n")
+    assert "line 1: the alias '*t' has no anchor" in fault(tmp_path, "terms: *t\n")
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        ("9" * 5000, "a number has 5000 digits"),
+        ("0x" + "f" * 5000, "a number has 5002 digits"),
+        ("0o9", "not the text '0o9'"),
+        ("1e51", "below 1e+50"),
+        ("-1e308", "below 1e+50"),
+        ("1e999", "finite"),
+        (str(10**60), "below 1e+50"),
+    ],
+)
+def test_numbers_beyond_reason(tmp_path: Path, number: str, words: str) -> None:
+    assert words in fault(tmp_path, f"name: a\ncutoff: {number}\n")
+
+
+@pytest.mark.parametrize("number", [2**63, -(2**63) - 1, 10**40])
+def test_whole_numbers_have_eight_bytes(tmp_path: Path, number: int) -> None:
+    assert "a whole number of at most 8 bytes" in fault(tmp_path, f"name: a\ncount: {number}\n")
+    assert "a whole number of at most 8 bytes" in fault(tmp_path, f"name: a\nlines: [1, {number}]\n")
+
+
+def test_a_second_document_is_refused(tmp_path: Path) -> None:
+    assert "line 2: a second document" in fault(tmp_path, "name: a\n---\nname: b\n")

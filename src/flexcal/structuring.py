@@ -1,9 +1,9 @@
 """Strict conversion of plain data (dicts, lists, texts, numbers) to frozen dataclasses, by cattrs.
 
-A Boolean or a text is never a number, NaN and infinity are refused, an unknown key is refused with the
-nearest known one. Arrays (`numpy.ndarray`, `NDArray[np.int64]`) are rectangular nested lists of numbers. Of a
-union, the members that have the form of the value (mapping, list or scalar) are tried in order, dataclasses that know more of its
-keys later.
+A Boolean or a text is never a number, NaN, infinity and numbers beyond `units.LARGEST` are refused, whole numbers have at
+most 8 bytes, an unknown key is refused with the nearest known one. Arrays (`numpy.ndarray`, `NDArray[np.int64]`) are
+rectangular nested lists of numbers. Of a union, the members that have the form of the value (mapping, list or scalar) are
+tried in order, dataclasses that know more of its keys later.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, cast, get_args, 
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
     from cattrs import Converter
@@ -252,12 +253,16 @@ def _number(value: Any) -> float:
         number = math.inf
     if not math.isfinite(number):
         raise _Unfit(f"a finite number is expected, not {_describe(value)}")
+    if abs(number) > LARGEST:
+        raise _Unfit(f"a number below {LARGEST:.0e} is expected, not {number:g}")
     return number
 
 
 def _integer(value: Any) -> int:
     if isinstance(value, bool) or not isinstance(value, int):
         raise _Unfit(f"a whole number is expected, not {_describe(value)}")
+    if not -(2**63) <= value < 2**63:
+        raise _Unfit(f"a whole number of at most 8 bytes is expected, not {value:.3g}")
     return value
 
 
@@ -339,7 +344,7 @@ def _describe(value: Any) -> str:
     if isinstance(value, str):
         text = " ".join(value.split())
         return f"the text '{text if len(text) <= _QUOTED else text[: _QUOTED - 1] + '…'}'"
-    return str(value)
+    return f"{value:.6g}" if isinstance(value, int) and abs(value) > 10**_QUOTED else str(value)
 
 
 def _failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None]:

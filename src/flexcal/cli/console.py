@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from flexcal.cli.printable import printable
 from flexcal.progress import Progress
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ class Console:
 
     def say(self, text: str) -> None:
         """A line of text beside the results; to standard error with `json`."""
-        print(text, file=sys.stderr if self.json else sys.stdout)
+        print(printable(text), file=sys.stderr if self.json else sys.stdout)
 
     def finish(self, document: Mapping[str, Any], following: str) -> None:
         """End a verb: what to do next, and the JSON document with `json`."""
@@ -57,7 +58,7 @@ class Console:
 
         tasks: dict[str, TaskID] = {}
         columns = (
-            TextColumn("{task.description:<14}"),
+            TextColumn("{task.description:<14}", markup=False),
             BarColumn(),
             TimeElapsedColumn(),
             TimeRemainingColumn(),
@@ -66,18 +67,18 @@ class Console:
 
             def advance(stage: str, share: float) -> None:
                 if stage not in tasks:
-                    tasks[stage] = bars.add_task(stage, total=1.0)
+                    tasks[stage] = bars.add_task(printable(stage), total=1.0)
                 bars.update(tasks[stage], completed=min(share, 1.0))
 
             yield advance
 
     def _rich(self, name: str) -> RichConsole:
-        from rich.console import Console as RichConsole
+        from flexcal.cli.safe_tables import SafeConsole
 
         if name not in self._streams:
             stream = sys.stdout if name == "out" else sys.stderr
             width = None if stream.isatty() else _WIDTH
-            self._streams[name] = RichConsole(file=stream, width=width, highlight=False)
+            self._streams[name] = SafeConsole(file=stream, width=width)
         return self._streams[name]
 
 
@@ -87,6 +88,6 @@ def _stage_lines() -> Progress:
     def advance(stage: str, share: float) -> None:
         if stage not in seen:
             seen.add(stage)
-            print(f"{stage} …", file=sys.stderr)
+            print(f"{printable(stage)} …", file=sys.stderr)
 
     return advance

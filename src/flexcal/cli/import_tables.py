@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from rich.markup import escape
 from rich.table import Table
 
 from flexcal.data.signals import standard_columns
@@ -19,9 +18,7 @@ def first_rows_table(found: ImportedFile) -> Table:
     """One row a column of flexcal: the file's column, its unit, the first values in SI, and why."""
     what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions"}[found.kind]
     rows = len(next(iter(found.columns.values())))
-    table = Table(
-        title=escape(f"{found.file}: {what}, {rows} rows; the first in SI units"), title_justify="left"
-    )
+    table = Table(title=f"{found.file}: {what}, {rows} rows; the first in SI units", title_justify="left")
     table.add_column("")
     table.add_column("column")
     table.add_column("unit")
@@ -38,7 +35,7 @@ def first_rows_table(found: ImportedFile) -> Table:
             column = f"{sign}{placed.columns[i]}{offset}"
             table.add_row(
                 name,
-                escape(column),
+                column,
                 placed.units[i] or "",
                 *_first(found, name),
                 placed.why if not i else "″",
@@ -52,4 +49,4 @@ def first_rows_table(found: ImportedFile) -> Table:
 
 def _first(found: ImportedFile, name: str) -> list[str]:
     values = found.columns[name][:_ROWS]
-    return [escape(f"{value:.6g}" if values.dtype.kind == "f" else str(value)) for value in values]
+    return [f"{value:.6g}" if values.dtype.kind == "f" else str(value) for value in values]

@@ -15,6 +15,7 @@ from importlib import import_module
 
 from flexcal.cli.command_line import keep_command_line
 from flexcal.cli.letters import show_near_letters
+from flexcal.cli.printable import sentence
 from flexcal.cli.verbs import Verb, find_verb, overview, unknown_verb
 from flexcal.errors import FlexcalError
 
@@ -40,7 +41,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stdout.flush()
         return status
     except FlexcalError as problem:
-        print(f"flexcal: {' '.join(str(problem).split())}", file=sys.stderr)
+        print(f"flexcal: {sentence(problem)}", file=sys.stderr)
         return FAILED
     except BrokenPipeError:
         # whoever read standard output has gone; nothing more can be said there, not even at exit
@@ -48,7 +49,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return 0
     except OSError as problem:
         where = f"{problem.filename}: " if problem.filename else ""
-        print(f"flexcal: {where}{problem.strerror or problem}.", file=sys.stderr)
+        print(f"flexcal: {sentence(f'{where}{problem.strerror or problem}.')}", file=sys.stderr)
         return FAILED
     except BaseException as problem:
         if not _was_interrupted(problem):
