@@ -34,7 +34,8 @@ def recorded(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The TX90L's folder with one trajectory and what the virtual cell recorded by it."""
     folder = copied(examples / "tx90l", tmp_path_factory.mktemp("cli") / "tx90l")
     plan = folder / "trajectory.yaml"
-    design = ("design", "trajectory", folder / "robot.yaml", "--count", 1, "--seed", 5, "--out", plan)
+    asked = ("--count", 1, "--criterion", "posterior", "--searches", 1, "--seed", 5)
+    design = ("design", "trajectory", folder / "robot.yaml", *asked, "--out", plan)
     measure = ("measure", plan, "--cell", "virtual", "--seed", 5, "--out", folder / "exciting")
     for arguments in (design, measure):
         assert main([str(a) for a in arguments]) == 0

@@ -12,19 +12,25 @@ from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import measuring
 from flexcal.cli.options import Json, Robot, require_at_least, require_robot
+from flexcal.errors import InputError
 
 
 @dataclass(frozen=True)
 class DesignTrajectory:
-    """Plan exciting trajectories: periodic motions within all limits and without collision that best determine the robot's dynamics."""
+    """Plan exciting trajectories: periodic motions within all limits and without collision that best determine the robot's dynamics.
+
+    Beside the plan, every trajectory is written as timed joint positions from rest to rest, as CSV and as a ROS JointTrajectory: move the
+    robot slowly to the first position, then start the log with the motion.
+    """
 
     robot: Robot
     out: Annotated[Path, arg(metavar="FILE")] = Path("trajectory.yaml")
     """File for the plan."""
     count: Annotated[int, arg(metavar="N")] = 3
     """Number of trajectories; each is optimised given the previous ones."""
-    criterion: Literal["posterior", "condition", "D", "E", "A", "c"] = "posterior"
-    """posterior: masses, centres of mass and rotors, with robot.yaml's prior; c: variances of the parameters --of, with it.
+    criterion: Literal["compound", "posterior", "condition", "D", "E", "A", "c"] = "compound"
+    """compound: posterior and condition together.
+    posterior: masses, centres of mass and rotors, with robot.yaml's prior; c: variances of the parameters --of, with it.
     Of the base parameters without prior: condition number of the column-scaled observation matrix, log det (D), least eigenvalue of the
     information (E), trace of the covariance (A)."""
     of: Annotated[tuple[str, ...], arg(metavar="NAME...", help_behavior_hint="")] = ()
@@ -52,10 +58,14 @@ class DesignTrajectory:
     """Fraction of the limits of velocities, accelerations and torques that a motion may use; the controller needs the rest."""
     loaded: bool = False
     """With the declared payload, as for a criterion of its parameters; without by default."""
-    searches: Annotated[int, arg(metavar="N")] = 1
-    """Number of random starts, of which the best is refined; more take longer."""
+    searches: Annotated[int, arg(metavar="N")] = 3
+    """Number of searches, each from a random start, of which the best is kept."""
     steps: Annotated[int, arg(metavar="N")] = 20
     """Iterations at each level of the barrier; 40 nearly converge."""
+    rate: Annotated[
+        float | None, arg(metavar="HZ", help_behavior_hint="(default: 100, more for fast motions)")
+    ] = None
+    """Timed joint positions a second; the cycle of a controller that takes one position each."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the random starts."""
     json: Json = False
@@ -69,6 +79,8 @@ class DesignTrajectory:
             1, count=self.count, harmonics=self.harmonics, searches=self.searches, steps=self.steps
         )
         require_at_least(0, seed=self.seed)
+        if self.rate is not None and not 1 <= self.rate <= 20_000:
+            raise InputError(f"--rate is {self.rate:g} Hz; give 1 to 20000.")
         console = Console(self.json)
         request = TrajectoryRequest(
             count=self.count,
@@ -84,13 +96,13 @@ class DesignTrajectory:
             start=self.start,
             share=self.share,
             loaded=self.loaded,
-            starts=self.searches,
+            searches=self.searches,
             steps=self.steps,
             seed=self.seed,
         )
         with console.progress() as progress:
             document = plan_trajectories(
-                self.robot, self.out, request, command=command_line(), progress=progress
+                self.robot, self.out, request, rate_hz=self.rate, command=command_line(), progress=progress
             ).document()
         without = "" if document["payload"] is None else ", without the payload"
         console.say(
@@ -102,6 +114,15 @@ class DesignTrajectory:
             f"matrix; criterion {self.criterion}: "
             + ", ".join(f"{merit:.4g}" for merit in document["merits"])
         )
+        first = document["timed"][0]
+        runs_up = f" (the first {first['run_up_s']:g} s run up to speed)" if first["run_up_s"] else ""
+        csv, ros = ([str(file[kind]) for file in document["timed"]] for kind in ("csv", "ros"))
+        console.say(
+            f"wrote {' '.join(csv)}: timed joint positions at {first['rate_hz']:g} Hz, from rest to rest{runs_up}; and {' '.join(ros)}, "
+            "the same as ROS JointTrajectory"
+        )
+        for remark in document["remarks"]:
+            console.say(remark)
         console.say(f"wrote {document['page']}, with figures")
         folder = "loaded" if self.loaded else "exciting"
         console.finish(document, f"{measuring(self.out, self.robot, folder)}, or record it on the robot")

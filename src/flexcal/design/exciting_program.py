@@ -188,9 +188,10 @@ class ExcitingProgram:
             j = int(np.argmax(np.abs(position)))
             return f"{model.joint_names[j]} is at {q[j]:.4g}, outside {self.limits.lower[j]:.4g} to {self.limits.upper[j]:.4g}"
         j = int(np.argmax(np.abs(torque)))
+        unit = "N" if model.joints[j].kind == "prismatic" else "N m"
         return (
-            f"{model.joint_names[j]} needs {abs(torque[j]) * self._drive_share[j]:.4g} N m at rest, but friction leaves "
-            f"{self._drive_share[j]:.4g} N m of its effort"
+            f"{model.joint_names[j]} needs {abs(torque[j]) * self._drive_share[j]:.4g} {unit} at rest, but friction leaves "
+            f"{self._drive_share[j]:.4g} {unit} of its effort"
         )
 
     def finer(self, factor: int) -> ExcitingProgram:

@@ -16,6 +16,7 @@ from flexcal.design.interior_search import minimise
 from flexcal.design.motion_limits import MotionLimits
 from flexcal.design.motion_space import Kind, MotionSpace
 from flexcal.design.sequences import Stage
+from flexcal.design.stated_limits import require_stated_limits
 from flexcal.design.torque_columns import TorqueColumns
 from flexcal.design.torque_goal import TorqueGoal, TrajectoryCriterion, declared_unknowns, torque_goal
 from flexcal.errors import InputError
@@ -114,9 +115,10 @@ def design_trajectories(
     A `sequence` of stages replaces `count`: one trajectory each, with the joints and the parameters of its own, for the criterion D.
     What was recorded by another plan, `after`, counts as known.
 
-    Raises `InputError` or `FlexcalError` where the duration does not hold a period, limits cross, the start is not possible, the robot
-    can stand nowhere, or torques cannot tell the parameters `of`.
+    Raises `InputError` or `FlexcalError` where the URDF lacks velocities, efforts or masses, the duration does not hold a period, limits
+    cross, the start is not possible, the robot can stand nowhere, or torques cannot tell the parameters `of`.
     """
+    require_stated_limits(model)
     frequency = 1 / duration if base_frequency_hz is None else base_frequency_hz
     periods = _periods(duration, frequency)
     limits = MotionLimits.of(model, share)

@@ -27,10 +27,11 @@ class PeriodicMotion:
     def of(cls, recording: Recording, plan: TrajectoryPlan, number: int, cutoff_hz: float) -> PeriodicMotion:
         """The mean of the periods of trajectory `number` after the settling ones, up to `cutoff_hz`; the torque as it acts, with its hold.
 
-        Raises `FlexcalError` where the recording is not as long or as fast as planned, or of another motion.
+        What follows the last period, such as coming to rest, is left out. Raises `FlexcalError` where the recording is not as long or as
+        fast as planned, or of another motion.
         """
         size, periods = plan.samples_per_period, plan.periods
-        if len(recording) != size * periods or not np.isclose(
+        if len(recording) < size * periods or not np.isclose(
             recording.time_step * plan.rate_hz, 1.0, rtol=1e-6
         ):
             raise FlexcalError(
@@ -38,7 +39,7 @@ class PeriodicMotion:
                 f"{1 / plan.rate_hz:g} s."
             )
         mean_q, mean_torque = (
-            values.reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
+            values[: size * periods].reshape(periods, size, -1)[plan.settle_periods :].mean(axis=0)
             for values in (recording.q, recording.torque)
         )
         planned = plan.motion(number, np.arange(size) / plan.rate_hz)[0]

@@ -98,8 +98,12 @@ def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
         if status == "good"
         else "Read the checks below before running the motions"
     )
-    sentence = (
-        "Limits are those of the URDF and of robot.yaml, for the nominal robot with its declared friction."
+    sentence = " ".join(
+        [
+            f"Limits are those of the URDF and of robot.yaml, for the nominal robot with its "
+            f"{'assumed' if document['assumed_friction'] else 'declared'} friction.",
+            *(f"{remark[0].upper()}{remark[1:]}." for remark in document["remarks"]),
+        ]
     )
     return Verdict(status, headline, sentence, facts, (), "", checks)
 

@@ -1,0 +1,124 @@
+"""`design trajectory` for a robot of another maker: what it asks for, and its motions as timed positions, checked with Pinocchio alone."""
+
+from __future__ import annotations
+
+import csv
+import re
+from pathlib import Path
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yaml
+
+URDF = """<robot name="gantry"><link name="base"/>
+<link name="carriage"><inertial><origin xyz="0.02 0.01 0.1"/><mass value="12"/>
+ <inertia ixx="0.2" iyy="0.25" izz="0.3" ixy="0.01" ixz="0" iyz="0.02"/></inertial></link>
+<link name="upper"><inertial><origin xyz="0.2 0 0.02"/><mass value="6"/>
+ <inertia ixx="0.03" iyy="0.15" izz="0.16" ixy="0" ixz="0.01" iyz="0"/></inertial></link>
+<link name="fore"><inertial><origin xyz="0.15 0.01 0"/><mass value="3"/>
+ <inertia ixx="0.01" iyy="0.05" izz="0.06" ixy="0" ixz="0" iyz="0.002"/></inertial></link>
+<joint name="rail" type="prismatic"><parent link="base"/><child link="carriage"/><origin xyz="0 0 0.8"/><axis xyz="1 0 0"/>
+ <limit lower="-0.6" upper="0.6" velocity="1.0" effort="400"/></joint>
+<joint name="shoulder" type="revolute"><parent link="carriage"/><child link="upper"/><origin xyz="0 0 0.3"/><axis xyz="0 1 0"/>
+ <limit lower="-1.5" upper="1.5" velocity="3" effort="120"/></joint>
+<joint name="elbow" type="revolute"><parent link="upper"/><child link="fore"/><origin xyz="0.5 0 0"/><axis xyz="0 1 0"/>
+ <limit lower="-2.2" upper="2.2" velocity="4" effort="50"/></joint></robot>"""
+FRICTION = np.array([[60.0, 8.0, 3.0], [25.0, 6.0, 2.0]])
+ROTOR = np.array([8.0, 0.5, 0.2])
+
+
+@pytest.fixture
+def gantry(tmp_path: Path) -> Path:
+    (tmp_path / "gantry.urdf").write_text(URDF)
+    robot = tmp_path / "robot.yaml"
+    robot.write_text(f"robot: gantry.urdf\ndrives: {{rotor_inertia: {ROTOR.tolist()}}}\n")
+    return robot
+
+
+def torques(folder: Path, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
+    model = pin.buildModelFromUrdf(str(folder / "gantry.urdf"))
+    data = model.createData()
+    rigid = np.array([pin.rnea(model, data, *row) for row in zip(q, dq, ddq, strict=True)])
+    return rigid + ROTOR * ddq + FRICTION[0] * dq + FRICTION[1] * np.sign(dq)
+
+
+def motion(file: Path) -> tuple[list[str], np.ndarray]:
+    with file.open() as stream:
+        header, *rows = csv.reader(stream)
+    return header, np.array(rows, dtype=float)
+
+
+def test_written_samples_keep_the_limits_from_rest_to_rest(run, gantry: Path) -> None:
+    folder = gantry.parent
+    outcome = run("design", "trajectory", gantry, "--count", 2, "--out", folder / "plan.yaml", "--json")
+    assert outcome.status == 0 and "no friction of rail, shoulder, elbow" in outcome.err
+    model = pin.buildModelFromUrdf(str(folder / "gantry.urdf"))
+    for number in (1, 2):
+        header, rows = motion(folder / f"plan_{number}.csv")
+        assert header == ["t", *(f"{kind}{j}" for kind in ("q", "dq", "ddq") for j in (1, 2, 3))]
+        t, (q, dq, ddq) = rows[:, 0], np.split(rows[:, 1:], 3, axis=1)
+        assert t[0] == 0 and np.allclose(np.diff(t), 0.01, atol=1e-8) and t[-1] == pytest.approx(20.0)
+        for end in (0, -1):
+            assert not dq[end].any() and not ddq[end].any()
+        assert (q > model.lowerPositionLimit).all() and (q < model.upperPositionLimit).all()
+        assert (np.abs(dq) < 0.8001 * model.velocityLimit).all()
+        assert (np.abs(torques(folder, q, dq, ddq)) < 0.85 * model.effortLimit).all()
+        # neighbours agree with their velocities and accelerations to the fourth order
+        ahead = q[:-1] + 0.01 * (dq[:-1] + dq[1:]) / 2 - 1e-4 * (ddq[1:] - ddq[:-1]) / 12
+        assert np.abs(q[1:] - ahead).max() < 1e-7
+        message = yaml.safe_load((folder / f"plan_{number}_ros.yaml").read_text())
+        assert message["joint_names"] == ["rail", "shoulder", "elbow"]
+        points = message["points"]
+        for key, values in (("positions", q), ("velocities", dq), ("accelerations", ddq)):
+            assert np.array_equal([point[key] for point in points], values)
+        since = [point["time_from_start"] for point in points]
+        assert all(type(at["sec"]) is int and 0 <= at["nanosec"] < 10**9 for at in since)
+        assert np.allclose([at["sec"] + 1e-9 * at["nanosec"] for at in since], t, atol=1e-9)
+
+
+def test_a_log_of_the_written_motion_identifies_the_robot(run, gantry: Path) -> None:
+    """Recorded from the first sample on, run-up and run-down included."""
+    folder = gantry.parent
+    asked = ("--rate", 1000, "--out", folder / "plan.yaml")
+    assert run("design", "trajectory", gantry, "--count", 1, "--searches", 1, *asked).status == 0
+    _, rows = motion(folder / "plan_1.csv")
+    q, dq, ddq = np.split(rows[:, 1:], 3, axis=1)
+    logs = folder / "logs"
+    logs.mkdir()
+    tau = torques(folder, q, dq, ddq) + 0.05 * np.random.default_rng(3).standard_normal(q.shape)
+    lines = ["t,q1,q2,q3,tau1,tau2,tau3"]
+    lines += [",".join(f"{v:.9g}" for v in row) for row in np.column_stack([rows[:, 0], q, tau])]
+    (logs / "pose_1_realisation_1_experiment_1_plus.csv").write_text("\n".join(lines) + "\n")
+    (logs / "plan.yaml").write_text((folder / "plan.yaml").read_text())
+    found = run("identify", "inertials", gantry, logs, "--json").document["parameters"]
+    for name, true in (("rail.viscous", 60.0), ("elbow.coulomb", 2.0), ("shoulder.viscous", 8.0)):
+        assert found[name]["estimate"] == pytest.approx(true, rel=0.05)
+
+
+def test_seeds_end_at_like_conditions(gantry: Path) -> None:
+    from flexcal.design.condition import condition_number
+    from flexcal.model import RobotModel
+    from flexcal.workflow.design_trajectory import TrajectoryRequest
+
+    model = RobotModel.from_yaml(gantry)
+    conditions = []
+    for seed in range(40, 46):
+        best = TrajectoryRequest(count=1, seed=seed).design(model)[0]
+        conditions.append(condition_number(best.information[-1]))
+    assert max(conditions) < 1.3 * min(conditions)
+
+
+@pytest.mark.parametrize(
+    ("pattern", "lacking", "said"),
+    [
+        ('velocity="1.0"', 'velocity="0"', "rail has no limit of velocity"),
+        ('effort="50"', 'effort="0"', "elbow has no limit of effort"),
+        (r"(?s)<inertial>.*?</inertial>", "", "no link has a mass"),
+    ],
+)
+def test_what_the_urdf_lacks_is_asked_for(run, gantry: Path, pattern: str, lacking: str, said: str) -> None:
+    (gantry.parent / "gantry.urdf").write_text(re.sub(pattern, lacking, URDF))
+    outcome = run("design", "trajectory", gantry, "--count", 1, "--out", gantry.parent / "plan.yaml")
+    assert outcome.status == 2 and said in outcome.err and "nan" not in outcome.err
+    assert not list(gantry.parent.glob("plan*"))
