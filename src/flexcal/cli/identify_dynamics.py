@@ -11,7 +11,16 @@ from tyro.conf import Positional, arg
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import after_dynamics, with_estimates
-from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import (
+    Accept,
+    Json,
+    MaybePath,
+    Paths,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,6 +69,7 @@ class IdentifyDynamics:
     flexible: bool = False
     """Use separate motor and arm equations for elastic joints, and identify the drive stiffness; needs logs with the arm side (qa1…)."""
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
+    accept: Accept = ()
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Number of logs read in parallel, each in its own process."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
@@ -87,6 +97,7 @@ class IdentifyDynamics:
                 estimator=self.estimator,
                 flexible=self.flexible,
                 learn_residual=self.learn_residual,
+                accept_weight="weight" in self.accept,
                 out=self.out,
                 command=command_line(),
                 jobs=self.jobs,

@@ -10,7 +10,16 @@ from tyro.conf import Positional, arg
 from flexcal.cli.command_line import command_line
 from flexcal.cli.console import Console
 from flexcal.cli.next_step import reading_elsewhere, with_estimates
-from flexcal.cli.options import Json, MaybePath, Paths, Robot, require_at_least, require_files, require_robot
+from flexcal.cli.options import (
+    Accept,
+    Json,
+    MaybePath,
+    Paths,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
 
 if TYPE_CHECKING:
     from flexcal.workflow.identify_payload import RobotPayload
@@ -50,6 +59,7 @@ class IdentifyPayload:
             help_behavior_hint="(default: beside robot.yaml)",
         ),
     ] = None
+    accept: Accept = ()
     jobs: Annotated[int, arg(metavar="N")] = 1
     """Number of logs read in parallel, each in its own process."""
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
@@ -72,6 +82,7 @@ class IdentifyPayload:
                 free=self.free,
                 frame=self.frame,
                 estimates=self.estimates,
+                accept_weight="weight" in self.accept,
                 out=self.out,
                 command=command_line(),
                 jobs=self.jobs,

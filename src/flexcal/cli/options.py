@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any, Optional
+from typing import Annotated, Any, Literal, Optional
 
 from tyro.conf import Positional, arg
 from tyro.constructors import PrimitiveConstructorSpec
@@ -46,6 +46,14 @@ Estimates = Annotated[
         metavar="FILE",
         help="estimates.yaml to use, or the folder that 'calibrate --out' wrote.",
         help_behavior_hint="(default: beside robot.yaml)",
+    ),
+]
+Accept = Annotated[
+    tuple[Literal["weight"], ...],
+    arg(
+        metavar="weight",
+        help="weight: go on where the torques do not hold the weight of the links, as of guessed masses or an arm that springs balance.",
+        help_behavior_hint="",
     ),
 ]
 Folder = Annotated[Path, arg(metavar="DIR")]

@@ -41,7 +41,8 @@ class Recording:
     torque: (N, n) motor torques referred to the joint, N m (N).
     arm: (N, n) positions on the arm side of elastic joints, where measured.
     velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
-        `tau_ext`); temperature: (N,); payload: (N,), kg, the same throughout.
+        `tau_ext`); force, moment: (N, 3), N and N m, as the force sensor reads them; temperature: (N,); payload: (N,), kg, the
+        same throughout.
     time_base, file: how the time stamps were and the file itself, where the recording comes from one.
 
     Raises `FlexcalError` where shapes do not fit or the time step is not positive.
@@ -57,6 +58,8 @@ class Recording:
     acceleration: np.ndarray | None = None
     arm_velocity: np.ndarray | None = None
     external_torque: np.ndarray | None = None
+    force: np.ndarray | None = None
+    moment: np.ndarray | None = None
     temperature: np.ndarray | None = None
     payload: np.ndarray | None = None
     time_base: TimeBase | None = None
@@ -73,6 +76,10 @@ class Recording:
                 raise FlexcalError(
                     f"{name} of a recording has shape {values.shape}, but q has {self.q.shape}."
                 )
+        for name in ("force", "moment"):
+            values = getattr(self, name)
+            if values is not None and values.shape != (len(self), 3):
+                raise FlexcalError(f"{name} of a recording has shape {values.shape}, not ({len(self)}, 3).")
         for name in ("temperature", "payload"):
             values = getattr(self, name)
             if values is not None and values.shape != self.q.shape[:1]:

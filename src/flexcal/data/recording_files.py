@@ -26,11 +26,13 @@ _FIELDS = {
     "ddq": "acceleration",
     "dqa": "arm_velocity",
     "tau_ext": "external_torque",
+    "force": "force",
+    "moment": "moment",
     "temperature": "temperature",
     "payload": "payload",
 }
 _REQUIRED = ("t", "q", "tau")
-_OPTIONAL = ("qa", "dq", "ddq", "dqa", "tau_ext", "temperature", "payload")
+_OPTIONAL = ("qa", "dq", "ddq", "dqa", "tau_ext", "force", "moment", "temperature", "payload")
 
 
 def read_recording(path: str | Path, model: RobotModel, label: RecordingLabel | None = None) -> Recording:

@@ -27,6 +27,8 @@ VECTORS = {
     "xyz": ("x", "y", "z"),
     "quaternion": ("qw", "qx", "qy", "qz"),
     "sigma_xyz": ("sigma_x", "sigma_y", "sigma_z"),
+    "force": ("fx", "fy", "fz"),
+    "moment": ("mx", "my", "mz"),
 }
 """Quantities with several columns; every other quantity is a single column of its own name."""
 
@@ -42,6 +44,8 @@ UNITS: dict[str, dict[str, float]] = {
     "ddq": _ACCELERATION,
     **dict.fromkeys(("tau", "tau_ext"), _TORQUE),
     **dict.fromkeys(("xyz", "length", "sigma", "sigma_xyz"), _LENGTH),
+    "force": {"N": 1.0, "kN": 1e3},
+    "moment": {"N m": 1.0, "Nm": 1.0},
     "payload": {"kg": 1.0, "g": 1e-3},
     "quaternion": {},
     "temperature": {},

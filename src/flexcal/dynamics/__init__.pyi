@@ -6,7 +6,17 @@ from .batched_equations import Batch, ExperimentSystem, experiment_system
 from .didim import direct_and_inverse
 from .drive_play import with_play
 from .drive_spring import DriveSpring, Play
-from .drive_terms import CLASSIC, Column, Coulomb, Coupling, DriveTerm, RotorInertia, TorqueOffset, Viscous
+from .drive_terms import (
+    CLASSIC,
+    Column,
+    Coulomb,
+    Coupling,
+    DriveTerm,
+    JointSprings,
+    RotorInertia,
+    TorqueOffset,
+    Viscous,
+)
 from .ekf import kalman_filter
 from .elimination import EssentialParameters, essential_parameters
 from .energy_model import energy_least_squares
@@ -19,6 +29,7 @@ from .gain_fit import drive_gains
 from .gaussian_process import GaussianProcess, require_scikit_learn
 from .idim_iv import instrumental_variables
 from .irls import huber_least_squares
+from .joint_loads import external_torque
 from .joint_log import JointLog, log_blocks
 from .learned_errors import ResidualErrors, residual_errors
 from .learned_residual import LearnedMotor, LearnedResidual
@@ -38,6 +49,7 @@ from .regression import RegressionData, Subsystem, batches_each, observe
 from .residual_learning import BlockErrors, learn_residual
 from .robot_prior import RobotPrior
 from .rows import Experiment, Window
+from .sensor_share import ExternalExcess, ExternalShare, external_share
 from .simulated_experiment import SimulatedExperiment
 from .spring_attenuation import attenuation
 from .tls import total_least_squares
@@ -65,9 +77,12 @@ __all__ = [
     "EssentialParameters",
     "Experiment",
     "ExperimentSystem",
+    "ExternalExcess",
+    "ExternalShare",
     "FrictionSelection",
     "GaussianProcess",
     "JointLog",
+    "JointSprings",
     "LearnedMotor",
     "LearnedResidual",
     "LoadCoulomb",
@@ -104,6 +119,8 @@ __all__ = [
     "error_sources",
     "essential_parameters",
     "experiment_system",
+    "external_share",
+    "external_torque",
     "feasible_least_squares",
     "huber_least_squares",
     "identify_payload",

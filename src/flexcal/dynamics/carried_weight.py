@@ -27,7 +27,7 @@ _SMALL = 1 / 8
 class CarriedWeight:
     """Sums over samples `of_weight` (n,) and `of_torque` (n,) of the squares, (N m)², and `of_both` (n,) of the products.
 
-    The weight is that of the links, and of what a log says that they hold.
+    The weight is that of the links, and of what a log says that they hold; zero at joints with a declared spring, which may balance it.
     """
 
     of_weight: np.ndarray
@@ -45,6 +45,10 @@ class CarriedWeight:
         some = slice(None, None, max(1, len(recording) // _POSES))
         held = None if recording.payload is None else recording.payload[some]
         weight, torque = gravity_torque(model, recording.q[some], held), recording.torque[some]
+        if recording.external_torque is not None:
+            torque = torque + recording.external_torque[some]
+        balanced = [entry.joint for entry in model.config.dynamics.joint_springs]
+        weight[:, [name in balanced for name in model.joint_names]] = 0.0
         return cls(*(np.sum(x, axis=0) for x in (weight**2, torque**2, weight * torque)))
 
     def __add__(self, other: CarriedWeight) -> CarriedWeight:

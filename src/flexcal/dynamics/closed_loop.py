@@ -18,7 +18,10 @@ _LOST = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """What the loop is to do at an instant: path, its derivatives and the torque given beforehand, each (n,)."""
+    """What the loop is to do at an instant: path, its derivatives, and the torque that acts beside the feedback, each (n,).
+
+    That is what acts from outside and, with a declared controller, the torque given beforehand.
+    """
 
     time: float
     path: np.ndarray
@@ -44,8 +47,9 @@ class ClosedLoop:
     """Steps of u + kp e + kd ė, e the path less the motion, linearly implicit in it (Euler): stable for any gains.
 
     With the controller that robot.yaml declares u is the torque that is given: the measured one makes this the controller with the
-    command r that it must have had, kp (r - q) + kd (ṙ - q̇) = u. Without, u = 0 and the gains are those of a critically damped loop of
-    `natural` frequency (rad/s) for the inertia that each joint has at the moment. `step` (s) lies between targets.
+    command r that it must have had, kp (r - q) + kd (ṙ - q̇) = u. Without, u is what acts from outside alone, and the gains are those
+    of a critically damped loop of `natural` frequency (rad/s) for the inertia that each joint has at the moment. `step` (s) lies between
+    targets.
     """
 
     def __init__(self, robot: SimulatedRobot, step: float, natural: float) -> None:
@@ -82,10 +86,10 @@ class ClosedLoop:
         error, slip = target.path - self._q, target.speed - self._dq
         if self._declared is None:
             own = np.diag(mass)
-            kp, kd, given = self._natural**2 * own, 2 * self._natural * own, 0.0
+            kp, kd = self._natural**2 * own, 2 * self._natural * own
         else:
-            kp, kd, given = np.array(self._declared.kp), np.array(self._declared.kd), target.torque
-        missing = given + kp * (error + h * slip) + kd * slip
+            kp, kd = np.array(self._declared.kp), np.array(self._declared.kd)
+        missing = target.torque + kp * (error + h * slip) + kd * slip
         missing -= self._robot.torque(target.time, self._q, self._dq, target.push, self._ddq)
         self._ddq = target.push + np.linalg.solve(mass + np.diag(h * kd + h * h * kp), missing)
         self._q = self._q + h * (self._dq + 0.5 * h * self._ddq)

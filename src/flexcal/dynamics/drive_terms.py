@@ -10,6 +10,7 @@ import numpy as np
 
 from flexcal.dynamics.motion import Motion
 from flexcal.model import RobotModel
+from flexcal.model.names import unknown_parallel
 
 Memory = dict[str, Any]
 """What terms carry from one block of an experiment to the next; empty at its start."""
@@ -110,5 +111,29 @@ class Coupling:
                 yield Column(f"{entry.motor}.{key}_at_{entry.joint}", joint, on_joint)
 
 
-CLASSIC: tuple[DriveTerm, ...] = (RotorInertia(), Viscous(), Coulomb(), TorqueOffset(), Coupling())
+@dataclass(frozen=True)
+class JointSprings:
+    """Springs and cables parallel to joints, as far as `dynamics:` declares them without their size.
+
+    `<joint>.spring_stiffness` · (q - rest), or · q beside `<joint>.spring_torque` where the rest is not declared; `<joint>.cable_torque`.
+    Both constants equal a torque offset, which absorbs them where it is among the terms. Behind an elastic drive they act on the arm.
+    """
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        rests = {entry.joint: entry.rest or 0.0 for entry in model.config.dynamics.joint_springs}
+        for i, name in enumerate(model.joint_names):
+            q = motion.q[:, i]
+            for key in unknown_parallel(model, name):
+                values = q - rests[name] if key == "spring_stiffness" else np.ones_like(q)
+                yield Column(f"{name}.{key}", i, values)
+
+
+CLASSIC: tuple[DriveTerm, ...] = (
+    RotorInertia(),
+    Viscous(),
+    Coulomb(),
+    TorqueOffset(),
+    Coupling(),
+    JointSprings(),
+)
 """The terms that the structural rank counts (FORMATS)."""

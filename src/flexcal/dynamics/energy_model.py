@@ -65,11 +65,11 @@ class EnergyModel(ScalarEquations):
         return found
 
     def _power(self, motion: Motion, memory: Memory) -> np.ndarray:
-        """Power of what stores no energy, by parameter, and of the motors (p + 1, N)."""
+        """Power of what stores no energy, by parameter, and of the motors and of what acts from outside (p + 1, N)."""
         found = np.zeros((len(self.names) + 1, len(motion)))
         for column in self._columns(motion, memory, inertial=False):
             found[self.names.index(column.name)] += motion.dq[:, column.joint] * column.values
-        found[-1] = np.sum(motion.dq * motion.torque, axis=1)
+        found[-1] = np.sum(motion.dq * motion.net, axis=1)
         return found
 
     def _columns(self, motion: Motion, memory: Memory, *, inertial: bool) -> Iterator[Column]:

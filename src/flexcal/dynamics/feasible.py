@@ -30,7 +30,11 @@ def feasible_least_squares(data: RegressionData) -> Estimate:
     cones = feasible_set(data.observation, system)
     bound = {number for cone in cones for number in cone.members}
     kept = [number for number, seen in enumerate(linear.identifiable) if seen]
-    free = [entry for entry in linear.dropped if names.index(entry.name) in bound]
+    free = [
+        entry
+        for entry in linear.dropped
+        if bound & {names.index(name) for name in (entry.name, *(heir for heir, _ in entry.absorbed_by))}
+    ]
     unseen = np.zeros((len(names), len(free)))
     for column, entry in zip(unseen.T, free, strict=True):
         column[names.index(entry.name)] = 1.0

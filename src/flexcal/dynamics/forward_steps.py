@@ -26,9 +26,10 @@ _SHIFT = 1e-6
 class ForwardSteps:
     """Steps of `length` h (s) that follow each other, each with what holds in its middle, in the mean of its samples.
 
-    Samples are `spacing` (s) apart. `torque` (N, n) and `state` (N, 2, n), q and q̇; `columns` (N, n, p) are W with the measured
-    accelerations of `middle`, and `inertia` (N, n, n, p) its derivative by each: M = inertia χ. `still` (N,) marks steps in which the
-    robot stands; `before` and `after` (N, n) are the positions measured at their ends, `speed` (N, n) the velocity at the start.
+    Samples are `spacing` (s) apart. `torque` (N, n), the external one included, and `state` (N, 2, n), q and q̇; `columns` (N, n, p) are W
+    with the measured accelerations of `middle`, and `inertia` (N, n, n, p) its derivative by each: M = inertia χ. `still` (N,) marks steps
+    in which the robot stands; `before` and `after` (N, n) are the positions measured at their ends, `speed` (N, n) the velocity at the
+    start.
     """
 
     length: float
@@ -105,7 +106,7 @@ def _steps(
         _means(motion.q, stride),
         _means(motion.dq, stride),
         _means(motion.ddq, stride),
-        _means(motion.torque, stride),
+        _means(motion.net, stride),
     )
     before = dict(memory)
     whole = columns(observation, middle, memory)

@@ -104,7 +104,8 @@ class LoadCoulomb:
     inertials: np.ndarray
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
-        load = np.abs(torque_regressor(model, motion.q, motion.dq, motion.ddq) @ self.inertials)
+        load = torque_regressor(model, motion.q, motion.dq, motion.ddq) @ self.inertials
+        load = np.abs(load if motion.external is None else load - motion.external)
         for axis in motor_axes(model):
             torque = load[:, axis.joint] * np.sign(axis.of(motion.dq))
             for joint, ratio in axis.shares:

@@ -9,7 +9,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.batched_equations import ExperimentSystem
-from flexcal.dynamics.drive_terms import Coulomb, Coupling, DriveTerm, RotorInertia, TorqueOffset, Viscous
+from flexcal.dynamics.drive_terms import (
+    Coulomb,
+    Coupling,
+    DriveTerm,
+    JointSprings,
+    RotorInertia,
+    TorqueOffset,
+    Viscous,
+)
 from flexcal.dynamics.friction_choice import Candidate
 from flexcal.dynamics.friction_library import (
     AsymmetricCoulomb,
@@ -101,8 +109,13 @@ def variants(name: str, scale: Scale) -> tuple[Candidate, ...]:
 
 
 def plain_terms(friction: tuple[str, ...]) -> tuple[DriveTerm, ...]:
-    """Rotor inertia, the terms among `friction` outside the library, and the coupling; raises `FlexcalError` for an unknown name."""
+    """Rotor inertia, the terms among `friction` outside the library, coupling and springs; raises `FlexcalError` for an unknown name."""
     for name in friction:
         if name not in FRICTION_TERMS:
             raise FlexcalError(f"there is no friction term '{name}'; there are {', '.join(FRICTION_TERMS)}.")
-    return (RotorInertia(), *(_PLAIN[name] for name in _PLAIN if name in friction), Coupling())
+    return (
+        RotorInertia(),
+        *(_PLAIN[name] for name in _PLAIN if name in friction),
+        Coupling(),
+        JointSprings(),
+    )

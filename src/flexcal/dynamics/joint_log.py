@@ -13,6 +13,7 @@ import numpy as np
 
 from flexcal.data import Recording, read_recording_blocks
 from flexcal.dynamics.carried_weight import CarriedWeight
+from flexcal.dynamics.joint_loads import external_torque
 from flexcal.dynamics.log_faults import MOVES, LogFaults
 from flexcal.dynamics.motion import FilteredPositions, Motion, filtered_positions
 from flexcal.errors import FlexcalError, InputError
@@ -29,8 +30,8 @@ class JointLog:
 
     The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `span` are the
     times of the first and the last sample of the log itself, s. `payload` is kg, as the column `payload` says, None where there is
-    none; `weight` is what its torques carry. A joint that never moves has no velocity and no acceleration: what its encoder shows of
-    them is noise, of which friction would take the sign.
+    none; `weight` is what its torques carry; `wrench` tells whether it has a force sensor's columns. A joint that never moves has no
+    velocity and no acceleration: what its encoder shows of them is noise, of which friction would take the sign.
     """
 
     path: Path
@@ -44,6 +45,7 @@ class JointLog:
     span: tuple[float, float]
     payload: float | None
     weight: CarriedWeight
+    wrench: bool = False
 
     @classmethod
     def read(cls, path: Path, model: RobotModel, cutoff_hz: float, scratch: Path) -> JointLog:
@@ -56,6 +58,7 @@ class JointLog:
         faults = LogFaults(path, model)
         read: list[tuple[float, float, float]] = []
         held: list[float] = []
+        sensed: list[bool] = []
         carried = [CarriedWeight.empty(model.n)]
 
         def watched() -> Iterator[Recording]:
@@ -63,6 +66,7 @@ class JointLog:
                 read.append((recording.start, recording.start + recording.duration, recording.time_step))
                 if recording.payload is not None:
                     held.append(float(recording.payload[0]))
+                sensed.append(recording.force is not None)
                 carried.append(CarriedWeight.of(recording, model))
                 faults.add(recording)
                 yield recording
@@ -77,6 +81,7 @@ class JointLog:
                         continue
                     np.save(stream, part.q.T)
                     np.save(stream, part.torque.T)
+                    np.save(stream, part.external.T)
                     starts.append(part.start)
                     samples += len(part)
                     motion = part.motion()
@@ -107,6 +112,7 @@ class JointLog:
             span,
             held[0] if held else None,
             reduce(add, carried),
+            any(sensed),
         )
 
     @property
@@ -118,8 +124,8 @@ class JointLog:
         """The filtered motion in parts that follow each other."""
         with self.filtered.open("rb") as stream:
             for start in self.starts:
-                q, torque = np.load(stream).T, np.load(stream).T
-                yield self.settled(FilteredPositions(start, self.time_step, q, torque).motion())
+                q, torque, external = (np.load(stream).T for _ in range(3))
+                yield self.settled(FilteredPositions(start, self.time_step, q, torque, external).motion())
 
     def settled(self, motion: Motion) -> Motion:
         """A motion of this log, with the joints that never move at rest."""
@@ -129,7 +135,7 @@ class JointLog:
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
-    """The recording of a log in parts that follow each other.
+    """The recording of a log in parts that follow each other, its external torque that of everything that acts beside the motors.
 
     Raises `InputError` as `read_recording` does, and for a gap.
     """
@@ -140,4 +146,4 @@ def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
                 f"{path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
                 f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
             )
-        yield recording
+        yield replace(recording, external_torque=external_torque(model, recording))

@@ -12,7 +12,7 @@ from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.triangle import Triangle, stacked
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
-from flexcal.model.names import unit_of
+from flexcal.model.names import unit_in
 
 
 def linear_fit(data: RegressionData, noise: Sequence[float]) -> Estimate:
@@ -79,13 +79,13 @@ class Unknowns:
         iterations: int = 1,
     ) -> Estimate:
         """Of all parameters `found` (p,), with the `covariance` (k, k) of the kept ones."""
-        names, base = self.data.names, self.data.base.found
+        names, base, model = self.data.names, self.data.base.found, self.data.observation.model
         whole = np.zeros((len(names), len(names)))
         whole[np.ix_(self.kept, self.kept)] = covariance
         seen = set(self.kept)
         return Estimate(
             parameters=Parameters(
-                Parameter(name, unit_of(name), float(v)) for name, v in zip(names, found, strict=True)
+                Parameter(name, unit_in(model, name), float(v)) for name, v in zip(names, found, strict=True)
             ),
             covariance=whole,
             rank=len(self.kept),

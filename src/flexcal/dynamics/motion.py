@@ -28,7 +28,8 @@ _BESIDE = 2
 class Motion:
     """`q`, `dq`, `ddq` (N, n) in rad, m and s, the motor `torque` (N, n) referred to the joint, at `time` (N,), s.
 
-    Positions are the motors', referred to the joint; `arm` has those behind elastic drives, where they were measured.
+    Positions are the motors', referred to the joint; `arm` has those behind elastic drives, where they were measured. `external` (N, n)
+    is the torque that acts on the joints from outside, τ_ext of Eq. 2.20; None for none.
     """
 
     time: np.ndarray
@@ -37,6 +38,7 @@ class Motion:
     ddq: np.ndarray
     torque: np.ndarray
     arm: ArmSide | None = None
+    external: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.time)
@@ -56,6 +58,11 @@ class Motion:
         """The largest |q̇| of every joint (n,)."""
         return np.abs(self.dq).max(axis=0)
 
+    @property
+    def net(self) -> np.ndarray:
+        """τ + τ_ext (N, n), the right-hand side of Eq. 2.20."""
+        return self.torque if self.external is None else self.torque + self.external
+
     def blocks(self) -> Iterator[Motion]:
         """The experiment in parts that follow each other: here one."""
         yield self
@@ -64,14 +71,20 @@ class Motion:
         """Samples from `start` to before `stop`."""
         at = slice(start, stop)
         arm = None if self.arm is None else self.arm.part(start, stop)
-        return Motion(self.time[at], self.q[at], self.dq[at], self.ddq[at], self.torque[at], arm)
+        external = None if self.external is None else self.external[at]
+        return Motion(self.time[at], self.q[at], self.dq[at], self.ddq[at], self.torque[at], arm, external)
 
     @classmethod
     def joined(cls, parts: Iterable[Motion]) -> Motion:
         """Motions that follow each other as one."""
         held = list(parts)
         columns = zip(*((m.time, m.q, m.dq, m.ddq, m.torque) for m in held), strict=True)
-        return cls(*(np.concatenate(column) for column in columns), arm=ArmSide.joined([m.arm for m in held]))
+        outside = [m.external for m in held if m.external is not None]
+        return cls(
+            *(np.concatenate(column) for column in columns),
+            arm=ArmSide.joined([m.arm for m in held]),
+            external=np.concatenate(outside) if outside else None,
+        )
 
     @classmethod
     def of(cls, recording: Recording, cutoff_hz: float, torque: TorqueLog = "instantaneous") -> Motion:
@@ -83,13 +96,14 @@ class Motion:
 class FilteredPositions:
     """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before.
 
-    Where the arm side was measured too, its positions follow those of the motors: `q` (N + 4, 2 n).
+    Where the arm side was measured too, its positions follow those of the motors: `q` (N + 4, 2 n). `external` is (N, n), or (N, 0).
     """
 
     start: float
     time_step: float
     q: np.ndarray
     torque: np.ndarray
+    external: np.ndarray
 
     def __len__(self) -> int:
         return len(self.torque)
@@ -97,7 +111,10 @@ class FilteredPositions:
     def part(self, start: int, stop: int) -> FilteredPositions:
         """Samples from `start` to before `stop`."""
         time = self.start + start * self.time_step
-        return FilteredPositions(time, self.time_step, self.q[start : stop + 4], self.torque[start:stop])
+        at = slice(start, stop)
+        return FilteredPositions(
+            time, self.time_step, self.q[start : stop + 4], self.torque[at], self.external[at]
+        )
 
     def motion(self) -> Motion:
         """With velocities and accelerations by central differences; that of a joint at rest is zero: friction would take its sign."""
@@ -106,7 +123,8 @@ class FilteredPositions:
         q, dq, ddq = differences(self.q, self.time_step)
         dq[np.abs(dq) < AT_REST] = 0.0
         arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if q.shape[1] > n else None
-        return Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], self.torque, arm)
+        external = self.external if self.external.size else None
+        return Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], self.torque, arm, external)
 
 
 def filtered_motion(
@@ -134,10 +152,11 @@ def filtered_positions(
     border = int(np.ceil(_BORDER_PERIODS / (cutoff_hz * step)))
     columns = _columns(chain([first], iterator), torque)
     number, held = 0, None
+    n = first.torque.shape[1]
     for q, acted in smoothed(columns, LowPass(step, cutoff_hz)):
         if held is not None:
             yield held
-        found = FilteredPositions(first.start + step * number, step, q, acted)
+        found = FilteredPositions(first.start + step * number, step, q, acted[:, :n], acted[:, n:])
         held = found.part(min(max(0, border - number), len(found)), len(found))
         number += len(found)
     if held is not None:
@@ -145,7 +164,7 @@ def filtered_positions(
 
 
 def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Positions (motor side, then arm side where measured) and the torques that act at the same instants."""
+    """Positions (motor side, then arm side where measured) and the torques that act at the same instants: motors, then from outside."""
     last = None
     for recording in recordings:
         sides = [recording.q] if recording.arm is None else [recording.q, recording.arm]
@@ -153,6 +172,8 @@ def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tup
         if torque != "instantaneous":
             before = np.concatenate([acted[:1] if last is None else last, acted[:-1]])
             last, acted = acted[-1:], 0.5 * (acted + before)
+        if recording.external_torque is not None:
+            acted = np.hstack([acted, recording.external_torque])
         yield np.hstack(sides), acted
 
 

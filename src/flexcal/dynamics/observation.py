@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from flexcal.dynamics.arm_side import ArmSide
 from flexcal.dynamics.drive_spring import DriveSpring
-from flexcal.dynamics.drive_terms import Column, DriveTerm, Memory
+from flexcal.dynamics.drive_terms import Column, DriveTerm, JointSprings, Memory
 from flexcal.dynamics.link_columns import LinkColumns, link_columns
 from flexcal.dynamics.motion import Motion
 from flexcal.model import RobotModel, inertial_names, torque_regressor
@@ -22,7 +22,8 @@ class Observation:
     """Columns of the joint torques: link inertials and drive terms of a robot.
 
     There is one equation a joint, and after them one a motor that is connected by one of the `springs`: that of the motor alone. The
-    joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor.
+    joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor,
+    and what acts from outside (τ_ext) stands beside the motor's torque.
 
     Of the columns of a joint that the links bring, some always are combinations of others, whatever the motion is. `reduced` leaves them
     out, and `spread` (one an equation) says how the others give them back: W = W_reduced · spread.
@@ -122,7 +123,8 @@ class Observation:
         links, drives = self._places
         found = np.empty((sum(self.widths), len(motion)))
         write_torque_regressor(self.model, *self._link_states(motion), links, found)
-        found[np.cumsum(self.widths) - 1] = motion.torque[:, self._torques].T
+        right = [motion.net, motion.torque[:, self._torques[self.model.n :]]]
+        found[np.cumsum(self.widths) - 1] = np.hstack(right).T
         columns = self._drive_columns(motion, {} if memory is None else memory)
         for place, column in zip(drives, columns, strict=True):
             found[place] = column.values
@@ -140,10 +142,12 @@ class Observation:
 
     def _drive_columns(self, motion: Motion, memory: Memory) -> Iterator[Column]:
         motors = {spring.joint: self.model.n + k for k, spring in enumerate(self.springs)}
+        behind = replace(motion, q=self._link_states(motion)[0])
         for term in self.terms:
-            for column in term.columns(self.model, motion, memory):
+            on_arm = isinstance(term, JointSprings)
+            for column in term.columns(self.model, behind if on_arm else motion, memory):
                 yield column
-                if column.joint in motors:
+                if column.joint in motors and not on_arm:
                     yield Column(column.name, motors[column.joint], column.values)
         for spring in self.springs:
             yield from spring.columns(self.model, motion, motors[spring.joint])

@@ -35,8 +35,7 @@ class RepeatedMotion:
         What the other lines hold is noise, of which high derivatives have much, and it would bend the parameters.
         """
         time, q, dq, ddq, torque = (
-            np.array([getattr(p, name) for p in self.periods])
-            for name in ("time", "q", "dq", "ddq", "torque")
+            np.array([getattr(p, name) for p in self.periods]) for name in ("time", "q", "dq", "ddq", "net")
         )
         moved = (_standing_out(periods) for periods in (q, dq, ddq))
         return Motion(time.mean(axis=0), *moved, torque=torque.mean(axis=0))

@@ -10,6 +10,7 @@ from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.observation import Observation
 from flexcal.estimation import Estimate, Parameters
 from flexcal.model.declared import declared
+from flexcal.model.names import PARALLEL
 from flexcal.model.regressor import INERTIAL
 
 FRICTION = ("viscous", "coulomb", "torque_offset")
@@ -122,4 +123,4 @@ def _free(found: Estimate, kept: tuple[str, ...]) -> np.ndarray:
 def _classic(name: str) -> bool:
     """Whether a parameter is of a link, or of the classic terms of a drive."""
     key = name.rpartition(".")[2].partition("_at_")[0]
-    return key in INERTIAL or key.startswith("com_") or key in ("rotor_inertia", *FRICTION)
+    return key in INERTIAL or key.startswith("com_") or key in ("rotor_inertia", *FRICTION, *PARALLEL)

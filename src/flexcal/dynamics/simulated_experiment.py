@@ -29,9 +29,9 @@ class SimulatedExperiment:
     """The motion of a robot with `parameters` (p,) that tracks a recording; torques, times and standstill are those of the recording.
 
     The path to track is the recorded one through one more low-pass, at a tenth of the rate of the rows that `decimation` makes of it; the
-    torque that a declared controller is given beforehand is the measured one, through the same. Without a controller the loop is
-    critically damped, its natural frequency half that rate. Where samples are denser than the loop needs, accelerations are the same over
-    several. A joint that never moves does not yield to its loads either. Raises `FlexcalError` as `ClosedLoop.reach` does.
+    torque that a declared controller is given beforehand is the measured one, through the same, and so is τ_ext. Without a controller
+    the loop is critically damped, its natural frequency half that rate. Where samples are denser than the loop needs, accelerations are the
+    same over several. A joint that never moves does not yield to its loads either. Raises `FlexcalError` as `ClosedLoop.reach` does.
     """
 
     observation: Observation
@@ -55,7 +55,7 @@ class SimulatedExperiment:
         return self.experiment.top_speed
 
     def blocks(self) -> Iterator[Motion]:
-        """The simulated motion in parts that follow each other, with the measured torques."""
+        """The simulated motion in parts that follow each other, with the measured torques, the external ones among them."""
         n, rests = self.observation.model.n, self.top_speed == 0
         motions = iter(self.experiment.blocks())
         first = next(motions)
@@ -70,7 +70,8 @@ class SimulatedExperiment:
 
         def columns() -> Iterator[tuple[np.ndarray, np.ndarray]]:
             for motion in (first, *motions):
-                yield np.hstack([motion.q, motion.torque]), np.column_stack([motion.time, motion.torque])
+                acting = motion.net if declared is not None else motion.net - motion.torque
+                yield np.hstack([motion.q, acting]), np.column_stack([motion.time, motion.net])
 
         done, last = 0, np.zeros((0, 3, n))
         for values, beside in smoothed(columns(), LowPass(step, _PATH * rows_hz)):

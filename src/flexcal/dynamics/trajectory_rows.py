@@ -14,7 +14,7 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel
 from flexcal.model.declared import declared, uncertain_inertials
-from flexcal.model.names import GEOMETRY, SPRINGS
+from flexcal.model.names import GEOMETRY, PARALLEL, SPRINGS
 from flexcal.model.periodic_torque import periodic_torque
 
 SAMPLES_PER_LINE = 4
@@ -144,7 +144,7 @@ def _drive_names(model: RobotModel) -> tuple[str, ...]:
 
 def _of_drive(name: str) -> bool:
     key = name.rpartition(".")[2].partition("_at_")[0]
-    return key in ("rotor_inertia", "viscous", "coulomb", "torque_offset")
+    return key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", *PARALLEL)
 
 
 def _reversal(joint: str) -> str:

@@ -11,7 +11,7 @@ from flexcal.export.exported import Rendered
 from flexcal.export.frames import transform
 from flexcal.export.loss import ToolMap, tool_positions
 from flexcal.model import RobotModel
-from flexcal.model.names import LATERAL, unit_of
+from flexcal.model.names import LATERAL, unit_in
 from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz, vector_rotation
 
@@ -133,4 +133,4 @@ def _quantity(model: RobotModel, name: str) -> dict[str, Any]:
         item = posterior.parameters[name]
         slope = value if item.scale == "log" else 1.0
         std = float(slope * np.sqrt(posterior.marginal([name])[0, 0]))
-    return {"value": value if np.isfinite(value) else None, "unit": unit_of(name), "std": std}
+    return {"value": value if np.isfinite(value) else None, "unit": unit_in(model, name), "std": std}

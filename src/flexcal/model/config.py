@@ -166,11 +166,32 @@ class GeometryConfig:
 
 
 @dataclass(frozen=True)
+class JointSpringConfig:
+    """A spring parallel to a joint, as of a balancer or a hose package, against which the motor gives stiffness · (q - rest).
+
+    `stiffness` in N m/rad (N/m of a prismatic joint), `rest` in rad or m. What is absent is identified.
+    """
+
+    joint: str
+    stiffness: float | None = None
+    rest: float | None = None
+
+
+@dataclass(frozen=True)
+class CableTorqueConfig:
+    """A constant `torque` (N m, or N) that the motor of a joint gives against cables; absent: identified."""
+
+    joint: str
+    torque: float | None = None
+
+
+@dataclass(frozen=True)
 class DynamicsConfig:
     """Signal treatment and friction of the identification of dynamics; an absent cut-off and decimation are proposed from the data.
 
     friction: "classic" (viscous, Coulomb, offset), a list of terms, or "auto": the classic ones and what cross-validation adds to them.
     torque: what a logged torque is over a sample, as in plans; `tau` in files.
+    joint_springs, cable_torques: what acts on a joint beside motor and friction, one entry a joint.
     """
 
     friction: str | tuple[str, ...] = "auto"
@@ -178,6 +199,8 @@ class DynamicsConfig:
     decimation: int | None = None
     mask_standstill: bool = True
     torque: Literal["held", "instantaneous", "mean"] = field(default="instantaneous", metadata={"key": "tau"})
+    joint_springs: tuple[JointSpringConfig, ...] = ()
+    cable_torques: tuple[CableTorqueConfig, ...] = ()
 
     def __post_init__(self) -> None:
         if isinstance(self.friction, str) and self.friction not in ("auto", "classic"):
@@ -188,6 +211,20 @@ class DynamicsConfig:
             raise FlexcalError(f"cutoff_hz must be positive, not {self.cutoff_hz:g} Hz.")
         if self.decimation is not None and self.decimation < 1:
             raise FlexcalError(f"decimation must be 1 or more, not {self.decimation}.")
+
+
+@dataclass(frozen=True)
+class ForceSensorConfig:
+    """A force and torque sensor whose axes lie at `xyz` (m), turned by `rpy` (rad), in the URDF frame `frame`.
+
+    wrench: whether the columns fx, fy, fz, mx, my, mz are what everything beyond the sensor does to the robot ("on_robot"), or the robot
+    to that ("on_environment").
+    """
+
+    frame: str
+    wrench: Literal["on_robot", "on_environment"]
+    xyz: Triple = (0.0, 0.0, 0.0)
+    rpy: Triple = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -283,5 +320,6 @@ class RobotConfig:
     limits: LimitsConfig = LimitsConfig()
     working_volume: BoxConfig | None = None
     controller: ControllerConfig | None = None
+    force_sensor: ForceSensorConfig | None = None
     signals: dict[str, SignalConfig] = field(default_factory=dict)
     estimates: str = "estimates.yaml"

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter
-from flexcal.model.names import GEOMETRY, spring_names, unit_of
+from flexcal.model.names import GEOMETRY, spring_names, unit_in, unit_of
 from flexcal.model.robot_model import RobotModel
 
 LENGTH_TOLERANCE = 3e-4
@@ -101,7 +101,7 @@ def declared(model: RobotModel, name: str) -> Parameter:
     std = _std(model, name, key)
     scale = "log" if key in _POSITIVE else "linear"
     lower = 0.0 if key == "hardening" else -np.inf
-    return Parameter(name, unit_of(name), value, lower=lower, prior_std=std, scale=scale)
+    return Parameter(name, unit_in(model, name), value, lower=lower, prior_std=std, scale=scale)
 
 
 def _std(model: RobotModel, name: str, key: str) -> float:

@@ -10,8 +10,8 @@ import numpy as np
 from flexcal.kernels import Tree
 from flexcal.model.config import Bearings, ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
-from flexcal.model.names import COUPLED, FRICTION, SCATTER
-from flexcal.model.point import Payload, Point
+from flexcal.model.names import COUPLED, FRICTION, PARALLEL, SCATTER
+from flexcal.model.point import ForceSensor, Payload, Point
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
 from flexcal.model.urdf import Description, Frame, read_urdf
@@ -45,6 +45,14 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
     for k, coupling in enumerate(config.drives.coupling):
         _joint(file, ("drives", "coupling", k, "motor"), names, coupling.motor)
         _joint(file, ("drives", "coupling", k, "joint"), names, coupling.joint)
+    for key in ("joint_springs", "cable_torques"):
+        entries = getattr(config.dynamics, key)
+        for k, entry in enumerate(entries):
+            _joint(file, ("dynamics", key, k, "joint"), names, entry.joint)
+            if entry.joint in {other.joint for other in entries[:k]}:
+                raise file.error(
+                    ("dynamics", key, k), f"the joint '{entry.joint}' stands twice under `{key}:`; keep one."
+                )
     for key in ("kp", "kd") if config.controller is not None else ():
         _check_count(file, ("controller", key), getattr(config.controller, key), n)
     if config.limits.acceleration is not None:
@@ -81,6 +89,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         joints=joints,
         points=points,
         nominal_payload=payload,
+        force_sensor=_force_sensor(file, description, config),
         bearing_frames=bearing_frames,
         tree=kinematic_tree(joints, bearing_frames, config.bearings),
         stations=stations,
@@ -102,6 +111,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         viscous=_per_joint(file, config, "viscous", n),
         coulomb=_per_joint(file, config, "coulomb", n),
         torque_offset=np.zeros(n),
+        parallel=np.zeros((n, len(PARALLEL))),
         friction=np.zeros((n, len(FRICTION))),
         coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
         delay=np.zeros(n),
@@ -151,6 +161,19 @@ def _payload(file: YamlFile, description: Description, config: RobotConfig) -> P
         raise file.error(("payload", "inertia"), "the payload's inertia must be symmetric and positive.")
     return Payload(
         entry.frame, frame.joint, frame.rotation, frame.translation, entry.mass, entry.mass_std, com, inertia
+    )
+
+
+def _force_sensor(file: YamlFile, description: Description, config: RobotConfig) -> ForceSensor | None:
+    entry = config.force_sensor
+    if entry is None:
+        return None
+    frame = _frame(file, ("force_sensor", "frame"), description, entry.frame)
+    return ForceSensor(
+        frame.joint,
+        frame.rotation @ rpy_rotation(np.array(entry.rpy)),
+        frame.translation + frame.rotation @ np.array(entry.xyz),
+        1.0 if entry.wrench == "on_robot" else -1.0,
     )
 
 

@@ -11,6 +11,7 @@ GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y"
 SPRINGS = ("bearing_x", "bearing_y", "drive")
 LATERAL = ("gravity_compliance_1", "gravity_compliance_2")
 FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_up")
+PARALLEL = ("spring_stiffness", "spring_torque", "cable_torque")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 INERTIALS = ("mass", "com_x", "com_y", "com_z")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
@@ -23,6 +24,7 @@ _UNITS = {
     "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
     "stiffness": "N m/rad", "damping": "N m s/rad",
     "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
+    "spring_stiffness": "N m/rad", "spring_torque": "N m", "cable_torque": "N m",
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
@@ -31,8 +33,24 @@ _UNITS = {
 }  # fmt: skip
 
 
+_OF_DRIVES = ("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION, *PARALLEL)
+_SLIDING = {
+    "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
+}  # fmt: skip
+
+
+def unit_in(model: RobotModel, name: str) -> str:
+    """SI unit of a parameter of a robot: that of a prismatic joint's drive, spring or friction is in N and m."""
+    unit, (owner, _, key) = unit_of(name), name.rpartition(".")
+    key, _, other = key.partition("_at_")
+    if key not in _OF_DRIVES or owner not in model.joint_names:
+        return unit
+    slides = [model.joints[model.joint_index(j)].kind == "prismatic" for j in (owner, other or owner)]
+    return _SLIDING.get(unit, unit) if all(slides) else unit
+
+
 def unit_of(name: str) -> str:
-    """SI unit of a parameter name."""
+    """SI unit of a parameter name, of joints that turn."""
     last = name.rpartition(".")[2].partition("_at_")[0]
     if last.startswith("transmission_"):
         return "rad"
@@ -49,6 +67,18 @@ def spring_names(model: RobotModel) -> tuple[str, ...]:
         for c in ((2, 0, 1) if joint.bearings else (2,))
     ]
     return tuple(f"{spring}.{kind}" for kind in ("stiffness", "damping") for spring in springs)
+
+
+def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
+    """What robot.yaml declares to act on a joint beside motor and friction without saying how much, out of `PARALLEL`."""
+    config = model.config.dynamics
+    springs = [entry for entry in config.joint_springs if entry.joint == joint]
+    found = ["spring_stiffness"] if any(entry.stiffness is None for entry in springs) else []
+    found += ["spring_torque"] if any(entry.rest is None for entry in springs) else []
+    found += (
+        ["cable_torque"] if any(e.joint == joint and e.torque is None for e in config.cable_torques) else []
+    )
+    return tuple(found)
 
 
 def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
@@ -74,6 +104,8 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
                 table[f"{joint.name}.transmission_{order}_{key}"] = ("transmission", (i, h, k))
         for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
             table[f"{joint.name}.{key}"] = (key, (i,))
+        for key in unknown_parallel(model, joint.name):
+            table[f"{joint.name}.{key}"] = ("parallel", (i, PARALLEL.index(key)))
         for k, key in enumerate(FRICTION):
             table[f"{joint.name}.{key}"] = ("friction", (i, k))
         if i in elastic:

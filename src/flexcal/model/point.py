@@ -1,4 +1,4 @@
-"""Measured points and payload."""
+"""Measured points, payload and force sensor."""
 
 from __future__ import annotations
 
@@ -51,3 +51,16 @@ class Payload:
     def com_in_link(self) -> np.ndarray:
         """Centre of mass (3,) in the frame of the link that carries the payload, m."""
         return self.translation + self.rotation @ self.com
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSensor:
+    """A force and torque sensor whose axes sit at `rotation`, `translation` in the link of joint `joint`.
+
+    `sign` is 1 where it reads what acts on the robot, -1 where it reads what the robot does to its surroundings.
+    """
+
+    joint: int
+    rotation: np.ndarray
+    translation: np.ndarray
+    sign: float

@@ -20,7 +20,7 @@ from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis
 from flexcal.model.joint import Joint
 from flexcal.model.names import locations
-from flexcal.model.point import Payload, Point
+from flexcal.model.point import ForceSensor, Payload, Point
 from flexcal.model.posterior import NOTHING_ESTIMATED, Posterior
 
 _MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
@@ -43,6 +43,7 @@ class RobotModel:
     joints: tuple[Joint, ...]
     points: Mapping[str, Point]
     nominal_payload: Payload | None
+    force_sensor: ForceSensor | None
     bearing_frames: Mapping[int, np.ndarray]
     tree: Tree
     stations: tuple[str, ...]
@@ -64,6 +65,7 @@ class RobotModel:
     viscous: np.ndarray
     coulomb: np.ndarray
     torque_offset: np.ndarray
+    parallel: np.ndarray
     friction: np.ndarray
     coupling: np.ndarray
     delay: np.ndarray

@@ -12,9 +12,11 @@ from flexcal.estimation import Estimate
 from flexcal.report.dynamics_checks import (
     check_base,
     check_bodies,
+    check_external,
     check_joints,
     check_shown,
     check_unseen,
+    check_weight,
 )
 from flexcal.report.notation import significant
 from flexcal.report.page import Check, Fact, Page, Section, Status, Verdict
@@ -136,4 +138,10 @@ def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
         check_base(results).named("base_parameters"),
         check_bodies(results["bodiless_links"]).named("bodies"),
         check_shown(results["remarks"]).named("drive_terms"),
+        *([check_weight(faults).named("weight")] if (faults := results.get("weight_faults")) else []),
+        *(
+            [check_external(share).named("external_torques")]
+            if (share := results.get("external_share"))
+            else []
+        ),
     )

@@ -15,6 +15,8 @@ LARGE, TOO_LARGE = 10.0, 30.0
 JOINT_LARGE = 25.0
 """Relative torque error of a joint, per cent, above which it is predicted poorly; small torques are mostly friction."""
 _SHOWN = 3
+_SENSOR = 0.1
+"""How far beside 1 the share of the external torques may lie outside its interval: axes turned by half a radian."""
 
 
 def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
@@ -88,3 +90,27 @@ def check_shown(remarks: list[str]) -> Check:
         return Check(question, "Yes.", "good")
     more = f"; and {len(remarks) - _SHOWN} more" if len(remarks) > _SHOWN else ""
     return Check(question, f"Not all: {'; '.join(remarks[:_SHOWN])}{more}.", "care")
+
+
+def check_weight(faults: list[str]) -> Check:
+    """Reservation about torques unlike the links' weight that were accepted."""
+    question = "Do the torques hold the links' weight?"
+    return Check(question, f"No, which was accepted: {faults[0]}.", "care")
+
+
+def check_external(share: Mapping[str, float]) -> Check:
+    """Whether the motors feel what the force sensor reads."""
+    question = "Do the motors feel what the force sensor reads?"
+    size = f"{significant(share['share'], 3)} (95 % interval {significant(share['low'], 3)} to {significant(share['high'], 3)})"
+    answer = f"The motor torques show {size} times the measured external torques."
+    if share["high"] < 0:
+        return Check(
+            question, f"{answer} The sign is the other one: correct `wrench:` under `force_sensor:`.", "bad"
+        )
+    if share["low"] - _SENSOR > 1.0 or share["high"] + _SENSOR < 1.0:
+        return Check(question, f"{answer} Check frame, axes, unit and time base of the sensor.", "bad")
+    if share["low"] < 0.5 or share["high"] > 1.5:
+        return Check(
+            question, f"{answer} The external torques are too small to check the sensor by them.", "care"
+        )
+    return Check(question, answer, "good")

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.report.dynamics_checks import LARGE, TOO_LARGE
+from flexcal.report.dynamics_checks import LARGE, TOO_LARGE, check_weight
 from flexcal.report.notation import significant
 from flexcal.report.page import Check
 
@@ -28,6 +28,7 @@ def payload_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
             "declared_mass", independent=True
         ),
         _check_others(results["other_payloads"]).named("other_estimates"),
+        *([check_weight(faults).named("weight")] if (faults := results.get("weight_faults")) else []),
     )
 
 

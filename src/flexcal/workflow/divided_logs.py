@@ -24,6 +24,7 @@ from flexcal.workflow.log_payloads import require_unloaded
 from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.log_torques import require_joint_torques
+from flexcal.workflow.log_wrenches import require_wrenches
 from flexcal.workflow.treatment import Treatment
 
 
@@ -52,17 +53,20 @@ class DividedLogs:
         treatment: Treatment,
         scratch: Path,
         *,
+        accept_weight: bool = False,
         jobs: int,
         progress: Progress,
     ) -> DividedLogs:
         """The last share `hold_out` of the time of every log to `fit` is unseen, and so are the logs `validate`.
 
         Filtered logs are files of the folder `scratch`. Raises `InputError` and `FlexcalError` for a log that lies, has a payload, or
-        has the torques of motors without a map.
+        has the torques of motors without a map, unless they are to be accepted (`accept_weight`).
         """
         seen, others = (read_logs(paths, model, treatment, scratch, jobs=jobs) for paths in (fit, validate))
         require_unloaded([*seen, *others], model)
-        require_joint_torques([*seen, *others], model)
+        if not accept_weight:
+            require_joint_torques([*seen, *others], model)
+        require_wrenches([*seen, *others], model)
         windows = [split(log, treatment, hold_out) for log in seen]
         late = [LogPart(log, w) for log, (_, w) in zip(seen, windows, strict=True) if w is not None]
         borders = [math.inf if w is None else w.start for _, w in windows]

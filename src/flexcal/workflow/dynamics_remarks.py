@@ -10,8 +10,8 @@ from flexcal.model.regressor import INERTIAL
 from flexcal.workflow.estimators import EstimatorName
 
 _SHOWN = 3
-_REGROUPED = ("rotor_inertia", "arm_inertia")
-"""Parameters that are always absorbed by the inertias of links."""
+_REGROUPED = ("rotor_inertia", "arm_inertia", "spring_torque", "cable_torque")
+"""Parameters that are always absorbed, by the inertias of links and by torque offsets."""
 _LARGEST_ATTENUATION = 0.5
 """Bias of a stiffness, in its standard deviations, up to which no remark is made."""
 

@@ -11,9 +11,11 @@ from tempfile import TemporaryDirectory
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
+    ExternalExcess,
     Observation,
     RegressionData,
     essential_parameters,
+    external_share,
     require_scikit_learn,
     select_friction,
     with_play,
@@ -28,6 +30,7 @@ from flexcal.workflow.divided_logs import DividedLogs
 from flexcal.workflow.drive_springs import drive_springs
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
+from flexcal.workflow.log_torques import weight_faults
 from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.results import write_results
 from flexcal.workflow.robot_dynamics import RobotDynamics
@@ -44,6 +47,7 @@ def identify_robot_dynamics(
     estimator: EstimatorName = "wls",
     flexible: bool = False,
     learn_residual: bool = False,
+    accept_weight: bool = False,
     out: Path | None = None,
     command: str = "",
     jobs: int = 1,
@@ -55,12 +59,13 @@ def identify_robot_dynamics(
     six joints, and 48 for their arm sides. The last share `hold_out` (0 to 1) of the time of every log is kept out of the fit, with what
     the filters would carry over, and predicted instead; or the logs `validate` are. The robot starts from nominal and the other blocks.
     With `out`, estimates, results.json, predictions.npz and report.html go to that folder. Raises `FlexcalError` where the logs do not
-    fit the robot, for a log with a payload, and for one that is given twice; nothing is written then. A cut-off or decimation that
-    robot.yaml lacks is proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by logs that have the arm side,
-    and estimates the drives' springs; friction terms are chosen before that, as if the robot were rigid. All estimators but `wls`, `ols`
-    and `sdp`, and learning, go through the logs again, in this process alone. `learn_residual` learns what the estimate misses of the
-    torques, writes it beside the estimates as learned_residual.npz where cross-validation finds it worth anything, and changes nothing
-    else; raises `FlexcalError` without scikit-learn, and `InputError` for a `flexible` robot.
+    fit the robot, for a log with a payload, for one that is given twice, and for torques unlike the links' weight, unless these are to
+    be accepted (`accept_weight`); nothing is written then. Where robot.yaml declares a force sensor, its columns are the external torques.
+    A cut-off or decimation that robot.yaml lacks is proposed. `flexible` tells motors and arm of the elastic joints apart (Eq. 2.22), by
+    logs that have the arm side, and estimates the drives' springs; friction terms are chosen before that, as if the robot were rigid. All
+    estimators but `wls`, `ols` and `sdp`, and learning, go through the logs again, in this process alone. `learn_residual` learns what the
+    estimate misses of the torques, writes it beside the estimates as learned_residual.npz where cross-validation finds it worth anything,
+    and changes nothing else; raises `FlexcalError` without scikit-learn, and `InputError` for a `flexible` robot.
     """
     if learn_residual:
         _require_rigid_and_learnable(flexible)
@@ -75,7 +80,15 @@ def identify_robot_dynamics(
 
     with TemporaryDirectory(prefix="flexcal_") as folder:
         divided = DividedLogs.read(
-            logs, validate, hold_out, model, treatment, Path(folder), jobs=jobs, progress=progress
+            logs,
+            validate,
+            hold_out,
+            model,
+            treatment,
+            Path(folder),
+            accept_weight=accept_weight,
+            jobs=jobs,
+            progress=progress,
         )
         declared = model.config.dynamics.friction
         friction = select_friction(model, declared, divided.equations, treatment.decimation)
@@ -88,6 +101,10 @@ def identify_robot_dynamics(
             held_out = RegressionData.of(observation, base, divided.unseen_equations(observation))
         rows = divided.rows(observation, base)
         estimate = ESTIMATORS[estimator](train, rows)
+        external = None
+        if model.force_sensor is not None:
+            wide = replace(observation, terms=(*observation.terms, ExternalExcess()))
+            external = external_share(RegressionData.of(wide, base, divided.equations(wide)))
         learned = None
         if learn_residual:
             unseen = divided.unseen_rows(observation, base)
@@ -114,6 +131,8 @@ def identify_robot_dynamics(
             friction=friction,
             motors=observation.motors,
             treatment=treatment,
+            weight_faults=tuple(weight_faults(divided.logs, model)),
+            external=external,
             learned=learned,
             seconds=time.perf_counter() - begun,
             estimates=source if out is None else out / ESTIMATES,

@@ -31,6 +31,7 @@ from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.half_gains import HalfGains, half_gains
 from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
+from flexcal.workflow.log_wrenches import require_no_wrenches
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.treatment import treatment_of
 
@@ -106,6 +107,7 @@ def identify_gains(
     with TemporaryDirectory(prefix="flexcal_") as folder:
         read = read_logs(logs, model, treatment, Path(folder), jobs=jobs)
         payloads = log_payloads(read, model)
+        require_no_wrenches(read)
         parts = [LogPart(log, Window()) for log in read]
         systems = log_systems(
             parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress

@@ -9,7 +9,7 @@ from typing import Any
 
 from flexcal.data import FolderCell, Recording, TrajectoryPlan, labels
 from flexcal.data.experiment_folder import PLAN, existing_file
-from flexcal.dynamics import LogFaults, identify_with_prior, trajectory_error
+from flexcal.dynamics import LogFaults, external_torque, identify_with_prior, trajectory_error
 from flexcal.errors import InputError
 from flexcal.estimates_file import provenance, read_estimates
 from flexcal.estimation import Estimate
@@ -118,9 +118,10 @@ def identify_recorded(
 def _checked(
     recordings: Iterable[Recording], files: Sequence[Path], model: RobotModel
 ) -> Iterator[Recording]:
-    """The recordings of some files; raises `InputError` for the first that lies."""
+    """The recordings of some files, their torques τ + τ_ext; raises `InputError` for the first that lies."""
     for recording, file in zip(recordings, files, strict=True):
         faults = LogFaults(file, model)
         faults.add(recording)
         faults.check()
-        yield recording
+        outside = external_torque(model, recording)
+        yield recording if outside is None else replace(recording, torque=recording.torque + outside)

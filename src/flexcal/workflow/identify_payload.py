@@ -31,7 +31,8 @@ from flexcal.report.trust import Trust
 from flexcal.workflow.calibrated_robot import stored_estimates
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.log_systems import read_logs
-from flexcal.workflow.log_torques import require_joint_torques
+from flexcal.workflow.log_torques import require_joint_torques, weight_faults
+from flexcal.workflow.log_wrenches import require_no_wrenches
 from flexcal.workflow.payload_remarks import declared_body, other_payloads, payload_remarks
 from flexcal.workflow.payload_system import PayloadSystem
 from flexcal.workflow.prediction_files import write_predictions
@@ -65,6 +66,7 @@ class RobotPayload:
     free: tuple[Path, ...]
     estimates: Path
     command: str = ""
+    weight_faults: tuple[str, ...] = ()
 
     @cached_property
     def trust(self) -> Trust:
@@ -100,6 +102,7 @@ class RobotPayload:
                 "decimation": self.treatment.decimation.factor,
                 "proposed": list(self.treatment.proposed),
             },
+            "weight_faults": list(self.weight_faults),
             "remarks": list(payload_remarks(fit, self.declared, self.blocks)),
             "estimates": self.estimates,
             "provenance": dict(fit.estimate.provenance),
@@ -128,6 +131,7 @@ def identify_robot_payload(
     free: Sequence[Path] = (),
     frame: str = "",
     estimates: Path | None = None,
+    accept_weight: bool = False,
     out: Path | None = None,
     command: str = "",
     jobs: int = 1,
@@ -138,7 +142,8 @@ def identify_robot_payload(
     `logs` and `free` are files, or folders of trajectories as 'measure' leaves them. Of the robot itself its estimates tell, all blocks
     but that of the payload, or the logs `free` without payload, or both together. The values are in the frame that robot.yaml declares
     for the payload, else in the URDF frame `frame`, else in that of the last link. `estimates` is read (and written) in place of those
-    beside robot.yaml: a file, or the folder that another identification wrote. With `out`, estimates, results.json, predictions.npz
+    beside robot.yaml: a file, or the folder that another identification wrote. Torques unlike the links' weight are refused, unless they
+    are to be accepted (`accept_weight`), with a remark. With `out`, estimates, results.json, predictions.npz
     and report.html go to that folder. Raises `FlexcalError` where neither tells of the robot's dynamics, a log does not fit the robot,
     says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and as
     `identify_payload` does; nothing is written then.
@@ -170,7 +175,10 @@ def identify_robot_payload(
         read = read_logs(every, model, treatment, Path(folder), jobs=jobs)
         carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
         _require_payloads(read, carries)
-        require_joint_torques(read, model)
+        require_no_wrenches(read)
+        faults = tuple(weight_faults(read, model))
+        if not accept_weight:
+            require_joint_torques(read, model)
         known = blocks.get("dynamics")
         for number in range(_ROUGH if model.elastic else 0):
             progress("payload", number / (_ROUGH + 1))
@@ -207,6 +215,7 @@ def identify_robot_payload(
         free=unloaded.files,
         estimates=target,
         command=command,
+        weight_faults=faults,
     )
     store_block(source, target, blocks, "payload", estimate)
     if out is not None:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from flexcal.dynamics import EssentialParameters, FrictionSelection, RegressionData
+from flexcal.dynamics import EssentialParameters, ExternalShare, FrictionSelection, RegressionData
 from flexcal.estimation import Estimate
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.report.dynamics import dynamics_checks
@@ -25,8 +25,9 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
-    whose motors have equations of their own. `learned` is what was learned beside the estimate, None where nobody asked for it;
-    `provenance` has all files with their hashes, `command` the command line, where there was one.
+    whose motors have equations of their own. `weight_faults` are torques unlike the links' weight that were accepted, `external` tells how
+    much of the measured external torques the motors' show, None without a force sensor. `learned` is what was learned beside the estimate,
+    None where nobody asked for it; `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     estimate: Estimate
@@ -40,6 +41,8 @@ class RobotDynamics:
     friction: FrictionSelection
     motors: tuple[str, ...]
     treatment: Treatment
+    weight_faults: tuple[str, ...]
+    external: ExternalShare | None
     learned: LearnedDynamics | None
     seconds: float
     estimates: Path
@@ -93,6 +96,8 @@ class RobotDynamics:
                 {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
                 for t in self.friction.trials
             ],
+            "weight_faults": list(self.weight_faults),
+            "external_share": None if self.external is None else asdict(self.external),
             "remarks": list(dynamics_remarks(self.train, self.estimate, self.estimator)),
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
