@@ -115,14 +115,17 @@ def test_npz_that_does_not_fit(tmp_path: Path) -> None:
     refused(
         r"estimates\.npz: the names and covariance of the block 'stiffness' are missing", **{label: names}
     )
-    refused(r"shape \(3, 3\), not \(4, 4\)", **{label: names, matrix: covariance[:3, :3]})
+    refused(
+        r"covariance' with the shape \(3, 3\), which does not fit",
+        **{label: names, matrix: covariance[:3, :3]},
+    )
     refused("names are not the values", **{label: names[::-1], matrix: covariance})
     refused(r"does not belong to estimates\.yaml", **{label: names, matrix: 2 * covariance})
     (tmp_path / "estimates.npz").write_bytes(b"nothing")
     with pytest.raises(InputError, match=r"estimates\.npz cannot be read"):
         read_estimates(path)
     (tmp_path / "estimates.npz").unlink()
-    with pytest.raises(InputError, match="no such file"):
+    with pytest.raises(InputError, match="No such file"):
         read_estimates(path)
     write_estimates(path, "stiffness", make_estimate(3))
     assert read_estimates(path)["stiffness"].rank == 2

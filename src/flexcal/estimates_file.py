@@ -10,7 +10,6 @@ from __future__ import annotations
 import hashlib
 import json
 import math
-import zipfile
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -21,6 +20,7 @@ import numpy as np
 from flexcal.atomic import atomic_paths
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
+from flexcal.npz_reader import ArrayForm, NpzFile
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import to_plain, yaml_text
 
@@ -212,18 +212,14 @@ def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:
     again = "run the identification again"
     if block.covariance_sha256 is None or block.fit is None:
         raise file.error((name,), f"the block '{name}' has values only, so it is no estimate; {again}.")
-    try:
-        with np.load(path, allow_pickle=False) as arrays:
-            names, covariance = arrays[f"{name}.names"], arrays[f"{name}.covariance"]
-    except KeyError:
-        raise InputError(
-            f"{path}: the names and covariance of the block '{name}' are missing; {again}."
-        ) from None
-    except (OSError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        what = f"{type(problem).__name__}" if not isinstance(problem, FileNotFoundError) else "no such file"
-        raise InputError(
-            f"{path} cannot be read ({what}); it belongs to {file.path.name}: {again}."
-        ) from problem
+    forms = {
+        f"{name}.names": ArrayForm("text", ("names",)),
+        f"{name}.covariance": ArrayForm("real", ("names", "names")),
+    }
+    stored = NpzFile(path, f"it belongs to {file.path.name}: {again}")
+    if f"{name}.names" not in stored or f"{name}.covariance" not in stored:
+        raise InputError(f"{path}: the names and covariance of the block '{name}' are missing; {again}.")
+    names, covariance = stored.read(forms).values()
     size = len(block.values)
     if covariance.shape != (size, size):
         raise InputError(

@@ -104,8 +104,8 @@ def test_it_belongs_to_one_estimate(learned: LearnedResidual, estimate: Estimate
         with pytest.raises(InputError, match=r"learned_residual\.npz cannot be read"):
             read_learned_residual(file, estimates)
     np.savez(file, allow_pickle=False, names=np.array(["shoulder"]))
-    with pytest.raises(InputError, match=r"cannot be read \(KeyError\)"):
+    with pytest.raises(InputError, match=r"lacks the array"):
         read_learned_residual(file, estimates)
     file.unlink()
-    with pytest.raises(InputError, match=r"cannot be read \(FileNotFoundError\)"):
+    with pytest.raises(InputError, match=r"cannot be read \(No such file"):
         read_learned_residual(file, estimates)

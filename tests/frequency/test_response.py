@@ -71,8 +71,8 @@ def test_result_describes_the_experiment(make_plan, linear_cell, rng, tmp_path):
 def test_loading_something_else_is_one_sentence(tmp_path):
     (tmp_path / "a.npz").write_text("no archive")
     np.savez(tmp_path / "b.npz", response=np.zeros(3))
-    for name in ("a.npz", "b.npz"):
-        with pytest.raises(InputError, match="not a frequency response"):
+    for name, words in (("a.npz", "cannot be read"), ("b.npz", "is not a frequency response")):
+        with pytest.raises(InputError, match=f"{words}.*; give what 'flexcal identify response' wrote"):
             FrequencyResponse.load(tmp_path / name)
     with pytest.raises(InputError, match="does not exist; run 'flexcal identify response'"):
         FrequencyResponse.load(tmp_path / "missing.npz")

@@ -6,7 +6,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +15,21 @@ from flexcal.dynamics.gaussian_process import GaussianProcess
 from flexcal.dynamics.learned_residual import LearnedMotor, LearnedResidual
 from flexcal.errors import InputError
 from flexcal.estimates_file import block_sha256
+from flexcal.npz_reader import ArrayForm, NpzFile
 
 LEARNED = "learned_residual.npz"
+_NUMBERS = ArrayForm("real", ("motors",))
+_FORMS = {
+    "names": ArrayForm("text", ("motors",)),
+    "shares": ArrayForm("real", ("motors", "motors")),
+    "inputs": ArrayForm("real", ("motors", "inputs", 3)),
+    "values": ArrayForm("real", ("motors", "inputs")),
+    "lengths": ArrayForm("real", ("motors", 3)),
+    "amplitude": _NUMBERS,
+    "noise": _NUMBERS,
+    "inflation": _NUMBERS,
+    "dynamics": ArrayForm("text"),
+}
 
 
 def write_learned_residual(path: Path, learned: LearnedResidual, estimates: Path) -> None:
@@ -45,23 +57,20 @@ def read_learned_residual(path: str | Path, estimates: str | Path) -> LearnedRes
     Raises `InputError` where the file cannot be read, and where it was learned with other dynamics than those of the file `estimates`.
     """
     path, again = Path(path), "run 'flexcal identify dynamics --learn-residual' again"
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            arrays = {name: stored[name] for name in stored.files}
-        processes = [
-            GaussianProcess(x, y, lengths, float(amplitude), float(noise))
-            for x, y, lengths, amplitude, noise in zip(
-                *(arrays[key] for key in ("inputs", "values", "lengths", "amplitude", "noise")), strict=True
-            )
-        ]
-        motors = zip(arrays["names"], processes, arrays["inflation"], strict=True)
-        learned = LearnedResidual(
-            tuple(LearnedMotor(str(name), process, float(factor)) for name, process, factor in motors),
-            arrays["shares"],
+    file = NpzFile(path, again)
+    arrays = file.read(_FORMS)
+    processes = [
+        GaussianProcess(x, y, lengths, float(amplitude), float(noise))
+        for x, y, lengths, amplitude, noise in zip(
+            *(arrays[key] for key in ("inputs", "values", "lengths", "amplitude", "noise")), strict=True
         )
-        belongs_to = str(arrays["dynamics"])
-    except (OSError, ValueError, TypeError, KeyError, EOFError, zipfile.BadZipFile) as problem:
-        raise InputError(f"{path} cannot be read ({type(problem).__name__}); {again}.") from problem
+    ]
+    motors = zip(arrays["names"], processes, arrays["inflation"], strict=True)
+    learned = LearnedResidual(
+        tuple(LearnedMotor(str(name), process, float(factor)) for name, process, factor in motors),
+        arrays["shares"],
+    )
+    belongs_to = str(arrays["dynamics"])
     if belongs_to != block_sha256(estimates, "dynamics"):
         raise InputError(f"{path} was learned with other dynamics than those of {estimates}; {again}.")
     return learned

@@ -1,6 +1,5 @@
 """The frequency response matrix of a robot in one pose, from motor torque to motor acceleration (eqs. (19)-(21))."""
 
-import zipfile
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
@@ -14,9 +13,28 @@ from flexcal.frequency import covariance as cov
 from flexcal.frequency.averages import Average, average_response, right_divide
 from flexcal.frequency.periods import experiment_spectra, keep_periods, odd_distortion
 from flexcal.frequency.records import PoseRecords, by_pose
+from flexcal.npz_reader import ArrayForm, NpzFile
 
 POOLED_LINES = 15  # neighbouring lines that share one covariance: 45 degrees of freedom with 4 realisations
 SMALLEST_FREEDOM = 20
+
+_MATRICES = ArrayForm("complex", ("lines", "axes", "axes"))
+_COVARIANCES = ArrayForm("complex", ("lines", "elements", "elements"))
+_FORMS = {
+    "frequencies_hz": ArrayForm("real", ("lines",)),
+    "response": _MATRICES,
+    "covariance": _COVARIANCES,
+    "noise_covariance": _COVARIANCES,
+    "degrees_of_freedom": ArrayForm("real"),
+    "realisations": ArrayForm("complex", ("realisations", "lines", "axes", "axes")),
+    "joints": ArrayForm("text", ("axes",)),
+    "q_mean": ArrayForm("real", ("all joints",)),
+    "payload": ArrayForm("real", finite=False),
+    "pose": ArrayForm("whole"),
+    "sample_time": ArrayForm("real"),
+    "average": ArrayForm("text"),
+    "odd_distortion": ArrayForm("real", ("axes or none",)),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,16 +106,17 @@ class FrequencyResponse:
     @classmethod
     def load(cls, path: str | Path) -> "FrequencyResponse":
         """Read what `save` wrote; `InputError` where the file is missing or something else."""
-        names = [field.name for field in fields(cls)]
         if not Path(path).exists():
             raise InputError(f"{path} does not exist; run 'flexcal identify response' to make it.")
-        try:
-            with np.load(path, allow_pickle=False) as stored:
-                values = {name: stored[name] for name in names}
-        except (OSError, KeyError, ValueError, zipfile.BadZipFile) as problem:
-            raise InputError(
-                f"{path} is not a frequency response; give what 'flexcal identify response' wrote."
-            ) from problem
+        file = NpzFile(Path(path), "give what 'flexcal identify response' wrote")
+        if "covariance" not in file:
+            raise file.error("is not a frequency response")
+        values = file.read(_FORMS)
+        lines, axes = values["response"].shape[:2]
+        if axes == 0 or lines == 0 or values["frequencies_hz"].min() <= 0:
+            raise file.error("holds no response at positive frequencies")
+        if values["covariance"].shape[1:] != (axes**2, axes**2):
+            raise file.error(f"holds a covariance of another size than the response's ({axes}, {axes})")
         payload = float(values["payload"])
         return cls(
             frequencies_hz=values["frequencies_hz"],

@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from flexcal.atomic import atomic_path
-from flexcal.errors import InputError
+from flexcal.npz_reader import ArrayForm, NpzFile
 from flexcal.report.fitted_response import FittedResponse
 
 FITTED = "fitted_responses.npz"
@@ -34,21 +34,36 @@ def write_fitted(folder: Path, responses: Sequence[FittedResponse]) -> None:
 
 def read_fitted(folder: Path) -> tuple[FittedResponse, ...]:
     """What `write_fitted` left; raises `InputError` where the file is not there or not such a one."""
-    path = folder / FITTED
-    try:
-        with np.load(path) as file:
-            return tuple(_response(file, pose) for pose in file["pose"].tolist())
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        reason = problem.strerror if isinstance(problem, OSError) and problem.strerror else problem
-        raise InputError(f"{path} cannot be read ({reason}); run the verb that writes it again.") from problem
+    file = NpzFile(folder / FITTED, "run the verb that writes it again")
+    poses = file.read({"pose": ArrayForm("whole", ("poses",))})["pose"]
+    return tuple(_response(file, pose) for pose in poses.tolist())
 
 
-def _response(file: np.lib.npyio.NpzFile, pose: int) -> FittedResponse:
-    found = {field.name: file[f"{field.name}_{pose}"] for field in fields(FittedResponse)[1:]}
+def _response(file: NpzFile, pose: int) -> FittedResponse:
+    found = file.read({f"{name}_{pose}": form for name, form in _forms(pose).items()})
+    values: dict[str, Any] = {name: found[f"{name}_{pose}"] for name in _forms(pose)}
     return FittedResponse(
         pose=pose - 1,
-        joints=tuple(found.pop("joints").tolist()),
-        payload=float(found.pop("payload")),
-        degrees_of_freedom=float(found.pop("degrees_of_freedom")),
-        **found,
+        joints=tuple(values.pop("joints").tolist()),
+        payload=float(values.pop("payload")),
+        degrees_of_freedom=float(values.pop("degrees_of_freedom")),
+        **values,
     )
+
+
+def _forms(pose: int) -> dict[str, ArrayForm]:
+    lines, axes = f"lines {pose}", f"axes {pose}"
+    matrices, sizes = ArrayForm("complex", (lines, axes, axes)), ArrayForm("real", (lines, axes, axes))
+    return {
+        "joints": ArrayForm("text", (axes,)),
+        "q_mean": ArrayForm("real", ("joints",)),
+        "payload": ArrayForm("real"),
+        "frequencies_hz": ArrayForm("real", (lines,)),
+        "response": matrices,
+        "predicted": matrices,
+        "std": sizes,
+        "noise_std": sizes,
+        "distortion_std": sizes,
+        "misfit": ArrayForm("real", (axes, axes)),
+        "degrees_of_freedom": ArrayForm("real"),
+    }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +10,14 @@ import polars as pl
 from flexcal.atomic import atomic_path
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
+from flexcal.npz_reader import ArrayForm, NpzFile
 from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, ArmPoses, MeasuredPoints
 
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
 _TEXTS = ("target", "station")
+_AGAIN = "run the verb that writes it again"
 
 
 def write_points(folder: Path, points: MeasuredPoints) -> None:
@@ -99,15 +100,22 @@ def write_arm(folder: Path, arms: ArmPoses) -> None:
 
 def read_arm(folder: Path) -> ArmPoses:
     """What `write_arm` left; raises `InputError` where the file is not there or not such a one."""
-    path = folder / ARM
-    try:
-        with np.load(path) as file:
-            errors = {model: file[f"errors_{model}"] for model in _MODELS if f"errors_{model}" in file}
-            return ArmPoses(
-                file["corners"], file["surface"], file["triangles"], file["pose"], file["tip"], errors
-            )
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise _unreadable(path, problem) from problem
+    file = NpzFile(folder / ARM, _AGAIN)
+    forms = {
+        "corners": ArrayForm("real", ("drawn", "corners", 3)),
+        "surface": ArrayForm("real", ("in full", "vertices", 3)),
+        "triangles": ArrayForm("whole", ("triangles", 3)),
+        "pose": ArrayForm("whole", ("points",)),
+        "tip": ArrayForm("real", ("points", 3)),
+    }
+    found = file.read(
+        forms | {name: ArrayForm("real", ("points", 3)) for name in _of_models(file, "errors_")}
+    )
+    triangles = found["triangles"]
+    if triangles.size and not 0 <= triangles.min() <= triangles.max() < found["surface"].shape[1]:
+        raise file.error("holds triangles of vertices that are not there")
+    errors = {name.removeprefix("errors_"): found.pop(name) for name in _of_models(file, "errors_")}
+    return ArmPoses(**found, errors=errors)
 
 
 def write_loads(folder: Path, loads: GravityLoads) -> None:
@@ -122,12 +130,16 @@ def read_loads(folder: Path) -> GravityLoads | None:
     path = folder / LOADS
     if not path.is_file():
         return None
-    try:
-        with np.load(path) as file:
-            along = {model: file[f"along_{model}"] for model in _MODELS if f"along_{model}" in file}
-            return GravityLoads(file["torque"], along)
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise _unreadable(path, problem) from problem
+    file = NpzFile(path, _AGAIN)
+    loads = ArrayForm("real", ("points", "joints"))
+    found = file.read({name: loads for name in ("torque", *_of_models(file, "along_"))})
+    return GravityLoads(
+        found.pop("torque"), {name.removeprefix("along_"): along for name, along in found.items()}
+    )
+
+
+def _of_models(file: NpzFile, prefix: str) -> list[str]:
+    return [f"{prefix}{model}" for model in _MODELS if f"{prefix}{model}" in file]
 
 
 def _vectors(prefix: str, values: np.ndarray) -> dict[str, np.ndarray]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -10,7 +9,7 @@ import numpy as np
 
 from flexcal.atomic import atomic_path
 from flexcal.dynamics import TorquePrediction
-from flexcal.errors import InputError
+from flexcal.npz_reader import ArrayForm, NpzFile
 
 PREDICTIONS = "predictions.npz"
 _ARRAYS = ("time", "measured", "predicted", "frequencies_hz", "measured_density", "residual_density")
@@ -35,19 +34,34 @@ def write_predictions(folder: Path, predictions: Sequence[TorquePrediction]) -> 
 
 def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
     """What `write_predictions` left; raises `InputError` where the file is not there or not such a one."""
-    path = folder / PREDICTIONS
-    try:
-        with np.load(path) as file:
-            return tuple(
-                TorquePrediction(
-                    name=str(name),
-                    stride=int(file["strides"][k]),
-                    held_out_from=float(file["held_out_from"][k]),
-                    **{array: file[f"{array}_{k}"] for array in _ARRAYS},
-                )
-                for k, name in enumerate(file["names"])
-            )
-    except (OSError, KeyError, ValueError, EOFError, zipfile.BadZipFile) as problem:
-        raise InputError(
-            f"{path} cannot be read ({problem}); run the verb that writes it again."
-        ) from problem
+    file = NpzFile(folder / PREDICTIONS, "run the verb that writes it again")
+    logs = file.read(
+        {
+            "names": ArrayForm("text", ("logs",)),
+            "strides": ArrayForm("whole", ("logs",)),
+            "held_out_from": ArrayForm("real", ("logs",), finite=False),
+        }
+    )
+    return tuple(
+        TorquePrediction(
+            name=str(name),
+            stride=int(logs["strides"][k]),
+            held_out_from=float(logs["held_out_from"][k]),
+            **{array: found[f"{array}_{k}"] for array in _ARRAYS},
+        )
+        for k, name in enumerate(logs["names"])
+        for found in [file.read({f"{array}_{k}": form for array, form in _forms(k).items()})]
+    )
+
+
+def _forms(log: int) -> dict[str, ArrayForm]:
+    torques = ArrayForm("real", (f"rows {log}", "joints"))
+    densities = ArrayForm("real", (f"frequencies {log}", "joints"))
+    return {
+        "time": ArrayForm("real", (f"rows {log}",)),
+        "measured": torques,
+        "predicted": torques,
+        "frequencies_hz": ArrayForm("real", (f"frequencies {log}",)),
+        "measured_density": densities,
+        "residual_density": densities,
+    }
