@@ -83,6 +83,11 @@ class Pushed:
         return path
 
 
+def pushed_model() -> mujoco.MjModel:
+    """The arm, its springs, dampers and armature."""
+    return mujoco.MjModel.from_xml_string(_MJCF)
+
+
 def pushed(seed: int, duration: float, *, push: float = 1.0, cable: float = CABLE) -> Pushed:
     """A sum of sines, with a wrench of other sines and a contact now and then."""
     rng = np.random.default_rng(seed)
@@ -98,7 +103,7 @@ def pushed(seed: int, duration: float, *, push: float = 1.0, cable: float = CABL
     force = np.array([30, 30, 30, 3, 3, 3]) * np.sin(time[:, None] * tones + rng.uniform(0, 6, 6))
     contact = (np.sin(2 * np.pi * 0.4 * time) > 0.8)[:, None] * np.array([25.0, 0, -40, 0, 2, 0])
     wrench = push * (force + contact)
-    model = mujoco.MjModel.from_xml_string(_MJCF)
+    model = pushed_model()
     data = mujoco.MjData(model)
     body = model.body("hand").id
     torque = np.empty_like(q)

@@ -107,7 +107,7 @@ def test_what_the_flexible_model_needs(recorded, tmp_path: Path) -> None:
     for file, measured, sentence in (
         (robot, log, r"motor.parquet: the columns qa1…qa6 \(positions on the arm side\) are missing"),
         (rigid, logs[0], "rigid.yaml declares no elastic joint"),
-        (coupled, logs[0], "joint_3 is elastic and coupled with another motor"),
+        (coupled, logs[0], "joint_3 is elastic and coupled with joint_4, which is not; declare both"),
     ):
         with pytest.raises(InputError, match=sentence) as refusal:
             identify_robot_dynamics(file, [measured], flexible=True, out=tmp_path / "out")

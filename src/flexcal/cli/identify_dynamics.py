@@ -106,7 +106,9 @@ class IdentifyDynamics:
         document = found.document()
         console.show(base_parameter_table(document["base_parameters"]))
         if self.flexible:
-            springs = {name: q for name, q in document["parameters"].items() if name.endswith(_SPRINGS)}
+            springs = {
+                name: q for name, q in document["parameters"].items() if any(key in name for key in _SPRINGS)
+            }
             units = {item.name: item.unit for item in found.estimate.parameters}
             console.show(quantity_table("drives of the elastic joints", springs, units))
         console.say(

@@ -60,3 +60,22 @@ class DriveSpring:
         yield Column(f"{name}.drive.torque_offset", motor, touches)
         if self.play is not None:  # last, so that recordings of one flank tell the offset and not the gap
             yield Column(f"{name}.drive.gap_torque", motor, touches * np.sign(stretch))
+
+
+def coupled_columns(model: RobotModel, motion: Motion, motors: Mapping[int, int]) -> Iterator[Column]:
+    """What springs between the motors and a coupling add to the motors' equations, whose numbers are `motors` by joint.
+
+    Motor m, which also turns joint j by the ratio r, stretches its spring by (q - θ)_m + r (q - θ)_j: `<m>.drive.stiffness_at_<j>` is
+    what either motor feels of the other's twist, r times the stiffness before the coupling, and zero for springs behind it. What a motor
+    feels of its own twist stands in its own stiffness, r² of the other's before the coupling included. Damping likewise.
+    """
+    arm = motion.arm
+    for entry in model.config.drives.coupling:
+        m, j = model.joint_index(entry.motor), model.joint_index(entry.joint)
+        if arm is None or m not in motors or j not in motors:
+            continue
+        for key, far, near in (("stiffness", arm.q, motion.q), ("damping", arm.dq, motion.dq)):
+            twist = far - near
+            name = f"{entry.motor}.drive.{key}_at_{entry.joint}"
+            yield Column(name, motors[m], -entry.ratio * twist[:, j])
+            yield Column(name, motors[j], -entry.ratio * twist[:, m])

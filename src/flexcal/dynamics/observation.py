@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.dynamics.arm_side import ArmSide
-from flexcal.dynamics.drive_spring import DriveSpring
+from flexcal.dynamics.drive_spring import DriveSpring, coupled_columns
 from flexcal.dynamics.drive_terms import Column, DriveTerm, JointSprings, Memory
 from flexcal.dynamics.link_columns import LinkColumns, link_columns
 from flexcal.dynamics.motion import Motion
@@ -151,6 +151,7 @@ class Observation:
                     yield Column(column.name, motors[column.joint], column.values)
         for spring in self.springs:
             yield from spring.columns(self.model, motion, motors[spring.joint])
+        yield from coupled_columns(self.model, motion, motors)
 
     def _link_states(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions, velocities and accelerations of the links: behind the springs, else as the motors."""

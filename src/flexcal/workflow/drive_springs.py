@@ -19,8 +19,8 @@ def drive_springs(
 ) -> tuple[DriveSpring, ...]:
     """The drives of the elastic joints; bearings are outside the flexible model.
 
-    Raises `InputError` for an `estimator` of rigid robots, for a robot without elastic joints, for one whose motors turn an elastic
-    joint together, and for a log that lacks the arm side.
+    Raises `InputError` for an `estimator` of rigid robots, for a robot without elastic joints, for a coupling of an elastic joint with a
+    rigid one or with backlash, and for a log that lacks the arm side.
     """
     if estimator not in _KNOWING:
         raise InputError(
@@ -31,13 +31,21 @@ def drive_springs(
             f"{model.path} declares no elastic joint, which --flexible needs; add it under `elastic:`, or leave --flexible out."
         )
     springs = tuple(DriveSpring(joint.index) for joint in model.driven)
+    elastic = {joint.name for joint in model.driven}
+    gaps = {model.joint_names[joint] for joint in model.backlash_joints}
     for entry in model.config.drives.coupling:
-        for joint in model.driven:
-            if joint.name in (entry.motor, entry.joint):
-                raise InputError(
-                    f"{model.path}: {joint.name} is elastic and coupled with another motor, which the flexible "
-                    "model lacks; leave --flexible out."
-                )
+        ends = {entry.motor, entry.joint}
+        if len(ends & elastic) == 1:
+            (one,), (other,) = ends & elastic, ends - elastic
+            raise InputError(
+                f"{model.path}: {one} is elastic and coupled with {other}, which is not; declare both under `elastic:`, or leave "
+                "--flexible out."
+            )
+        if ends <= elastic and ends & gaps:
+            raise InputError(
+                f"{model.path}: {min(ends & gaps)} has backlash and a coupled motor, which the flexible model lacks; remove it from "
+                "`geometry: backlash:`, or leave --flexible out."
+            )
     for log in logs:
         if next(log_blocks(log, model)).arm is None:
             raise InputError(
