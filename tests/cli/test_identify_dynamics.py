@@ -169,7 +169,12 @@ def test_what_robot_yaml_lacks_is_proposed(
     robot = with_friction(tx40, "classic") / "robot.yaml"
     line = "dynamics: {cutoff_hz: 100, decimation: 100, friction: classic}"
     declared = robot.read_text()
-    assert results("classic")["signals"] == {"cutoff_hz": 100, "decimation": 100, "proposed": []}
+    assert results("classic")["signals"] == {
+        "cutoff_hz": 100,
+        "decimation": 100,
+        "proposed": [],
+        "time_stamps": {},
+    }
     robot.write_text(declared.replace(line, "dynamics: {decimation: 100, friction: classic}"))
     found = identified(tx40, capsys, "--hold-out", "last:0.3")
     assert found["signals"]["proposed"] == ["cutoff_hz"]

@@ -129,7 +129,8 @@ def test_one_lost_sample_is_filled_in(tmp_path: Path, robot: Any) -> None:
         (HEADER, ["0,0,0,0,0", "0.1,0,zero,0,0"], ["line 3, column q2", "'zero' is not a number"]),
         (HEADER, ["0,0,0,0,0", '0.1,0,"1,5",0,0'], ["line 3, column q2", "decimal point"]),
         (HEADER, ["0,0,0,0,0", "0.2,0,0,0,0", "0.1,0,0,0,0"], ["line 4, column t", "backwards"]),
-        (HEADER, ["0,0,0,0,0", "0.2,0,0,0,0", "0.2,0,0,0,0"], ["line 4, column t", "stands still"]),
+        (HEADER, ["0.2,0,0,0,0", "0.2,0,0,0,0"], ["line 3, column t", "stands still"]),
+        (HEADER, ["0,0,0,0,0", *6 * ["0.2,0,0,0,0"]], ["line 4", "stands still: 6 rows", "more digits"]),
         (
             HEADER,
             [f"{t},0,0,0,0" for t in (0.0, 0.1, 0.2, 0.3, 0.8, 0.9, 1.0)],

@@ -21,7 +21,7 @@ from flexcal.dynamics import (
 )
 from flexcal.dynamics.noisy_columns import NoisyLog
 from flexcal.dynamics.rows import rows
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import FlexcalError
 from flexcal.progress import silent
 from flexcal.workflow.dynamics_remarks import dynamics_remarks
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
@@ -118,13 +118,42 @@ def test_a_window_reads_no_more_than_it_needs(swing: Motion, observation: Observ
         np.testing.assert_allclose(found, expected, atol=1e-12)
 
 
-def test_a_gap_is_refused(swing: Motion, observation: Observation, tmp_path: Path) -> None:
-    path = tmp_path / "log.csv"
-    write_recording(path, Recording(STEP, swing.q, swing.torque))
+@pytest.fixture
+def divided(logs: list[Path]) -> tuple[Path, list[Recording]]:
+    """A log with two gaps and, between them, a part that is too short for the filter; and what lies before and after."""
+    path = logs[1]
     lines = path.read_text().splitlines(keepends=True)
-    path.write_text("".join(lines[:800] + lines[900:]))
-    with pytest.raises(InputError, match=r"log\.csv: a gap of 0\.505 s precedes the sample at 4\.495 s"):
-        JointLog.read(path, observation.model, 10.0, tmp_path)
+    path.write_text("".join(lines[:801] + lines[901:951] + lines[1101:]))
+    table = np.loadtxt(lines[1:], delimiter=",")
+    parts = [table[:800], table[1100:]]
+    return path, [Recording(STEP, part[:, 1:7], part[:, 7:], start=float(part[0, 0])) for part in parts]
+
+
+def test_nothing_reaches_across_a_gap(
+    divided: tuple[Path, list[Recording]], observation: Observation, tmp_path: Path
+) -> None:
+    """A log with gaps has the rows of two logs, with numbers of their own, whatever the blocks are."""
+    path, parts = divided
+    log = JointLog.read(path, observation.model, 10.0, tmp_path)
+    motions = [Motion.of(part, 10.0) for part in parts]
+    assert log.spans == tuple((p.start, pytest.approx(p.start + p.duration)) for p in parts)
+    assert "divided at 2 gaps, the longest of 0.755 s" in log.time_stamps
+    assert "0.25 s between gaps are too short for the filters and left out" in log.time_stamps
+    joined = Motion.joined(log.blocks())
+    np.testing.assert_allclose(joined.ddq, np.concatenate([m.ddq for m in motions]), atol=1e-8)
+    found = list(rows(observation, log, Decimation(4), Window()))
+    expected = [list(rows(observation, motion, Decimation(4), Window())) for motion in motions]
+    number = np.concatenate([part.number for part in found])
+    assert (np.diff(number) > 0).all() and number[-1] <= log.samples // 4
+    for joint in range(6):
+        mine, theirs = (
+            np.hstack([part.columns[joint] for part in each])
+            for each in (found, [*expected[0], *expected[1]])
+        )
+        np.testing.assert_allclose(mine, theirs, atol=1e-8)
+    total = sum(part.duration for part in parts)
+    assert log.last(0.3) == pytest.approx(parts[1].start + parts[1].duration - 0.3 * total)
+    assert log.last(0.95) == pytest.approx(parts[0].start + 0.05 * total)
 
 
 def test_no_room_for_the_filtered_log(logs: list[Path], observation: Observation, tmp_path: Path) -> None:

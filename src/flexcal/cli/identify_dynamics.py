@@ -80,6 +80,7 @@ class IdentifyDynamics:
         """Fit, and print the base parameters and the error of the torques."""
         from flexcal.cli.tables import base_parameter_table, friction_table, learned_table, quantity_table
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
+        from flexcal.workflow.used_signals import signal_sentences
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")
@@ -115,12 +116,8 @@ class IdentifyDynamics:
             f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
-        signals = document["signals"]
-        if signals["proposed"]:
-            console.say(
-                f"proposed from the spectrum of the motion, because robot.yaml lacks {' and '.join(signals['proposed'])}: "
-                f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
-            )
+        for sentence in signal_sentences(document["signals"]):
+            console.say(sentence)
         if document["friction_tried"]:
             console.show(friction_table(document["friction_tried"]))
         console.say(f"friction: {', '.join(found.friction.labels)}")

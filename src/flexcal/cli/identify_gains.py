@@ -39,6 +39,7 @@ class IdentifyGains:
         """Fit, and print the gains."""
         from flexcal.cli.tables import drive_gain_table
         from flexcal.workflow.identify_gains import identify_gains
+        from flexcal.workflow.used_signals import signal_sentences
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")
@@ -50,6 +51,8 @@ class IdentifyGains:
             )
         document = found.document()
         console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
+        for sentence in signal_sentences(document["signals"]):
+            console.say(sentence)
         console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
         console.say(found.trust.sentence)
         if self.out is not None:

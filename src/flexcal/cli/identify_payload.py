@@ -70,6 +70,7 @@ class IdentifyPayload:
         """Fit, and print the payload."""
         from flexcal.cli.tables import quantity_table
         from flexcal.workflow.identify_payload import identify_robot_payload
+        from flexcal.workflow.used_signals import signal_sentences
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")
@@ -93,6 +94,8 @@ class IdentifyPayload:
         title = f"payload in the frame {found.frame}, inertia about its centre of mass"
         console.show(quantity_table(title, document["parameters"], units))
         console.say(f"relative torque error: {document['error_percent']['train']:.2f} %")
+        for sentence in signal_sentences(document["signals"]):
+            console.say(sentence)
         for remark in document["remarks"]:
             console.say(remark)
         console.say(found.trust.sentence)

@@ -12,6 +12,7 @@ from .recording import Recording, RecordingLabel
 from .recording_files import read_recording, read_recording_blocks, write_recording
 from .target_files import read_commands, read_targets, write_commands, write_targets
 from .time_base import TimeBase
+from .time_summary import TimeSummary
 from .tool_targets import ToolTargets
 from .trajectory_paths import FourierPaths, SplinePaths
 from .trajectory_plan import TrajectoryPlan
@@ -29,6 +30,7 @@ __all__ = [
     "RecordingLabel",
     "SplinePaths",
     "TimeBase",
+    "TimeSummary",
     "ToolTargets",
     "TrajectoryPlan",
     "check_motion",

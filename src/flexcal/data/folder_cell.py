@@ -15,7 +15,7 @@ from flexcal.data.pose_files import read_poses
 from flexcal.data.pose_plan import PosePlan
 from flexcal.data.pose_set import PoseSet
 from flexcal.data.recording import Recording
-from flexcal.data.recording_files import read_recording
+from flexcal.data.recording_files import FILL, read_recording
 from flexcal.data.trajectory_plan import TrajectoryPlan
 from flexcal.errors import InputError
 from flexcal.yaml_writer import to_plain
@@ -56,7 +56,8 @@ class FolderCell:
             raise InputError(f"{self.path / PLAN} is a plan of kind '{own.kind}', which has no joint logs.")
         self._check_same(plan)
         files = [(existing_file(self.path, label.name), label) for label in labels(own)]
-        return (read_recording(file, self.model, label) for file, label in files)
+        fill = FILL if isinstance(own, TrajectoryPlan) else 0.0
+        return (read_recording(file, self.model, label, fill=fill) for file, label in files)
 
     def measure(self, plan: PosePlan | None = None) -> PoseSet:
         """The measured poses of `poses.csv` (or `.parquet`).

@@ -16,6 +16,10 @@ _SMALLEST = 1e-12
 _SHORTEST_TRANSFORM = 8192
 
 
+class TooFewSamples(FlexcalError):
+    """A signal is shorter than the impulse response of its filter."""
+
+
 @dataclass(frozen=True)
 class LowPass:
     """A fourth-order Butterworth filter forwards and backwards, at samples `time_step` (s) apart: -6 dB at `cutoff_hz`.
@@ -60,11 +64,11 @@ class LowPass:
     def before(self, values: np.ndarray, beyond: int = 0) -> np.ndarray:
         """The samples that precede `values` (N, n) when they go on as they begin, turned about the first by half a turn.
 
-        There are `support` of them, and so many `beyond`. Raises `FlexcalError` where N is not above their number.
+        There are `support` of them, and so many `beyond`. Raises `TooFewSamples` where N is not above their number.
         """
         count = self.support + beyond
         if len(values) <= count:
-            raise FlexcalError(
+            raise TooFewSamples(
                 f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {count + 1} are needed."
             )
         return 2 * values[0] - values[count:0:-1]

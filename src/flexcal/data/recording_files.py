@@ -10,9 +10,10 @@ import numpy as np
 
 from flexcal.data.joint_limits import check_joint_units
 from flexcal.data.recording import Recording, RecordingLabel
+from flexcal.data.sample_times import LATE, MOST_EQUAL
 from flexcal.data.signals import UNITS, Signal, assign, standard_columns
 from flexcal.data.table import Table, open_table, write_table
-from flexcal.data.time_base import TimeBase, fit_time_base, gaps, resample, uniform_blocks
+from flexcal.data.time_base import TimeBase, uniform_blocks
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -31,39 +32,38 @@ _FIELDS = {
     "temperature": "temperature",
     "payload": "payload",
 }
+FILL = 0.02
+"""s without samples that interpolation may fill in a log of a robot's own motion, which lies below 10 Hz."""
 _REQUIRED = ("t", "q", "tau")
 _OPTIONAL = ("qa", "dq", "ddq", "dqa", "tau_ext", "force", "moment", "temperature", "payload")
 
 
-def read_recording(path: str | Path, model: RobotModel, label: RecordingLabel | None = None) -> Recording:
+def read_recording(
+    path: str | Path, model: RobotModel, label: RecordingLabel | None = None, *, fill: float = 0.0
+) -> Recording:
     """Read one joint log; where its time stamps jitter, values are interpolated onto a uniform base.
 
-    Raises `InputError` with file, line and column for a missing, unknown or partial column, a value that is missing or
-    no number, time that does not increase, a gap (more than two samples missing), a rate outside 1 Hz to 20 kHz, and
-    angles that cannot be in rad. `recording.time_base` says how regular the time stamps were.
+    Raises `InputError` with file, line and column for a missing, unknown or partial column, a value that is missing or no number, time that
+    runs backwards by more than 50 ms or stands still, a gap (a step of more than 2.5 time steps and more than `fill`, s), a rate outside
+    1 Hz to 20 kHz, and angles that cannot be in rad. `recording.time_base` says how the time stamps were.
     """
     file = open_table(path)
     signals = assign(file, model, _REQUIRED, _OPTIONAL)
     table = file.read()
     t = signals["t"].values(table)[:, 0]
-    _check_increasing(table, signals["t"], t, None)
-    if len(t) < 2:
-        raise table.error(0, None, "this is the only sample; a log needs at least two.")
-    holes = gaps(t)
-    if holes.size:
-        row = int(holes[0])
-        step = float(np.median(np.diff(t)))
-        others = f" (the first of {holes.size})" if holes.size > 1 else ""
+    _check_time(table, signals["t"], t, None)
+    values = _stacked(model, table, signals)
+    (base, whole), *others = uniform_blocks([(t, values)], positions=model.n, fill=fill)
+    if others:
+        later = others[0][0]
+        several = f" (the first of {len(others)})" if len(others) > 1 else ""
         raise table.error(
-            row + 1,
+            int(np.argmax(t > later.start - 0.5 * later.time_step)),
             signals["t"].columns[0],
-            f"a gap of {t[row + 1] - t[row]:.6g} s{others} precedes this sample, where {step:.6g} s is usual; "
+            f"a gap of {later.gap:.6g} s{several} precedes this sample, where {base.time_step:.6g} s is usual; "
             "record again, or cut the log there into two files.",
         )
-    base = fit_time_base(t)
-    _check_rate(table, signals["t"], base.time_step)
-    values = _stacked(model, table, signals)
-    return _recording(path, signals, resample(t, values, base), base, label, model.n)
+    return _recording(path, signals, whole, base, label, model.n)
 
 
 def read_recording_blocks(
@@ -72,13 +72,14 @@ def read_recording_blocks(
     """Read a joint log of any length in constant memory, as recordings of about `rows` samples that follow each other.
 
     All have one time step, that of the first block. A block continues the one before without a seam, except after a
-    gap in the log: its `time_base.gap` then says how many seconds are missing. Raises `InputError` as `read_recording`
-    does, except for gaps.
+    gap in the log: its `time_base.gap` then says how many seconds are missing. Steps of up to 20 ms are no gaps. Raises `InputError` as
+    `read_recording` does, except for gaps.
     """
     file = open_table(path)
     signals = assign(file, model, _REQUIRED, _OPTIONAL)
     empty = True
-    for base, values in uniform_blocks(_stamped(model, signals, file.blocks((), rows))):
+    stamped = _stamped(model, signals, file.blocks((), rows))
+    for base, values in uniform_blocks(stamped, positions=model.n, fill=FILL):
         empty = False
         yield _recording(path, signals, values, base, label, model.n)
     if empty:
@@ -113,12 +114,8 @@ def _stamped(
     held: float | None = None
     for table in tables:
         t = signals["t"].values(table)[:, 0]
-        _check_increasing(table, signals["t"], t, before)
-        if before is None:
-            if len(t) < 2:
-                raise table.error(0, None, "this is the only sample; a log needs at least two.")
-            _check_rate(table, signals["t"], float(np.median(np.diff(t))))
-        before = float(t[-1])
+        _check_time(table, signals["t"], t, before)
+        before = float(t.max()) if before is None else max(before, float(t.max()))
         yield t, _stacked(model, table, signals, held)
         held = float(signals["payload"].values(table)[0, 0]) if "payload" in signals else None
 
@@ -188,19 +185,31 @@ def _recording(
     )
 
 
-def _check_increasing(table: Table, signal: Signal, t: np.ndarray, before: float | None) -> None:
-    first = t[:1] if before is None else np.array([before])
-    steps = np.diff(t, prepend=first)
-    steps[0] = steps[0] if before is not None else 1.0
-    if (steps <= 0).any():
-        row = int(np.argmax(steps <= 0))
-        earlier = before if row == 0 else t[row - 1]
-        what = "stands still" if steps[row] == 0 else "runs backwards"
+def _check_time(table: Table, signal: Signal, t: np.ndarray, before: float | None) -> None:
+    """Of the time stamps `t` (N,) after one at `before` (None: they begin the log)."""
+    if before is None and len(t) < 2:
+        raise table.error(0, None, "this is the only sample; a log needs at least two.")
+    latest = np.maximum.accumulate(t if before is None else np.maximum(t, before))
+    if (latest - t > LATE).any():
+        row = int(np.argmax(latest - t > LATE))
         raise table.error(
             row,
             signal.columns[0],
-            f"the time {what}: {t[row]:.9g} s follows {earlier:.9g} s; sort or repair the log.",
+            f"the time runs backwards: {t[row]:.9g} s follows {latest[row]:.9g} s; sort or repair the log, or cut it there into two "
+            "files.",
         )
+    changes = np.concatenate([[0], np.flatnonzero(np.diff(t)) + 1, [len(t)]])
+    equal = np.diff(changes)
+    if equal.max() > MOST_EQUAL or (before is None and len(equal) < 2):
+        run = int(np.argmax(equal))
+        raise table.error(
+            int(changes[run]) + 1,
+            signal.columns[0],
+            f"the time stands still: {equal[run]} rows have {t[changes[run]]:.9g} s; write the time with more digits, or repair the log.",
+        )
+    if before is None:
+        steps = np.diff(t)
+        _check_rate(table, signal, float(np.median(steps[steps > 0])))
 
 
 def _check_rate(table: Table, signal: Signal, step: float) -> None:

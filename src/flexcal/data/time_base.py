@@ -1,31 +1,38 @@
-"""Uniform time base fitted to measured time stamps."""
+"""Uniform time base for measured time stamps, on which values are interpolated."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from math import floor
 
 import numpy as np
 
+from flexcal.data.sample_times import GAP, JITTER, Clock, Samples, clock_of, in_order, merged
+from flexcal.data.scattered import interpolated
 from flexcal.errors import FlexcalError
 
-GAP = 2.5
-"""A step longer than this many time steps is a gap; a single lost sample is filled in."""
 ENOUGH = 200
-"""Samples that the time step of blocks is taken from, at least, where there are as many."""
-JITTER = 0.02
-"""Time stamps within this part of a time step of the uniform base are taken as uniform."""
+"""Samples that the clock of blocks is taken from, at least, where there are as many."""
+_REACH = 5.0
+"""Longest steps that the interpolation reaches to either side, at most."""
+_ROUNDING = 1e-6
+"""Time steps by which the last sample may lie before its place on the base."""
+_BLOCK = tuple[np.ndarray, np.ndarray]
 
 
 @dataclass(frozen=True)
 class TimeBase:
-    """The uniform base t = start + k · time_step (s, k < samples) fitted to N time stamps, and how they lie about it.
+    """The uniform base t = start + k · time_step (s, k < samples) under time stamps, and how these lie about it.
 
     jitter: standard deviation of the time stamps about the base, s; jitter_max: the largest deviation.
-    lost: single samples that are missing and filled in by interpolation.
+    shortest, longest: steps between time stamps, s. even: samples were taken evenly, and only their stamps scatter.
+    lost: samples that are missing and filled in by interpolation, of a log with a uniform base; regular: whether it has one.
     resampled: whether values are interpolated onto the base, or taken as they are since the stamps fit within 2 %.
     gap: seconds without samples before the start, where the log has a gap there.
+    sorted, merged, repeated: rows that were out of order, had the time stamp of another one, or repeated the row before while the robot
+        went on; these are left out.
     """
 
     start: float
@@ -36,117 +43,81 @@ class TimeBase:
     lost: int
     resampled: bool
     gap: float = 0.0
+    shortest: float = 0.0
+    longest: float = 0.0
+    regular: bool = True
+    even: bool = False
+    sorted: int = 0
+    merged: int = 0
+    repeated: int = 0
 
 
-def gaps(t: np.ndarray, time_step: float | None = None) -> np.ndarray:
-    """Indices i where a gap lies between t[i] and t[i + 1]: a step of more than 2.5 (median) time steps."""
+def gaps(t: np.ndarray, longest: float | None = None) -> np.ndarray:
+    """Indices i where a gap lies between t[i] and t[i + 1]: a step of more than `longest` (s; None: 2.5 median steps)."""
     steps = np.diff(t)
     if not steps.size:
         return np.zeros(0, dtype=int)
-    return np.flatnonzero(steps > GAP * (np.median(steps) if time_step is None else time_step))
+    return np.flatnonzero(steps > (GAP * np.median(steps) if longest is None else longest))
 
 
-def fit_time_base(t: np.ndarray, time_step: float | None = None) -> TimeBase:
-    """The base under ascending time stamps (N,) without gaps, by least squares.
+def uniform_blocks(
+    blocks: Iterable[_BLOCK], *, positions: int = 0, fill: float = 0.0
+) -> Iterator[tuple[TimeBase, np.ndarray]]:
+    """Blocks of time stamps (N,) with values (N, m), put on one uniform base as they come; the first `positions` columns are positions.
 
-    A rate within 1e-6, or five standard errors, of a whole number of Hz is taken as that one, so that logs of one
-    controller have one time step. With `time_step` given only the start is fitted. Raises `FlexcalError` for fewer than
-    two time stamps.
+    Clock and time step are those of the longest stretch of the first block (of at least 200 samples). Time stamps are taken as the times
+    of their samples, unless the positions are those of even sampling. A stretch ends at a gap: a step of more than 2.5 time steps and more
+    than `fill` (s). Inside one, values are interpolated, and nothing is extrapolated; the next one has a base of its own, whose `gap` says
+    how long it was. A block may hold back its last samples for the next. Raises `FlexcalError` for fewer than two samples in all.
     """
-    if t.size < 2:
-        raise FlexcalError("a recording needs at least two samples.")
-    steps = np.diff(t)
-    median = float(np.median(steps)) if time_step is None else time_step
-    counts = np.where(steps > 1.5 * median, 2, 1)
-    number = np.concatenate([[0], np.cumsum(counts)])
-    if time_step is None:
-        centred = number - number.mean()
-        time_step = float(centred @ (t - t[0])) / float(centred @ centred)
-        rate = 1.0 / time_step
-        residual = t - t[0] - time_step * number
-        error = float(residual.std()) / float(np.sqrt(centred @ centred)) / time_step
-        if round(rate) and abs(rate - round(rate)) < max(1e-6, min(5 * error, 1e-3)) * rate:
-            time_step = 1.0 / round(rate)
-    start = float(t[0] + np.mean((t - t[0]) - time_step * number))
-    if abs(start - t[0]) < 1e-6 * time_step:
-        start = float(t[0])
-    deviation = t - (start + time_step * number)
-    largest = float(np.abs(deviation).max())
-    lost = int(np.sum(counts == 2))
-    return TimeBase(
-        start=start,
-        time_step=time_step,
-        samples=int(number[-1]) + 1,
-        jitter=float(deviation.std()),
-        jitter_max=largest,
-        lost=lost,
-        resampled=lost > 0 or largest > JITTER * time_step,
-    )
-
-
-def resample(t: np.ndarray, values: np.ndarray, base: TimeBase) -> np.ndarray:
-    """Values (N, …) at times t (N,) on the base, (samples, …): the cubic through the four nearest samples.
-
-    Next to the ends the cubic is that of the last four samples; with fewer than four, straight lines.
-    """
-    if not base.resampled:
-        return values
-    at = base.start + base.time_step * np.arange(base.samples)
-    points = min(4, t.size) if t.size >= 4 else 2
-    first = np.clip(np.searchsorted(t, at, side="right") - points // 2, 0, t.size - points)
-    nodes = t[first[:, None] + np.arange(points)]
-    result = np.zeros((base.samples, *values.shape[1:]))
-    for j in range(points):
-        weight = np.ones(base.samples)
-        for k in range(points):
-            if k != j:
-                weight *= (at - nodes[:, k]) / (nodes[:, j] - nodes[:, k])
-        result += weight.reshape(-1, *([1] * (values.ndim - 1))) * values[first + j]
-    return result
-
-
-def uniform_blocks(blocks: Iterable[tuple[np.ndarray, np.ndarray]]) -> Iterator[tuple[TimeBase, np.ndarray]]:
-    """Blocks of ascending time stamps (N,) with values (N, m), put on one uniform base as they come.
-
-    The time step is that of the longest stretch of the first block (of at least 200 samples). What follows without a
-    gap continues the base of the block before; after a gap the base starts anew, and `gap` says how long it was. A
-    block may hold back its last samples for the next. Raises `FlexcalError` for fewer than two samples in all.
-    """
-    step, gap, origin, done = 0.0, 0.0, None, 0
-    t, values = np.zeros(0), np.zeros(0)
-    for block_t, block_values, last in _with_last(blocks):
-        t = np.concatenate([t, block_t])
-        values = np.concatenate([values, block_values]) if values.size else block_values
-        if not step and t.size < ENOUGH and not last:
-            continue
-        if not step and t.size < 2:
-            raise FlexcalError("a recording needs at least two samples.")
-        edges = [0, *(gaps(t, step or None) + 1), t.size]
-        if not step:
-            first, end = max(pairwise(edges), key=lambda edge: edge[1] - edge[0])
-            step = fit_time_base(t[first:end]).time_step if end - first > 1 else float(np.median(np.diff(t)))
+    clock: Clock | None = None
+    even: _EvenTimes | None = None
+    stretch, repairs = _Stretch(), np.zeros(3, dtype=int)
+    held = Samples(np.zeros(0), np.zeros((0, 0)))
+    for t, values, last in _with_last(blocks):
+        new = Samples(t, values)
+        if clock is None:
+            new = held = _joined(held, new)
+            if new.t.size < ENOUGH and not last:
+                continue
+        new = in_order(new.t, new.values, positions)
+        repairs += new.repairs
+        if clock is None:
+            if new.t.size < 2:
+                raise FlexcalError("a recording needs at least two samples.")
+            clock = clock_of(new.t, new.values[:, :positions], fill)
+            even = _EvenTimes(clock) if clock.even else None
+            held = Samples(np.zeros(0), new.values[:0])
+        if even is not None:
+            new = _joined(held, Samples(even.times(new.t), new.values))
+        else:
+            new = _joined(held, new)
+            new = merged(in_order(new.t, new.values, 0))
+            repairs += new.repairs
+        t, values = new.t, new.values
+        edges = [0, *(gaps(t, clock.gap) + 1), t.size]
         for first, end in pairwise(edges):
-            piece, whole = t[first:end], last or end < t.size
-            start = _start(piece, step) if origin is None else origin + done * step
-            steps = (piece[-1] - start) / step
-            count = round(steps) + 1 if whole else int(steps) - 2
-            if count > 0:
-                base, part = _placed(piece, values[first:end], start, step, count)
-                yield replace(base, gap=gap), part
-                gap = 0.0
-                origin, done = (start, count) if origin is None else (origin, done + count)
-            if whole:
-                origin, done = None, 0
-                gap = float(t[end] - t[end - 1]) if end < t.size else 0.0
+            found = stretch.push(t[first:end], values[first:end], clock, whole=last or end < t.size)
+            if found is not None:
+                base, part = found
+                ordered, alike, repeated = (int(count) for count in repairs)
+                yield replace(base, sorted=ordered, merged=alike, repeated=repeated), part
+                repairs[:] = 0
+            if end < t.size:
+                stretch = _Stretch(gap=float(t[end] - t[end - 1]))
         kept = edges[-2]
-        if origin is not None:
-            kept += int(np.searchsorted(t[kept:], origin + (done - 3) * step))
-        t, values = t[kept:], values[kept:]
+        if stretch.begun:
+            kept += int(np.searchsorted(t[kept:], stretch.next - _REACH * clock.gap))
+        held = Samples(t[kept:], values[kept:])
 
 
-def _with_last(
-    blocks: Iterable[tuple[np.ndarray, np.ndarray]],
-) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+def _joined(held: Samples, new: Samples) -> Samples:
+    if not held.t.size:
+        return new
+    return Samples(np.concatenate([held.t, new.t]), np.concatenate([held.values, new.values]))
+
+
+def _with_last(blocks: Iterable[_BLOCK]) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
     iterator = iter(blocks)
     held = next(iterator, None)
     while held is not None:
@@ -155,23 +126,105 @@ def _with_last(
         held = following
 
 
+class _EvenTimes:
+    """Times of samples that were taken evenly, from stamps that scatter about them; they follow the stamps from block to block."""
+
+    def __init__(self, clock: Clock) -> None:
+        self._step, self._gap = clock.time_step, clock.gap
+        self._origin, self._number, self._shift = 0.0, 0, 0.0
+        self._last: float | None = None
+
+    def times(self, t: np.ndarray) -> np.ndarray:
+        """Of the samples with the stamps `t` (N,) that follow."""
+        starts = gaps(t, self._gap) + 1
+        if t.size and (self._last is None or t[0] - self._last > self._gap):
+            starts = np.concatenate([[0], starts])
+        edges = np.unique([0, *starts, t.size])
+        found = [self._run(t[a:b], fresh=bool(np.isin(a, starts))) for a, b in pairwise(edges)]
+        self._last = float(t[-1]) if t.size else self._last
+        return np.concatenate([np.zeros(0), *found])
+
+    def _run(self, t: np.ndarray, *, fresh: bool) -> np.ndarray:
+        if fresh:
+            self._origin = float(np.mean(t - self._step * np.arange(t.size)))
+            self._number, self._shift = 0, 0.0
+        even = self._origin + self._step * (self._number + np.arange(t.size))
+        before = self._shift
+        if not fresh and t.size >= ENOUGH:
+            most = 0.5 * self._step * t.size
+            self._shift = before + float(np.clip(np.median(t - even) - before, -most, most))
+        self._number += t.size
+        return even + np.linspace(before, self._shift, t.size)
+
+
+class _Stretch:
+    """Samples without gaps, put on a base that goes on from block to block; `gap` (s) precedes them."""
+
+    def __init__(self, gap: float = 0.0) -> None:
+        self._gap = gap
+        self._start, self._done, self._step = 0.0, 0, 1.0
+
+    @property
+    def begun(self) -> bool:
+        """Whether samples are on the base."""
+        return self._done > 0
+
+    @property
+    def next(self) -> float:
+        """Time of the sample that follows on the base, s."""
+        return self._start + self._done * self._step
+
+    def push(
+        self, t: np.ndarray, values: np.ndarray, clock: Clock, *, whole: bool
+    ) -> tuple[TimeBase, np.ndarray] | None:
+        """What the samples at `t` (N,) complete of the base, if anything: all that they enclose where the stretch ends with them."""
+        step = clock.time_step
+        start = self.next if self.begun else _start(t, step)
+        enclosed = (float(t[-1]) - start) / step
+        count = floor(enclosed + 0.5) + 1 if whole else floor(enclosed - _REACH * clock.gap / step)
+        if count <= 0:
+            return None
+        number = np.rint((t - start) / step)
+        inside = (number >= 0) & (number < count)
+        deviation = (t - start - step * number)[inside]
+        largest = float(np.abs(deviation).max()) if deviation.size else 0.0
+        taken = (
+            deviation.size == count
+            and bool((np.diff(number[inside]) == 1).all())
+            and largest <= JITTER * step
+        )
+        if taken:
+            part = values[inside]
+        else:
+            start = start if self.begun else float(t[0])
+            count = floor((float(t[-1]) - start) / step + _ROUNDING) + 1 if whole else count
+            if count <= 0:
+                return None
+            part = interpolated(t, values, np.clip(start + step * np.arange(count), t[0], t[-1]))
+        if not self.begun:
+            self._start, self._step = start, step
+        self._done += count
+        steps = np.diff(t)
+        base = TimeBase(
+            start,
+            step,
+            count,
+            float(deviation.std()) if deviation.size else 0.0,
+            largest,
+            max(0, count - int(inside.sum())) if clock.regular else 0,
+            not taken,
+            gap=self._gap,
+            shortest=float(steps.min()) if steps.size else step,
+            longest=float(steps.max()) if steps.size else step,
+            regular=clock.regular,
+            even=clock.even,
+        )
+        self._gap = 0.0
+        return base, part
+
+
 def _start(t: np.ndarray, step: float) -> float:
-    return fit_time_base(t, step).start if t.size > 1 else float(t[0])
-
-
-def _placed(
-    t: np.ndarray, values: np.ndarray, start: float, step: float, count: int
-) -> tuple[TimeBase, np.ndarray]:
-    """The values at start + k · step, k < count, with how the time stamps lie about that base."""
-    number = np.rint((t - start) / step)
-    deviation = t - (start + step * number)
-    rows = (number >= 0) & (number < count)
-    jitter = deviation[rows] if rows.any() else np.zeros(1)
-    largest = float(np.abs(jitter).max())
-    lost = count - np.unique(number[rows]).size
-    base = TimeBase(
-        start, step, count, float(jitter.std()), largest, lost, bool(lost) or largest > JITTER * step
-    )
-    if base.resampled and t.size > 1:
-        return base, resample(t, values, base)
-    return base, values[rows]
+    """Of the base under stamps that lie next to it; the first one else."""
+    number = np.rint((t - t[0]) / step)
+    start = float(t[0] + np.mean(t - t[0] - step * number))
+    return float(t[0]) if abs(start - t[0]) < 1e-6 * step else start

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Column, Memory
-from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion import Motion, stretches
 from flexcal.dynamics.rows import Experiment
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
@@ -56,13 +57,14 @@ class ArmYield:
 
     `shift` (T, n) N m is the torque of the yielding arm less that of the rigid one at the instants `time` (T,). `slopes` (T, n, s) are the
     derivatives by the `sources`, in estimation coordinates: by inertials those of the shift, for the columns of links have those of the
-    rigid arm, by others those of the torque.
+    rigid arm, by others those of the torque. Where the recording has gaps, stretches of it begin at the indices `starts`.
     """
 
     time: np.ndarray
     shift: np.ndarray
     slopes: np.ndarray
     sources: tuple[str, ...]
+    starts: tuple[int, ...] = (0,)
 
     @classmethod
     def of(
@@ -70,9 +72,19 @@ class ArmYield:
     ) -> ArmYield:
         """Along a recording, of the `model` with `payload` (kg; None: the one that it has), which tells on which flanks drives rest.
 
-        Raises `FlexcalError` for a recording of less than half a second.
+        Stretches of less than half a second are left out; raises `FlexcalError` where there is no longer one.
         """
-        motion = _slow(experiment)
+        each = [cls._along(model, motion, sources, payload) for motion in _slow(experiment)]
+        time, shift, slopes = (
+            np.concatenate([getattr(part, name) for part in each]) for name in ("time", "shift", "slopes")
+        )
+        starts = np.cumsum([0, *(len(part.time) for part in each[:-1])])
+        return cls(time, shift, slopes, tuple(sources), tuple(int(start) for start in starts))
+
+    @classmethod
+    def _along(
+        cls, model: RobotModel, motion: Motion, sources: Sequence[str], payload: float | None
+    ) -> ArmYield:
         states, course = (motion.q, motion.dq, motion.ddq), _Course(motion.time)
         flanks = None
         if model.elastic:
@@ -99,14 +111,19 @@ class ArmYield:
         return cls(motion.time, shift(model), slopes, tuple(sources))
 
     @cached_property
-    def _curves(self) -> Any:
+    def _curves(self) -> list[Any]:
+        """Of every stretch."""
         from scipy.interpolate import CubicSpline
 
-        return CubicSpline(self.time, np.concatenate([self.shift[:, :, None], self.slopes], axis=2))
+        values = np.concatenate([self.shift[:, :, None], self.slopes], axis=2)
+        edges = pairwise((*self.starts, len(self.time)))
+        return [CubicSpline(self.time[start:end], values[start:end]) for start, end in edges]
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         """For every joint the shift, then the slopes."""
-        values = self._curves(np.clip(motion.time, self.time[0], self.time[-1]))
+        stretch = max(0, int(np.searchsorted(self.time[list(self.starts)], motion.time[0], side="right")) - 1)
+        curves = self._curves[stretch]
+        values = curves(np.clip(motion.time, curves.x[0], curves.x[-1]))
         for k, name in enumerate((YIELD, *map(error_column, self.sources))):
             for joint in range(model.n):
                 yield Column(name, joint, values[:, joint, k])
@@ -129,18 +146,22 @@ class _Course:
         return self(_low_passed(flanks, float(self.time[1] - self.time[0])))
 
 
-def _slow(experiment: Experiment) -> Motion:
-    """What a low-pass leaves of an experiment, every so many samples, the last one among them."""
-    whole = Motion.joined(experiment.blocks())
-    step = float(whole.time[1] - whole.time[0])
-    if len(whole) * step < _SHORTEST:
-        raise FlexcalError(
-            f"{experiment.name}: {len(whole) * step:.2g} s of motion are too short; record for longer."
-        )
-    stride = max(1, int(1.0 / (_RATE_HZ * step)))
-    some = slice((len(whole) - 1) % stride, None, stride)
-    q, dq, ddq = (_low_passed(values, step)[some] for values in (whole.q, whole.dq, whole.ddq))
-    return Motion(whole.time[some], q, dq, ddq, whole.torque[some])
+def _slow(experiment: Experiment) -> list[Motion]:
+    """What a low-pass leaves of every stretch of an experiment, every so many samples, the last one among them."""
+    found, longest = [], 0.0
+    for stretch in stretches(experiment.blocks()):
+        whole = Motion.joined(stretch)
+        step = float(whole.time[1] - whole.time[0]) if len(whole) > 1 else 0.0
+        longest = max(longest, len(whole) * step)
+        if len(whole) * step < _SHORTEST:
+            continue
+        stride = max(1, int(1.0 / (_RATE_HZ * step)))
+        some = slice((len(whole) - 1) % stride, None, stride)
+        q, dq, ddq = (_low_passed(values, step)[some] for values in (whole.q, whole.dq, whole.ddq))
+        found.append(Motion(whole.time[some], q, dq, ddq, whole.torque[some]))
+    if not found:
+        raise FlexcalError(f"{experiment.name}: {longest:.2g} s of motion are too short; record for longer.")
+    return found
 
 
 def _low_passed(values: np.ndarray, step: float) -> np.ndarray:

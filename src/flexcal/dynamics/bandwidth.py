@@ -47,15 +47,18 @@ def motion_bandwidth(recordings: Iterable[Recording]) -> MotionBandwidth:
 
 
 def _segments(recordings: Iterable[Recording]) -> Iterator[tuple[float, np.ndarray]]:
-    """Positions of an even number of samples, all of one length, with their time step; the last ones may be left out."""
-    held, step, whole = np.zeros((0, 0)), 0.0, False
+    """Positions of an even number of samples without gaps, all of one length, with their time step; the last ones may be left out."""
+    held, longest = np.zeros((0, 0)), np.zeros((0, 0))
+    step, whole = 0.0, False
     for recording in recordings:
-        step = recording.time_step
-        held = np.concatenate([held, recording.q]) if held.size else recording.q
+        step, base = recording.time_step, recording.time_base
+        begins = not held.size or (base is not None and base.gap > 0)
+        held = recording.q if begins else np.concatenate([held, recording.q])
+        longest = max(longest, held, key=len)
         length = 2 * round(_SEGMENT / step / 2)
         while len(held) >= length:
             whole = True
             yield step, held[:length]
             held = held[length:]
     if not whole:
-        yield step, held[: len(held) // 2 * 2]
+        yield step, longest[: len(longest) // 2 * 2]

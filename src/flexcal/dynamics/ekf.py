@@ -45,8 +45,9 @@ def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
     for _ in range(_PASSES):
         state = _Filter(data, unknowns, state.parameters)
         for sigma, experiment, window in zip(torque, recorded.experiments, recorded.windows, strict=True):
-            state.restart()
             for steps in forward_steps(recorded.observation, experiment, window, slowest_speeds(experiment)):
+                if steps.begins:
+                    state.restart()
                 density = sigma**2 * recorded.decimation.factor * steps.spacing
                 state.follow(steps, np.sqrt(density / steps.length))
     found, kept = state.parameters, unknowns.kept

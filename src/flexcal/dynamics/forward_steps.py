@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Memory
-from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion import Motion, stretches
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment, Window
 
@@ -28,8 +28,8 @@ class ForwardSteps:
 
     Samples are `spacing` (s) apart. `torque` (N, n), the external one included, and `state` (N, 2, n), q and q̇; `columns` (N, n, p) are W
     with the measured accelerations of `middle`, and `inertia` (N, n, n, p) its derivative by each: M = inertia χ. `still` (N,) marks steps
-    in which the robot stands; `before` and `after` (N, n) are the positions measured at their ends, `speed` (N, n) the velocity at the
-    start.
+    in which the robot stands; `begins` says that a gap precedes them, or nothing; `before` and `after` (N, n) are the positions measured at
+    their ends, `speed` (N, n) the velocity at the start.
     """
 
     length: float
@@ -39,6 +39,7 @@ class ForwardSteps:
     columns: np.ndarray
     inertia: np.ndarray
     still: np.ndarray
+    begins: bool
     before: np.ndarray
     after: np.ndarray
     speed: np.ndarray
@@ -72,21 +73,27 @@ def forward_steps(
     Friction that remembers does so from the start of the experiment on.
     """
     memory: Memory = {}
-    held: Motion | None = None
-    for block in experiment.blocks():
-        first, last = np.searchsorted(block.time, [window.start, window.end])
-        if first:
-            observation.follow(block.part(0, first), memory)
-        if first == last:
-            continue
-        motion = block.part(first, last)
-        motion = motion if held is None else Motion.joined([held, motion])
-        stride = max(1, int(_STEP / float(motion.time[1] - motion.time[0]) + 1e-6)) if len(motion) > 1 else 1
-        count = (len(motion) - 1) // stride
-        for start in range(0, count, _TOGETHER):
-            stop = min(start + _TOGETHER, count)
-            yield _steps(observation, motion.part(start * stride, stop * stride + 1), stride, memory, slowest)
-        held = motion.part(count * stride, len(motion))
+    for stretch in stretches(experiment.blocks()):
+        held: Motion | None = None
+        begins = True
+        for block in stretch:
+            first, last = np.searchsorted(block.time, [window.start, window.end])
+            if first:
+                observation.follow(block.part(0, first), memory)
+            if first == last:
+                continue
+            motion = block.part(first, last)
+            motion = motion if held is None else Motion.joined([held, motion])
+            stride = (
+                max(1, int(_STEP / float(motion.time[1] - motion.time[0]) + 1e-6)) if len(motion) > 1 else 1
+            )
+            count = (len(motion) - 1) // stride
+            for start in range(0, count, _TOGETHER):
+                stop = min(start + _TOGETHER, count)
+                part = motion.part(start * stride, stop * stride + 1)
+                yield replace(_steps(observation, part, stride, memory, slowest), begins=begins)
+                begins = False
+            held = motion.part(count * stride, len(motion))
 
 
 def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndarray:
@@ -127,6 +134,7 @@ def _steps(
         whole,
         inertia,
         np.array(stands),
+        False,
         motion.q[at][:-1],
         motion.q[at][1:],
         motion.dq[at][:-1],

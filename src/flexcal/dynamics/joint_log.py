@@ -11,7 +11,7 @@ from tempfile import NamedTemporaryFile
 
 import numpy as np
 
-from flexcal.data import Recording, read_recording_blocks
+from flexcal.data import Recording, TimeSummary, read_recording_blocks
 from flexcal.dynamics.carried_weight import CarriedWeight
 from flexcal.dynamics.joint_loads import external_torque
 from flexcal.dynamics.log_faults import MOVES, LogFaults
@@ -28,8 +28,9 @@ class JointLog:
     """The log at `path`, its positions low-pass filtered at `cutoff_hz`: with the torques in the file `filtered`, in parts that begin at
     `starts`, s.
 
-    The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `span` are the
-    times of the first and the last sample of the log itself, s. `payload` is kg, as the column `payload` says, None where there is
+    The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `spans` are the
+    times of the first and the last sample before, between and after the gaps of the log itself, s; `time_stamps` says what was done with
+    its time stamps, empty where they were uniform. `payload` is kg, as the column `payload` says, None where there is
     none; `weight` is what its torques carry; `wrench` tells whether it has a force sensor's columns. A joint that never moves has no
     velocity and no acceleration: what its encoder shows of them is noise, of which friction would take the sign.
     """
@@ -42,7 +43,8 @@ class JointLog:
     time_step: float
     top_speed: np.ndarray
     rest: np.ndarray
-    span: tuple[float, float]
+    spans: tuple[tuple[float, float], ...]
+    time_stamps: str
     payload: float | None
     weight: CarriedWeight
     wrench: bool = False
@@ -56,14 +58,22 @@ class JointLog:
         where the folder cannot take it.
         """
         faults = LogFaults(path, model)
-        read: list[tuple[float, float, float]] = []
+        spans: list[tuple[float, float]] = []
+        summary, steps = TimeSummary(), []
         held: list[float] = []
         sensed: list[bool] = []
         carried = [CarriedWeight.empty(model.n)]
 
         def watched() -> Iterator[Recording]:
             for recording in log_blocks(path, model):
-                read.append((recording.start, recording.start + recording.duration, recording.time_step))
+                base, end = recording.time_base, recording.start + recording.duration
+                steps.append(recording.time_step)
+                if base is not None:
+                    summary.add(base)
+                if spans and not (base and base.gap):
+                    spans[-1] = (spans[-1][0], end)
+                else:
+                    spans.append((recording.start, end))
                 if recording.payload is not None:
                     held.append(float(recording.payload[0]))
                 sensed.append(recording.force is not None)
@@ -99,17 +109,19 @@ class JointLog:
             raise InputError(f"{path}: {problem}") from problem
         rests = highest - lowest < MOVES
         top_speed[rests] = 0.0
-        span = (read[0][0], read[-1][1])
+        used = tuple(span for span in spans if any(span[0] <= start <= span[1] for start in starts))
+        summary.short = sum(end - start for start, end in spans if (start, end) not in used)
         return cls(
             path,
             cutoff_hz,
             Path(stream.name),
             tuple(starts),
             samples,
-            read[0][2],
+            steps[0],
             top_speed,
             np.where(rests, 0.5 * (lowest + highest), np.nan),
-            span,
+            used,
+            summary.sentence,
             held[0] if held else None,
             reduce(add, carried),
             any(sensed),
@@ -119,6 +131,20 @@ class JointLog:
     def name(self) -> str:
         """The path of the log."""
         return str(self.path)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """Times of the first and the last sample, s."""
+        return self.spans[0][0], self.spans[-1][1]
+
+    def last(self, share: float) -> float:
+        """The time from which on the last `share` of the recorded time lies, s; gaps do not count."""
+        left = share * sum(end - start for start, end in self.spans)
+        for start, end in reversed(self.spans):
+            if left <= end - start:
+                return end - left
+            left -= end - start
+        return self.span[0]
 
     def blocks(self) -> Iterator[Motion]:
         """The filtered motion in parts that follow each other."""
@@ -135,15 +161,10 @@ class JointLog:
 
 
 def log_blocks(path: Path, model: RobotModel) -> Iterator[Recording]:
-    """The recording of a log in parts that follow each other, its external torque that of everything that acts beside the motors.
+    """The recording of a log in parts that follow each other, or come after a gap, as their `time_base` says, its external torque that of
+    everything that acts beside the motors.
 
-    Raises `InputError` as `read_recording` does, and for a gap.
+    Raises `InputError` as `read_recording_blocks` does.
     """
     for recording in read_recording_blocks(path, model, rows=_ROWS):
-        base = recording.time_base
-        if base is not None and base.gap > 0:
-            raise InputError(
-                f"{path}: a gap of {base.gap:.6g} s precedes the sample at {recording.start:.9g} s, where "
-                f"{base.time_step:.6g} s is usual; record again, or cut the log there into two files."
-            )
         yield replace(recording, external_torque=external_torque(model, recording))

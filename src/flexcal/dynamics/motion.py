@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, groupby
 from typing import Literal
 
 import numpy as np
 
 from flexcal.data import Recording
-from flexcal.data.low_pass import LowPass
+from flexcal.data.low_pass import LowPass, TooFewSamples
 from flexcal.dynamics.arm_side import ArmSide
 
 TorqueLog = Literal["held", "instantaneous", "mean"]
@@ -20,6 +20,8 @@ AT_REST = 1e-3
 """rad/s or m/s, below which a joint is at rest: there it is noise that seems to move it."""
 _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
+_APART = 1.5
+"""Steps from one sample to the next, at least, across a gap."""
 _BESIDE = 2
 """Samples on either side that the second difference of first differences takes."""
 
@@ -142,10 +144,54 @@ def filtered_positions(
     A logged `torque` that is held until the next sample, or is the mean until then, belongs to the middle of that step: the torque at a
     sample is the mean of its own and the one before. Half a sample of delay between torque and twist would count as K T/2 of damping.
 
-    `recordings` follow each other without a seam, as blocks of one log; so do the parts, and they do not depend on where the blocks
-    are cut. Samples nearer to an end than one period of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all
-    the samples are too few for it.
+    `recordings` follow each other as blocks of one log; so do the parts, and they do not depend on where the blocks are cut. What lies
+    between two gaps of the log is filtered by itself, and left out where it is too short for that. Samples nearer to an end than one period
+    of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all the samples are too few for it.
     """
+    short: TooFewSamples | None = None
+    long = False
+    for stretch in _between_gaps(recordings):
+        try:
+            for part in _filtered(stretch, cutoff_hz, torque):
+                long = True
+                yield part
+        except TooFewSamples as problem:
+            short = short or problem
+    if short is not None and not long:
+        raise short
+
+
+def stretches(motions: Iterable[Motion]) -> Iterator[Iterator[Motion]]:
+    """The parts of a motion, those together between which there is no gap."""
+    last, step, number = -np.inf, np.inf, 0
+
+    def stretch(motion: Motion) -> int:
+        nonlocal last, step, number
+        step = float(motion.time[1] - motion.time[0]) if len(motion) > 1 else step
+        number += bool(motion.time[0] - last > _APART * step)
+        last = float(motion.time[-1])
+        return number
+
+    for _, group in groupby((motion for motion in motions if len(motion)), stretch):
+        yield group
+
+
+def _between_gaps(recordings: Iterable[Recording]) -> Iterator[Iterator[Recording]]:
+    number = 0
+
+    def stretch(recording: Recording) -> int:
+        nonlocal number
+        base = recording.time_base
+        number += base is not None and base.gap > 0
+        return number
+
+    for _, group in groupby(recordings, stretch):
+        yield group
+
+
+def _filtered(
+    recordings: Iterable[Recording], cutoff_hz: float, torque: TorqueLog
+) -> Iterator[FilteredPositions]:
     iterator = iter(recordings)
     first = next(iterator)
     step = first.time_step

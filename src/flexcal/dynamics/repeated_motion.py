@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion import Motion, stretches
 from flexcal.dynamics.rows import Experiment, Window, slowest_speeds
 from flexcal.errors import FlexcalError
 
@@ -44,10 +44,14 @@ class RepeatedMotion:
     def of(cls, experiment: Experiment, window: Window) -> RepeatedMotion:
         """All whole periods of an experiment inside the window, from where the robot begins to move there.
 
-        The period is the shortest lag after which positions are the same to 1 % of their amplitude. Raises `FlexcalError` for a motion
-        that does not repeat, or does so less than four times.
+        Of a recording with gaps, those of the longest stretch. The period is the shortest lag after which positions are the same to 1 %
+        of their amplitude. Raises `FlexcalError` for a motion that does not repeat, or does so less than four times.
         """
-        motion = _moving(Motion.joined(experiment.blocks()), window, slowest_speeds(experiment))
+        slowest = slowest_speeds(experiment)
+        each = (
+            _moving(Motion.joined(stretch), window, slowest) for stretch in stretches(experiment.blocks())
+        )
+        motion = max(each, key=len)
         size = _period(motion.q)
         count = len(motion) // size if size else 0
         if count < FEWEST:

@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.equations import Equations
-from flexcal.dynamics.motion import AT_REST, Motion
+from flexcal.dynamics.motion import AT_REST, Motion, stretches
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
@@ -102,15 +102,39 @@ def rows(
 ) -> Iterator[Rows]:
     """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 
-    Memory does not grow with the recording. A pass with the same arguments gives the same blocks again.
+    No row reaches across a gap of the experiment. Memory does not grow with the recording. A pass with the same arguments gives the same
+    blocks again.
     """
-    ends = np.cumsum(observation.widths)
-    slowest = slowest_speeds(experiment)
-    stream = DecimationStream(decimation)
-    centres = _Centres(decimation)
     memory: Memory = {}
+    slowest = slowest_speeds(experiment)
+    done = 0
+
+    def counted(motions: Iterable[Motion]) -> Iterator[Motion]:
+        nonlocal done
+        for motion in motions:
+            done += len(motion)
+            yield motion
+
+    for stretch in stretches(experiment.blocks()):
+        first = -(-done // decimation.factor)
+        yield from _stretch_rows(observation, counted(stretch), slowest, decimation, window, memory, first)
+
+
+def _stretch_rows(
+    observation: Equations,
+    motions: Iterable[Motion],
+    slowest: np.ndarray,
+    decimation: Decimation,
+    window: Window,
+    memory: Memory,
+    first: int,
+) -> Iterator[Rows]:
+    """The rows of motions without gaps, from the number `first` on; friction remembers what was before."""
+    ends = np.cumsum(observation.widths)
+    stream = DecimationStream(decimation)
+    centres = _Centres(decimation, first)
     reach = math.inf
-    for start, piece in _pieces(experiment.blocks(), decimation.factor * max(1, _BLOCK // decimation.factor)):
+    for start, piece in _pieces(motions, decimation.factor * max(1, _BLOCK // decimation.factor)):
         if len(piece) > 1:
             reach = (decimation.support + 1) * float(piece.time[1] - piece.time[0])
         if piece.time[-1] < window.start - reach:
@@ -140,15 +164,16 @@ class _Centres:
     sign of a velocity tells, and the row holds a part of it.
     """
 
-    def __init__(self, decimation: Decimation) -> None:
+    def __init__(self, decimation: Decimation, number: int) -> None:
         self._decimation = decimation
+        self._start = number
         self._number: int | None = None
         self._first = decimation.support
         self._held = np.zeros((2, 0))
 
     def push(self, start: int, time: np.ndarray, still: np.ndarray) -> None:
         if self._number is None:
-            self._number = start // self._decimation.factor
+            self._number = self._start + start // self._decimation.factor
         self._held = np.hstack([self._held, [time, still]])
 
     def pop(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.filtering import Decimation
-from flexcal.data.low_pass import LowPass
+from flexcal.data.low_pass import LowPass, TooFewSamples
 from flexcal.dynamics.closed_loop import ClosedLoop, Target
-from flexcal.dynamics.motion import Motion, differences, smoothed
+from flexcal.dynamics.motion import Motion, differences, smoothed, stretches
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.rows import Experiment
 from flexcal.dynamics.simulated_robot import SimulatedRobot
@@ -31,7 +31,8 @@ class SimulatedExperiment:
     The path to track is the recorded one through one more low-pass, at a tenth of the rate of the rows that `decimation` makes of it; the
     torque that a declared controller is given beforehand is the measured one, through the same, and so is τ_ext. Without a controller
     the loop is critically damped, its natural frequency half that rate. Where samples are denser than the loop needs, accelerations are the
-    same over several. A joint that never moves does not yield to its loads either. Raises `FlexcalError` as `ClosedLoop.reach` does.
+    same over several. A joint that never moves does not yield to its loads either. What lies between two gaps and is too short for that
+    low-pass stays as it was recorded. Raises `FlexcalError` as `ClosedLoop.reach` does.
     """
 
     observation: Observation
@@ -56,8 +57,22 @@ class SimulatedExperiment:
 
     def blocks(self) -> Iterator[Motion]:
         """The simulated motion in parts that follow each other, with the measured torques, the external ones among them."""
+        for stretch in stretches(self.experiment.blocks()):
+            recorded: list[Motion] = []
+            simulated = False
+            try:
+                for motion in self._simulated(_kept(stretch, recorded)):
+                    simulated = True
+                    recorded.clear()
+                    yield motion
+            except TooFewSamples:
+                if simulated:
+                    raise
+                yield from recorded
+
+    def _simulated(self, motions: Iterator[Motion]) -> Iterator[Motion]:
+        """The same of motions without gaps."""
         n, rests = self.observation.model.n, self.top_speed == 0
-        motions = iter(self.experiment.blocks())
         first = next(motions)
         step = float(first.time[1] - first.time[0])
         robot = SimulatedRobot(self.observation, self.parameters, self.name)
@@ -89,3 +104,10 @@ class SimulatedExperiment:
             q = states[:, 0] + later * (states[:, 1] + 0.5 * later * ddq)
             q[:, rests], dq[:, rests], ddq[:, rests] = x[:, :n][:, rests], 0.0, 0.0
             yield Motion(time, q, dq, ddq, torque)
+
+
+def _kept(motions: Iterator[Motion], kept: list[Motion]) -> Iterator[Motion]:
+    """The motions, each of which is in `kept` before it is used."""
+    for motion in motions:
+        kept.append(motion)
+        yield motion

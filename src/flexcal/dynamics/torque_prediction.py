@@ -14,6 +14,8 @@ _LONGEST_SEGMENT = 512
 _SEGMENTS = 4
 """A recording is cut into no fewer segments for its spectra, side by side, unless it is very short."""
 _SHORTEST_SEGMENT = 8
+_APART = 1.5
+"""Steps from one row to the next, at least, across a gap."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +64,8 @@ def predict_torques(
     for block in rows(observation, experiment, decimation, Window()):
         steps = np.diff(np.concatenate([[before], block.time]))
         step = step if np.isfinite(step) else float(steps[-1])
+        if steps[0] > _APART * step:
+            spectrum.interrupt()
         before = float(block.time[-1])
         torque = block.torque[:n].T
         model = block.predicted(observation.members, parameters)[:n].T
@@ -110,6 +114,10 @@ class _Spectrum:
             self._segments += 1
             held = held[self._length // 2 :]
         self._held = held
+
+    def interrupt(self) -> None:
+        """A gap precedes the next rows: no segment reaches across it."""
+        self._held = None
 
     def density(self, step: float, width: int) -> tuple[np.ndarray, np.ndarray]:
         """Frequencies (F,), Hz, and one-sided densities (F, k) of rows that are `step` (s) apart, without the mean at 0 Hz."""

@@ -36,6 +36,7 @@ from flexcal.workflow.results import write_results
 from flexcal.workflow.robot_dynamics import RobotDynamics
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import treatment_of
+from flexcal.workflow.used_signals import used_signals
 
 
 def identify_robot_dynamics(
@@ -131,6 +132,7 @@ def identify_robot_dynamics(
             friction=friction,
             motors=observation.motors,
             treatment=treatment,
+            signals=used_signals(treatment, divided.logs),
             weight_faults=tuple(weight_faults(divided.logs, model)),
             external=external,
             learned=learned,

@@ -34,20 +34,22 @@ from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.log_wrenches import require_no_wrenches
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.treatment import treatment_of
+from flexcal.workflow.used_signals import used_signals
 
 
 @dataclass(frozen=True, eq=False)
 class IdentifiedGains:
     """Drive gains: `factors` to the `declared` gains (n,) of `signals: tau:`, which are 1 where there are none.
 
-    `halves` are the factors from each half of the recordings, None where a half alone does not determine them. `payloads` are kg by log;
-    `provenance` has all files with their hashes, `command` the command line, where there was one.
+    `halves` are the factors from each half of the recordings, None where a half alone does not determine them. `payloads` are kg by log,
+    `signals` as `used_signals` has them; `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     factors: Estimate
     halves: HalfGains | None
     declared: np.ndarray
     payloads: tuple[float, ...]
+    signals: Mapping[str, Any]
     robot: str
     provenance: Mapping[str, str]
     command: str = ""
@@ -78,6 +80,7 @@ class IdentifiedGains:
             "verdict": self.trust.document(),
             "declared_gains": list(self.declared),
             "gains": self.gains,
+            "signals": dict(self.signals),
             "payloads_kg": list(self.payloads),
             "provenance": dict(self.provenance),
             "command": self.command,
@@ -118,6 +121,7 @@ def identify_gains(
         half_gains(observation, base, systems, payloads),
         declared,
         tuple(payloads),
+        used_signals(treatment, read),
         model.name,
         provenance([robot, model.urdf, *logs]),
         command,

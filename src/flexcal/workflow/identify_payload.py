@@ -40,6 +40,7 @@ from flexcal.workflow.recorded_logs import RecordedLogs, recorded_with
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
+from flexcal.workflow.used_signals import used_signals
 
 _ROUGH = 2
 """Fits of an elastic robot before the last one, each with the springs loaded by the payload of the one before."""
@@ -53,7 +54,7 @@ _SENSELESS = 0.5
 class RobotPayload:
     """The `fit` of the recordings `loaded` and `free`, the `model` with it, the robot's other `blocks`, and where the estimate was written.
 
-    `declared` is the robot of robot.yaml alone, `command` the command line, where there was one.
+    `declared` is the robot of robot.yaml alone, `signals` are as `used_signals` has them, `command` the command line, where there was one.
     """
 
     declared: RobotModel
@@ -61,7 +62,7 @@ class RobotPayload:
     frame: str
     fit: PayloadFit
     blocks: Mapping[Block, Estimate]
-    treatment: Treatment
+    signals: Mapping[str, Any]
     loaded: tuple[Path, ...]
     free: tuple[Path, ...]
     estimates: Path
@@ -97,11 +98,7 @@ class RobotPayload:
             "robot_mass_kg": float(self.declared.mass.sum()),
             "body_rise": fit.rise,
             "other_payloads": other_payloads(fit.estimate, self.blocks),
-            "signals": {
-                "cutoff_hz": self.treatment.cutoff_hz,
-                "decimation": self.treatment.decimation.factor,
-                "proposed": list(self.treatment.proposed),
-            },
+            "signals": dict(self.signals),
             "weight_faults": list(self.weight_faults),
             "remarks": list(payload_remarks(fit, self.declared, self.blocks)),
             "estimates": self.estimates,
@@ -210,7 +207,7 @@ def identify_robot_payload(
         frame=frame,
         fit=replace(fit, estimate=estimate),
         blocks=blocks,
-        treatment=treatment,
+        signals=used_signals(treatment, read),
         loaded=loaded.files,
         free=unloaded.files,
         estimates=target,

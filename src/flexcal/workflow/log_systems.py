@@ -81,8 +81,7 @@ def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window,
     """What of a log is fitted, and its last share `hold_out` of time, if there is one; the filters reach from neither into the other."""
     if hold_out == 0:
         return Window(), None
-    start, end = log.span
-    border = end - hold_out * (end - start)
+    border = log.last(hold_out)
     reach = treatment.decimation.support * log.time_step
     return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
 

@@ -25,9 +25,10 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
-    whose motors have equations of their own. `weight_faults` are torques unlike the links' weight that were accepted, `external` tells how
-    much of the measured external torques the motors' show, None without a force sensor. `learned` is what was learned beside the estimate,
-    None where nobody asked for it; `provenance` has all files with their hashes, `command` the command line, where there was one.
+    whose motors have equations of their own; `signals` are as `used_signals` has them. `weight_faults` are torques unlike the links' weight
+    that were accepted, `external` tells how much of the measured external torques the motors' show, None without a force sensor. `learned`
+    is what was learned beside the estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the
+    command line, where there was one.
     """
 
     estimate: Estimate
@@ -41,6 +42,7 @@ class RobotDynamics:
     friction: FrictionSelection
     motors: tuple[str, ...]
     treatment: Treatment
+    signals: Mapping[str, Any]
     weight_faults: tuple[str, ...]
     external: ExternalShare | None
     learned: LearnedDynamics | None
@@ -85,11 +87,7 @@ class RobotDynamics:
             "error_percent": percent,
             "hold_out": {"share": self.hold_out, "logs": [str(log) for log in self.validated]},
             "bodiless_links": list(self.bodiless),
-            "signals": {
-                "cutoff_hz": self.treatment.cutoff_hz,
-                "decimation": self.treatment.decimation.factor,
-                "proposed": list(self.treatment.proposed),
-            },
+            "signals": dict(self.signals),
             "friction_terms": list(self.friction.names),
             "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
             "friction_tried": [

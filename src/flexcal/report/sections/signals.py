@@ -10,7 +10,7 @@ from flexcal.report.page import Table
 
 
 def signals_table(signals: Mapping[str, Any]) -> Table:
-    """Cut-off and decimation, and who chose them, from `signals` of results.json."""
+    """Cut-off and decimation, who chose them, and the treatment of irregular time stamps, from `signals` of results.json."""
 
     def origin(key: str) -> str:
         return "chosen by flexcal" if key in signals["proposed"] else "robot.yaml"
@@ -18,5 +18,9 @@ def signals_table(signals: Mapping[str, Any]) -> Table:
     rows = (
         ("low-pass cut-off of the positions / Hz", significant(signals["cutoff_hz"]), origin("cutoff_hz")),
         ("decimation: samples to one row", str(signals["decimation"]), origin("decimation")),
+        *(
+            (f"time stamps of {log}", words, "the log")
+            for log, words in signals.get("time_stamps", {}).items()
+        ),
     )
     return Table("table-signals", "Signals used", ("what", "value", "from"), rows, text_columns=(2,))

@@ -1,0 +1,30 @@
+"""Treatment of logs in results.json and in words."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from flexcal.dynamics import JointLog
+from flexcal.workflow.treatment import Treatment
+
+
+def used_signals(treatment: Treatment, logs: Sequence[JointLog]) -> dict[str, Any]:
+    """The entry `signals` of results.json: filters, and what was done with the time stamps of each log where they are not uniform."""
+    return {
+        "cutoff_hz": treatment.cutoff_hz,
+        "decimation": treatment.decimation.factor,
+        "proposed": list(treatment.proposed),
+        "time_stamps": {str(log.path): log.time_stamps for log in logs if log.time_stamps},
+    }
+
+
+def signal_sentences(signals: Mapping[str, Any]) -> list[str]:
+    """The same in words: what was proposed, and the treatment of time stamps."""
+    said = []
+    if signals["proposed"]:
+        said.append(
+            f"proposed from the spectrum of the motion, because robot.yaml lacks {' and '.join(signals['proposed'])}: "
+            f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
+        )
+    return said + [f"{log}: {words}" for log, words in signals["time_stamps"].items()]
