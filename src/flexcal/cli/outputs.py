@@ -92,6 +92,11 @@ def _present(folder: Path, patterns: Sequence[str]) -> dict[Path, tuple[int, int
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in sorted(files)}
 
 
+def written_in(folder: Path) -> dict[str, str]:
+    """SHA-256 by name of what flexcal wrote into a folder."""
+    return {name: digest for name, (digest, _) in _ledger(folder).items()}
+
+
 def _ledger(folder: Path) -> dict[str, tuple[str, str]]:
     """Digest and verb of every file; the verb is empty where an older flexcal did not write it down."""
     path, verb = folder / LEDGER, ""

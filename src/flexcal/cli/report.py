@@ -11,6 +11,7 @@ from tyro.conf import Positional, arg
 from flexcal.cli.console import Console
 from flexcal.cli.options import Json, MaybePath
 from flexcal.cli.particulars import ParticularsOptions
+from flexcal.cli.stored_files import stored_files
 from flexcal.errors import InputError
 
 
@@ -56,21 +57,24 @@ class Report(ParticularsOptions):
             return
         from flexcal.workflow.report_folder import report_folder
 
-        written = report_folder(self.folder)
+        with stored_files(self.folder):
+            written = report_folder(self.folder)
         console.say(f"wrote {written}, from the numbers stored beside it")
         console.finish({"report": written}, f"open {written}")
 
     def _for_customer(self, console: Console) -> None:
         from flexcal.workflow.customer_report import customer_report
 
-        written = customer_report(self.folder, self.particulars)
+        with stored_files(self.folder):
+            written = customer_report(self.folder, self.particulars)
         console.say(f"wrote {written}: two sheets of A4")
         console.finish({"report": written}, f"open {written}, and print it or save it as PDF")
 
     def _compare(self, console: Console, other: Path) -> None:
         from flexcal.workflow.compare_folders import compare_folders
 
-        document = compare_folders(self.folder, other)
+        with stored_files(self.folder, other):
+            document = compare_folders(self.folder, other)
         first, second = document["runs"]
         difference = document["difference_mm"]
         real = "significant" if difference["significant"] else "not significant"

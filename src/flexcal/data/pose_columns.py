@@ -13,6 +13,9 @@ from flexcal.structuring import suggestion
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
 
+_HIGHEST = 2.0**53
+"""Whole numbers up to here are exact in a table."""
+
 
 def first_point(file: TableFile, model: RobotModel) -> str:
     """The default target; raises `InputError` where robot.yaml declares none."""
@@ -63,6 +66,11 @@ def whole_numbers(table: Table, column: str, values: np.ndarray) -> np.ndarray:
     if (values != np.rint(values)).any():
         row = int(np.argmax(values != np.rint(values)))
         raise table.error(row, column, f"{values[row]:g} is no whole number; number the poses.")
+    if (np.abs(values) > _HIGHEST).any():
+        row = int(np.argmax(np.abs(values) > _HIGHEST))
+        raise table.error(
+            row, column, f"{values[row]:g} is too large for the number of a pose; number the poses."
+        )
     return values.astype(np.int64)
 
 

@@ -166,7 +166,9 @@ def _choose(file: TableFile, quantity: str, n: int, mapped: Signal | None, requi
 
 
 def _check_joint_count(file: TableFile, quantity: str, n: int) -> None:
-    numbers = [int(m[1]) for name in file.columns if (m := re.fullmatch(rf"{quantity}([1-9][0-9]*)", name))]
+    numbers = [
+        int(m[1]) for name in file.columns if (m := re.fullmatch(rf"{quantity}([1-9][0-9]{{0,4}})", name))
+    ]
     count = len(numbers)
     if count and sorted(numbers) == list(range(1, count + 1)) and count != n:
         raise file.error(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import io
-import math
 from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,6 +13,7 @@ import numpy as np
 
 from flexcal.atomic import atomic_path
 from flexcal.errors import InputError
+from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
     import polars as pl
@@ -23,6 +23,8 @@ _SHOWN = 4
 BLOCK_BYTES = 64 * 2**20
 _DECODED = 100_000
 """Rows of Parquet that are decoded together: to slice some, all of their row group is."""
+_QUOTED = 20
+"""Letters of a number that a message quotes."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +195,11 @@ def _csv_header(path: Path, stream: BinaryIO) -> tuple[tuple[str, ...], int]:
         text = _decoded(path, raw, number).lstrip("\ufeff").strip()
         if not text or text.startswith("#"):
             continue
-        names = tuple(name.strip() for name in next(csv.reader([text])))
+        if "\r" in text:
+            raise InputError(
+                f"{path} line {number}: lines end with CR alone; save the file with other line ends, or let 'flexcal import' read it."
+            )
+        names = tuple(_row(path, number, text))
         if len(names) == 1 and any(mark in text for mark in ";\t"):
             raise InputError(
                 f"{path} line {number}: the columns are not separated by commas; save it with commas, or let 'flexcal import' read it."
@@ -254,7 +260,7 @@ def _parse(file: TableFile, content: bytes, texts: Collection[str], line: int) -
     except pl.exceptions.PolarsError:
         return _read_cells(file, content, texts, line)
     arrays = _arrays(frame)
-    if any(frame[c].null_count() or (c not in texts and not np.isfinite(v).all()) for c, v in arrays.items()):
+    if any(frame[c].null_count() or (c not in texts and not _measurable(v).all()) for c, v in arrays.items()):
         return _read_cells(file, content, texts, line)
     return arrays
 
@@ -278,7 +284,7 @@ def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: i
             break
         if not text.strip():
             raise InputError(f"{file.path} line {number}: the line is empty; remove it.")
-        row = [cell.strip() for cell in next(csv.reader([text]))]
+        row = _row(file.path, number, text)
         if len(row) != len(file.columns):
             raise InputError(
                 f"{file.path} line {number}: there are {len(row)} values, but the header names {len(file.columns)} columns; "
@@ -294,6 +300,18 @@ def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: i
     }
 
 
+def _row(path: Path, line: int, text: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([text]))]
+    except csv.Error as problem:
+        raise InputError(f"{path} line {line}: the line cannot be read ({problem}); correct it.") from problem
+
+
+def _measurable(values: np.ndarray) -> np.ndarray:
+    """Which of some numbers (N,) can be measurements: finite, and below `LARGEST`."""
+    return np.abs(values) <= LARGEST
+
+
 def _fault(cell: str, is_text: bool) -> str | None:
     if not cell:
         return "the value is missing; complete or remove the line."
@@ -302,8 +320,10 @@ def _fault(cell: str, is_text: bool) -> str | None:
     if not _is_number(cell):
         comma = " with a decimal point" if _is_number(cell.replace(",", ".")) else ""
         return f"'{cell}' is not a number; write one{comma}."
-    if not math.isfinite(float(cell)):
-        return f"the value is {cell}, which is no measurement; remove the line or measure it again."
+    number = float(cell)
+    if not abs(number) <= LARGEST:
+        shown = cell if len(cell) < _QUOTED else f"{number:g}"
+        return f"the value is {shown}, which is no measurement; remove the line or measure it again."
     return None
 
 
@@ -323,8 +343,8 @@ def _check_finite(table: Table, frame: pl.DataFrame) -> None:
                 name,
                 "the value is missing; complete or remove the row.",
             )
-        if values.dtype.kind == "f" and not np.isfinite(values).all():
-            row = int(np.argmin(np.isfinite(values)))
+        if values.dtype.kind == "f" and not _measurable(values).all():
+            row = int(np.argmin(_measurable(values)))
             raise table.error(
                 row,
                 name,

@@ -26,7 +26,15 @@ def read_text(path: Path) -> ForeignTable:
     The separator is the first of tab, semicolon, comma and space that splits the rows of the second half into as many cells each, else
     most of them.
     """
-    lines = _decoded(path).splitlines()
+    try:
+        return _read(path, _decoded(path).splitlines())
+    except csv.Error as problem:
+        raise InputError(
+            f"{path} holds a cell that cannot be read ({problem}); export the measurements again."
+        ) from problem
+
+
+def _read(path: Path, lines: list[str]) -> ForeignTable:
     while lines and not lines[-1].strip():
         lines.pop()
     if not lines:
@@ -73,7 +81,9 @@ def values(cells: Sequence[str], comma: bool = False) -> np.ndarray:
     try:
         return np.array(plain, dtype=float)
     except ValueError:
-        numbers = np.array([float(cell) if NUMBER.fullmatch(cell) else np.nan for cell in plain])
+        numbers = np.array(
+            [float(cell.replace(",", ".")) if NUMBER.fullmatch(cell) else np.nan for cell in plain]
+        )
     filled = sum(bool(cell) for cell in cells)
     return numbers if 2 * np.isfinite(numbers).sum() > filled else np.array(cells, dtype=str)
 

@@ -10,6 +10,10 @@ from xml.parsers import expat
 import numpy as np
 
 from flexcal.errors import InputError
+from flexcal.units import LARGEST
+
+_QUOTED = 60
+"""Letters of an attribute that a message quotes."""
 
 
 @dataclass(frozen=True)
@@ -43,10 +47,11 @@ class Element:
             values = np.array([float(word) for word in text.split()])
         except ValueError:
             values = np.array([np.nan])
-        if len(values) != count or not np.isfinite(values).all():
+        if len(values) != count or not (np.abs(values) <= LARGEST).all():
             what = "a number" if count == 1 else f"{count} numbers"
+            quoted = text if len(text) <= _QUOTED else f"{text[:_QUOTED]}…"
             raise self.error(
-                f'{attribute}="{text}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.'
+                f'{attribute}="{quoted}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.'
             )
         return values
 

@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.data import PoseSet
 from flexcal.data.joint_limits import check_joint_units
 from flexcal.data.pose_checks import check_metres, check_same_pose
-from flexcal.data.pose_columns import check_positive, unit_quaternions
+from flexcal.data.pose_columns import check_positive, unit_quaternions, whole_numbers
 from flexcal.data.signals import JOINT_QUANTITIES, standard_columns
 from flexcal.data.table import Table, write_table
 from flexcal.errors import InputError
@@ -30,7 +30,7 @@ from flexcal.importing import (
 )
 from flexcal.importing.rtde_names import TOOL
 from flexcal.model import RobotModel
-from flexcal.units import MILLIMETRE
+from flexcal.units import LARGEST, MILLIMETRE
 
 _POSES = (
     "pose",
@@ -222,13 +222,17 @@ def _converted(
         columns["pose"] = np.arange(1, len(foreign) + 1)
     for quantity, placed in guess.placed.items():
         for column in placed.columns:
-            bad = ~np.isfinite(foreign.numbers[column])
+            numbers = foreign.numbers[column]
+            bad = ~(np.abs(numbers) <= LARGEST)
             if bad.any():
-                what = "time" if column in foreign.times else "number"
+                row = int(np.argmax(bad))
+                what = "there is no time" if column in foreign.times else "there is no number"
+                if not np.isnan(numbers[row]):
+                    what = f"the value is {numbers[row]:g}, which is no measurement"
                 raise foreign.table.error(
-                    int(np.argmax(bad)),
+                    row,
                     column,
-                    f"there is no {what}; complete or remove the line, or discard the column with --map {quantity}=none.",
+                    f"{what}; complete or remove the line, or discard the column with --map {quantity}=none.",
                 )
         found = placed.values(foreign.table)
         if quantity == "quaternion":
@@ -237,7 +241,8 @@ def _converted(
         names = standard_columns(quantity, model.n)
         columns |= {name: found[:, i] for i, name in enumerate(names)}
     if "pose" in columns:
-        columns["pose"] = columns["pose"].astype(np.int64)
+        if "pose" in guess.placed:
+            columns["pose"] = whole_numbers(foreign.table, guess.placed["pose"].columns[0], columns["pose"])
         values["pose"] = columns["pose"]
     columns |= {name: foreign.table.columns[column] for name, column in guess.texts.items()}
     return columns, values

@@ -33,12 +33,14 @@ def write_results(folder: Path, document: Mapping[str, Any]) -> None:
 def read_results(folder: Path) -> dict[str, Any]:
     """The document that a verb left in `folder`; raises `InputError` where there is none."""
     path = folder / RESULTS
+    again = "run the verb that writes it again"
     try:
-        return json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as problem:
-        raise InputError(
-            f"{path} cannot be read ({problem}); run the verb that writes it again."
-        ) from problem
+        document = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise InputError(f"{path} cannot be read ({problem}); {again}.") from problem
+    if not isinstance(document, dict):
+        raise InputError(f"{path} holds no results of a verb; {again}.")
+    return document
 
 
 def quantities(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, dict[str, Any]]:
