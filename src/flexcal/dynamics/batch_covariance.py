@@ -8,11 +8,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.dynamics.batch_scores import Scores
 from flexcal.dynamics.batched_equations import Batch
+from flexcal.dynamics.equations import Equations
+from flexcal.dynamics.noise_memory import remembered
+from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData
 
 _LEVERAGE = 0.9
 """A direction that one window determines to this share, or more, leaves no residual there that would tell its error."""
+_WITHIN = 0.5
+"""Longest time constant of noise that windows allow for, as share of their length."""
+_SHORT = 6.0
+"""Time constant, in batches, below which windows are long enough."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,18 +30,6 @@ class BatchCovariance:
     covariance: np.ndarray
     freedom: float
     window: int
-
-
-@dataclass(frozen=True, eq=False)
-class _Scores:
-    """Of one experiment, batch by batch (zero for one without rows), in coordinates in which the information of all is one.
-
-    `score` (B, k) is the estimating function, `information` (B, k, k) the batch's share; `batches` have rows.
-    """
-
-    score: np.ndarray
-    information: np.ndarray
-    batches: int
 
 
 def batch_covariance(
@@ -52,7 +48,16 @@ def batch_covariance(
     members = data.observation.members
     seen = [np.vstack([rows_of(root, kept, own), np.zeros(len(kept))]) for own in members]
     missed = [np.append(-parameters[own], 1.0) for own in members]
-    return score_covariance(data.batches, noise, seen, missed, root, variance)
+    offsets = offset_scores(data.observation, kept, root)
+    return score_covariance(data.batches, noise, seen, missed, root, variance, offsets)
+
+
+def offset_scores(observation: Equations, kept: Sequence[int], root: np.ndarray) -> np.ndarray | None:
+    """Columns (k, ·) that times a score in coordinates of `root` (k, k) give those of the joints' torque offsets; None without offsets."""
+    if not isinstance(observation, Observation):
+        return None
+    offsets = [i for i, number in enumerate(kept) if observation.names[number].endswith(".torque_offset")]
+    return np.linalg.solve(root, np.eye(len(kept))[:, offsets]) if offsets else None
 
 
 def rows_of(matrix: np.ndarray, kept: Sequence[int], members: np.ndarray) -> np.ndarray:
@@ -70,6 +75,7 @@ def score_covariance(
     missed: Sequence[np.ndarray],
     root: np.ndarray,
     variance: float,
+    offsets: np.ndarray | None = None,
 ) -> BatchCovariance:
     """root · M · rootᵀ with M the covariance of the scores Qᵀρ as the batches show it (Newey & West 1987).
 
@@ -79,32 +85,61 @@ def score_covariance(
     for the first autocorrelation of the scores, all parameters pooled; what that kernel leaves out where they are autoregressive is given
     back. The scores of a window are freed of what the fit took from its residuals, so that independent errors give root · rootᵀ σ² without
     bias (Bell & McCaffrey 2002). So many parameters from so few batches leave correlations uncertain: they are drawn towards those of
-    root · rootᵀ, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ.
+    root · rootᵀ, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ. Where the noise of a joint has a time constant above half a window
+    and six batches, standard deviations are at least those of `remembered`, correlations are its own, and ν is at most the number of
+    independent samples of such noise, one every two time constants; a column of `offsets` (k, ·) times a score is that of a joint's torque
+    offset.
     """
-    joints, size = len(seen), root.shape[1]
+    joints = len(seen)
     found = [
         _scores(own, noise[joints * number : joints * (number + 1)], seen, missed)
         for number, own in enumerate(experiments)
     ]
-    batches = sum(e.batches for e in found)
-    follows = _first_autocorrelation(found)
+    return covariance_of_scores(found, root, variance, offsets)
+
+
+def covariance_of_scores(
+    experiments: Sequence[Scores],
+    root: np.ndarray,
+    variance: float,
+    offsets: np.ndarray | None = None,
+    known: np.ndarray | None = None,
+) -> BatchCovariance:
+    """That of `score_covariance`, of scores; `known` (k, k) is the information of a prior, in their coordinates.
+
+    Without a prior QᵀQ = 1 of all batches; with it that and the prior's share are one.
+    """
+    batches, size = sum(e.batches for e in experiments), root.shape[1]
+    follows = _first_autocorrelation(experiments)
     window = _bandwidth(follows, batches)
-    middle = np.zeros((size, size))
-    for experiment in found:
+    given = np.zeros((size, size)) if known is None else known
+    middle = given.copy()
+    for experiment in experiments:
         middle += _windows(experiment, window, variance) / _seen_share(follows, window)
     freedom = min(batches - 1.0, 1.5 * batches / window)
     spread = root @ middle @ root.T
     std = np.sqrt(np.diag(spread))
+    if offsets is not None:
+        slow, memory = remembered(experiments, offsets)
+        if memory > max(_SHORT, _WITHIN * window):
+            freedom = max(1.0, min(freedom, 0.5 * batches / memory))
+            spread = root @ (given + slow) @ root.T
+            std = np.maximum(std, np.sqrt(np.diag(spread)))
     nominal = root @ root.T
-    expected = np.sqrt(np.diag(nominal))
     share = size / (size + freedom)
-    mixed = (1.0 - share) * spread + share * nominal * np.outer(std / expected, std / expected)
+    correlation = (1.0 - share) * _correlation(spread) + share * _correlation(nominal)
+    mixed = correlation * np.outer(std, std)
     return BatchCovariance(mixed, freedom, window)
+
+
+def _correlation(covariance: np.ndarray) -> np.ndarray:
+    std = np.sqrt(np.diag(covariance))
+    return covariance / np.outer(std, std)
 
 
 def _scores(
     batches: Sequence[Batch], noise: Sequence[float], seen: Sequence[np.ndarray], missed: Sequence[np.ndarray]
-) -> _Scores:
+) -> Scores:
     length, size = batches[-1].number + 1, seen[0].shape[1]
     score = np.zeros((length, size))
     information = np.zeros((length, size, size))
@@ -114,10 +149,10 @@ def _scores(
         errors = np.concatenate([factor @ e for factor, e in zip(scaled, missed, strict=True)])
         score[batch.number] = errors @ matrix
         information[batch.number] = matrix.T @ matrix
-    return _Scores(score, information, len(batches))
+    return Scores(score, information, len(batches))
 
 
-def _first_autocorrelation(experiments: Sequence[_Scores]) -> float:
+def _first_autocorrelation(experiments: Sequence[Scores]) -> float:
     """Of the scores from batch to batch, at most 0.97."""
     product = sum(float(np.sum(e.score[1:] * e.score[:-1])) for e in experiments)
     size = sum(float(np.sum(e.score**2)) for e in experiments)
@@ -138,7 +173,7 @@ def _seen_share(r: float, window: int) -> float:
     return (1 + 2 * float(np.sum((1 - lag / window) * r**lag))) * (1 - r) / (1 + r)
 
 
-def _windows(experiment: _Scores, window: int, variance: float) -> np.ndarray:
+def _windows(experiment: Scores, window: int, variance: float) -> np.ndarray:
     """The squares of the corrected scores of all windows, those that begin before the first batch or end after the last included."""
     size = experiment.score.shape[1]
     score = _moving_sum(experiment.score, window)

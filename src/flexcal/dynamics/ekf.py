@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
 
-from flexcal.dynamics.batch_covariance import batch_covariance
+from flexcal.dynamics.batch_covariance import BatchCovariance, covariance_of_scores, offset_scores
+from flexcal.dynamics.forward_model import ForwardModel, ForwardModels
 from flexcal.dynamics.forward_steps import ForwardSteps, forward_steps
+from flexcal.dynamics.innovation_scores import InnovationScores
 from flexcal.dynamics.linear_fit import Unknowns, weighted_system
 from flexcal.dynamics.recorded_rows import RecordedRows
-from flexcal.dynamics.regression import RegressionData
-from flexcal.dynamics.rows import slowest_speeds
+from flexcal.dynamics.regression import RegressionData, batches_each
+from flexcal.dynamics.rows import Experiment, Window, slowest_speeds
 from flexcal.dynamics.triangle import triangular
 from flexcal.dynamics.wls import noise_levels
-from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 
 POSITION_NOISE = 1e-5
@@ -26,53 +29,93 @@ _SHARE = 0.5
 
 
 def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
-    """χ̂ after two passes over all experiments, each from CAD with P0, and its covariance.
+    """χ̂ after two passes over all experiments, each from CAD with P0, and one Gauss-Newton step; its covariance from the innovations.
 
     The state is q, q̇ and χ over steps of 2 ms. With a the measured acceleration, q̈ = a + M⁻¹(τ − W(a) χ), which is the direct model and
-    linear in χ but for M: the first pass takes that from what it begins with, the second from the first. P0 is 100 % of every CAD value;
+    linear in χ but for M: each pass takes that from the one before, the first from what it begins with. P0 is 100 % of every CAD value;
     where CAD has none, half of what would explain all torques of a joint alone, and there rotor inertias, viscous and Coulomb friction
     begin. Q is the torque noise of `noise_levels`, white up to the band of the decimated rows; R is that of positions of 1e-5 rad;
     parameters do not wander. Square-root form by QR, the parameters scaled by P0. The message has the mean normalised innovation
-    squared: above one, Q and R are too small. As a filter takes errors for independent, every standard deviation changes by what
-    `batch_covariance` finds for it beside (WᵀW)⁻¹ at the same χ̂. Raises `FlexcalError` as `noise_levels` does, and where M is not
-    positive definite.
+    squared: above one, Q and R are too small. A filter takes innovations for independent, but position noise goes through its states and
+    torque noise has a memory: the covariance is that of the innovations' scores, batch by batch (`covariance_of_scores`). Raises
+    `FlexcalError` as `noise_levels` does, and where M is not positive definite.
     """
     noise = noise_levels(data)
     system = weighted_system(data, noise)
     unknowns = Unknowns.of(data, system)
     torque = np.reshape(noise, (len(recorded.experiments), -1))
-    state = _Filter(data, unknowns, None)
+    state = _Filter(data, unknowns)
     for _ in range(_PASSES):
-        state = _Filter(data, unknowns, state.parameters)
-        for sigma, experiment, window in zip(torque, recorded.experiments, recorded.windows, strict=True):
+        about = state.parameters.copy()
+        state = _Filter(data, unknowns)
+        for sigma, (experiment, window) in zip(torque, _recordings(recorded), strict=True):
             for steps in forward_steps(recorded.observation, experiment, window, slowest_speeds(experiment)):
                 if steps.begins:
                     state.restart()
-                density = sigma**2 * recorded.decimation.factor * steps.spacing
-                state.follow(steps, np.sqrt(density / steps.length))
-    found, kept = state.parameters, unknowns.kept
-    factor, scale = unknowns.reduced(system)
-    root = scale[:, None] * np.linalg.solve(factor[:-1, :-1], np.eye(len(kept)))
-    freedom = unknowns.freedom(system)
+                models = ForwardModels.of(steps, about, _smoothing(recorded))
+                state.follow(models, _step_noise(sigma, steps, recorded))
+    found, spread = _settled(state, recorded, torque, unknowns.kept)
     cost = float(np.linalg.norm(system.right - system.matrix @ found) ** 2)
-    spread = batch_covariance(data, noise, found, kept, root, cost / freedom)
-    more = np.sqrt(np.diag(spread.covariance) / np.sum(root**2, axis=1))
-    covariance = state.covariance() * np.outer(more, more)
     level = state.squares / max(1, state.count)
     message = f"extended Kalman filter; mean normalised innovation squared {level:.3g}, which should be 1"
-    return unknowns.estimate(found, covariance, spread.freedom, cost, freedom, message, _PASSES)
+    freedom = unknowns.freedom(system)
+    return unknowns.estimate(found, spread.covariance, spread.freedom, cost, freedom, message, _PASSES)
+
+
+def _smoothing(recorded: RecordedRows) -> int:
+    """Samples to either side over which accelerations are smoothed: below the band of the decimated rows, but for undecimated ones."""
+    return 2 * (recorded.decimation.factor - 1)
+
+
+def _recordings(recorded: RecordedRows) -> Iterator[tuple[Experiment, Window]]:
+    return zip(recorded.experiments, recorded.windows, strict=True)
+
+
+def _step_noise(sigma: np.ndarray, steps: ForwardSteps, recorded: RecordedRows) -> np.ndarray:
+    """Standard deviation (n,) of the mean torque of a step, N m, of noise `sigma` of decimated rows that is white up to their band."""
+    return sigma * np.sqrt(recorded.decimation.factor * steps.spacing / steps.length)
+
+
+def _settled(
+    state: _Filter, recorded: RecordedRows, torque: np.ndarray, kept: list[int]
+) -> tuple[np.ndarray, BatchCovariance]:
+    """All parameters (p,) after one more step, which takes M from the last pass, and the covariance that the scores of the innovations
+    show."""
+    root, scores = state.root(), []
+    for sigma, (experiment, window) in zip(torque, _recordings(recorded), strict=True):
+        own: InnovationScores | None = None
+        for steps in forward_steps(recorded.observation, experiment, window, slowest_speeds(experiment)):
+            if own is None:
+                length = (
+                    int(experiment.samples * steps.spacing / steps.length) // batches_each(len(torque)) + 1
+                )
+                own = InnovationScores(state.parameters, kept, root, POSITION_NOISE, length)
+            models = ForwardModels.of(steps, state.parameters, _smoothing(recorded))
+            own.follow(models, _step_noise(sigma, steps, recorded), _FIRST_SPEED)
+        if own is not None:
+            scores.append(own.scores)
+    known = root.T @ np.linalg.solve(state.prior, root)
+    onward = np.linalg.inv(np.linalg.cholesky(known + sum(e.information.sum(axis=0) for e in scores)))
+    begun = np.linalg.solve(root, (state.start - state.parameters)[kept])
+    step = onward @ (known @ begun + sum(e.score.sum(axis=0) for e in scores))
+    found = state.parameters.copy()
+    found[kept] += root @ onward.T @ step
+    settled = [e.of(onward).after(step) for e in scores]
+    level = state.squares / max(1, state.count)
+    root = root @ onward.T
+    offsets = offset_scores(recorded.observation, kept, root)
+    return found, covariance_of_scores(settled, root, level, offsets, onward @ known @ onward.T)
 
 
 class _Filter:
     """Estimates and the square root S of their covariance SᵀS, for q, q̇ and the scaled parameters."""
 
-    def __init__(self, data: RegressionData, unknowns: Unknowns, about: np.ndarray | None) -> None:
+    def __init__(self, data: RegressionData, unknowns: Unknowns) -> None:
         self._kept, self._n = unknowns.kept, data.observation.model.n
-        self._model = data.observation.model
-        self.parameters, prior = _prior(data, unknowns)
-        self._about = self.parameters.copy() if about is None else about
-        self._scale = np.sqrt(np.diag(prior))
-        self._root = np.linalg.cholesky(prior / np.outer(self._scale, self._scale)).T
+        self.parameters, self.prior = _prior(data, unknowns)
+        self.start = self.parameters.copy()
+        self._scale = np.sqrt(np.diag(self.prior))
+        self._root = np.linalg.cholesky(self.prior / np.outer(self._scale, self._scale)).T
         self._state: np.ndarray | None = None
         self._whole = self._root
         self.squares, self.count = 0.0, 0
@@ -83,69 +126,44 @@ class _Filter:
             self._root = triangular(self._whole[:, 2 * self._n :])
         self._state = None
 
-    def covariance(self) -> np.ndarray:
-        """(k, k) of the kept parameters."""
+    def root(self) -> np.ndarray:
+        """(k, k) with root · rootᵀ the covariance of the kept parameters."""
         self.restart()
-        half = self._root * self._scale
-        return half.T @ half
+        return (self._root * self._scale).T
 
-    def follow(self, steps: ForwardSteps, torque_noise: np.ndarray) -> None:
+    def follow(self, models: ForwardModels, torque_noise: np.ndarray) -> None:
         """Predict and correct, step by step; `torque_noise` (n,) is the standard deviation of a step's mean torque, N m."""
-        by_position, by_speed = steps.slopes(self._about)
+        steps = models.steps
         for k in range(len(steps.torque)):
             if steps.still[k]:
                 self.restart()
                 continue
             if self._state is None:
-                self._start(steps.before[k], steps.speed[k])
-            self._step(steps, k, by_position[k], by_speed[k], torque_noise)
+                self._state = self._started(steps.before[k], steps.speed[k])
+            self._step(models.step(k, self._state, self.parameters), steps.after[k], torque_noise)
 
-    def _start(self, position: np.ndarray, speed: np.ndarray) -> None:
+    def _started(self, position: np.ndarray, speed: np.ndarray) -> np.ndarray:
         n, size = self._n, 2 * self._n + len(self._kept)
-        self._state = np.concatenate([position, speed])
         self._whole = np.zeros((size, size))
         self._whole[range(2 * n), range(2 * n)] = [POSITION_NOISE] * n + [_FIRST_SPEED] * n
         self._whole[2 * n :, 2 * n :] = self._root
+        return np.concatenate([position, speed])
 
-    def _step(
-        self,
-        steps: ForwardSteps,
-        k: int,
-        by_position: np.ndarray,
-        by_speed: np.ndarray,
-        torque_noise: np.ndarray,
-    ) -> None:
-        assert self._state is not None
-        n, h = self._n, steps.length
-        q, dq = self._state[:n], self._state[n:]
-        mass = steps.inertia[k] @ self._about
-        if np.linalg.eigvalsh(mass)[0] <= 0:
-            raise FlexcalError(
-                f"the mass matrix of {self._model.path} is not positive definite with the filter's parameters; give CAD inertias and "
-                "`drives: {rotor_inertia: […]}` nearer to the truth, or take --estimator wls."
-            )
-        moved = by_position @ (q + 0.5 * h * dq - steps.state[k, 0]) + by_speed @ (dq - steps.speed[k])
-        push = np.linalg.inv(mass)
-        torque = steps.torque[k] - moved
-        felt = steps.columns[k]
-        ddq = steps.middle.ddq[k] + push @ (torque - felt @ self.parameters)
-        slope = np.hstack([-push @ by_position, -push @ by_speed, -push @ felt[:, self._kept] * self._scale])
-        size = len(self._whole)
+    def _step(self, model: ForwardModel, after: np.ndarray, torque_noise: np.ndarray) -> None:
+        n, size = self._n, len(self._whole)
         onward = np.eye(size)
-        onward[:n, n : 2 * n] = h * np.eye(n)
-        onward[:n] += 0.5 * h**2 * slope
-        onward[n : 2 * n] += h * slope
+        onward[: 2 * n, : 2 * n] = model.by_state
+        onward[: 2 * n, 2 * n :] = model.by_parameters[:, self._kept] * self._scale
         noise = np.zeros((n, size))
-        noise[:, :n], noise[:, n : 2 * n] = 0.5 * h**2 * (push * torque_noise).T, h * (push * torque_noise).T
-        predicted = np.concatenate([q + h * dq + 0.5 * h**2 * ddq, dq + h * ddq])
+        noise[:, : 2 * n] = (model.by_torque * torque_noise).T
         spread = np.vstack([self._whole @ onward.T, noise])
         table = np.zeros((n + len(spread), n + size))
         table[:n, :n] = POSITION_NOISE * np.eye(n)
         table[n:, :n], table[n:, n:] = spread[:, :n], spread
         factor = triangular(table)
-        innovation = np.linalg.solve(factor[:n, :n].T, steps.after[k] - predicted[:n])
+        innovation = np.linalg.solve(factor[:n, :n].T, after - model.predicted[:n])
         change = factor[:n, n:].T @ innovation
-        self._state = predicted + change[: 2 * n]
+        self._state = model.predicted + change[: 2 * n]
         self.parameters[self._kept] += self._scale * change[2 * n :]
         self._whole = factor[n:, n:]
         self.squares += float(innovation @ innovation)

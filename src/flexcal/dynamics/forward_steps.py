@@ -14,7 +14,7 @@ from flexcal.dynamics.rows import Experiment, Window
 
 _STEP = 2e-3
 """s, at most, unless samples are farther apart."""
-_TOGETHER = 200
+_TOGETHER = 400
 """Steps that are in memory at once."""
 _PUSH = 1e-3
 """rad/s², by which accelerations are moved to see inertia: torques are linear in them, but for friction by load."""
@@ -116,7 +116,8 @@ def _steps(
         _means(motion.net, stride),
     )
     before = dict(memory)
-    whole = columns(observation, middle, memory)
+    sampled = columns(observation, motion, memory)
+    whole = columns(observation, middle, dict(before))
     n = observation.model.n
     inertia = np.empty((len(middle), n, n, len(observation.names)))
     for joint in range(n):
@@ -131,7 +132,7 @@ def _steps(
         spacing,
         middle.torque,
         np.stack([middle.q, middle.dq], axis=1),
-        whole,
+        _means(sampled, stride),
         inertia,
         np.array(stands),
         False,
