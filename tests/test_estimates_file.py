@@ -189,6 +189,22 @@ def test_names_of_files_and_blocks(tmp_path: Path) -> None:
         write_estimates(tmp_path / "estimates.yaml", "geometry", make_estimate())  # type: ignore[arg-type]
 
 
+@pytest.mark.parametrize("content", ["arrays", "one array", "text", "nothing"])
+def test_an_npz_of_another_program_stays(tmp_path: Path, content: str) -> None:
+    path = tmp_path / "estimates.npz"
+    if content == "arrays":
+        np.savez(path, weights=np.ones(3))
+    elif content == "one array":
+        with path.open("wb") as stream:
+            np.save(stream, np.ones(3))
+    else:
+        path.write_text("mine" if content == "text" else "")
+    before = path.read_bytes()
+    with pytest.raises(InputError, match=r"estimates.npz was not written by flexcal"):
+        write_estimates(tmp_path / "estimates.yaml", "calibration", make_estimate())
+    assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["estimates.npz"]
+
+
 def test_values_only_are_no_estimate(tmp_path: Path) -> None:
     path = tmp_path / "truth.yaml"
     path.write_text("dynamics: {values: {link_1.mass: {estimate: 12.3, unit: kg}}}\n")

@@ -1,19 +1,21 @@
-"""Atomic writing of files: written under a temporary name, then renamed."""
+"""Atomic writing of files: written elsewhere on the same file system, then renamed."""
 
-import os
-import tempfile
+from __future__ import annotations
+
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from flexcal.errors import InputError
+from flexcal.publication import Publication
 
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
-    """Yield a temporary file beside `path` that takes its place when the block ends and goes when it raises.
+    """Yield a temporary file that takes the place of `path` when the block ends, and goes when it raises.
 
-    Raises `InputError` where the folder does not exist and cannot be made, or cannot be written to.
+    Within the block of a `Publication` it waits for the end of that, and `current` leads to it. Raises `InputError` where the folder does
+    not exist and cannot be made, or cannot be written to, and where `path` is there and no regular file.
     """
     with atomic_paths(path) as (temporary,):
         yield temporary
@@ -21,55 +23,47 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 
 @contextmanager
 def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
-    """`atomic_path` for files that belong together: all of them are whole before the first takes its place."""
-    places = [Path(path) for path in paths]
+    """`atomic_path` for files that belong together: they take their places together."""
+    running = Publication.running()
+    if running is not None:
+        with _written(running, [Path(path) for path in paths]) as temporaries:
+            yield temporaries
+        return
+    with Publication() as alone, _written(alone, [Path(path) for path in paths]) as temporaries:
+        yield temporaries
+
+
+@contextmanager
+def _written(publication: Publication, places: list[Path]) -> Iterator[tuple[Path, ...]]:
     temporaries: list[Path] = []
     try:
         for place in places:
-            temporaries.append(_temporary(place))
+            temporaries.append(_temporary(publication, place))
         yield tuple(temporaries)
         for place, temporary in zip(places, temporaries, strict=True):
-            temporary.chmod(_mode_of(place))
-            with temporary.open("rb") as stream:
-                os.fsync(stream.fileno())
-        for place, temporary in zip(places, temporaries, strict=True):
-            temporary.replace(place)
+            publication.put(place, temporary)
     except OSError as problem:
         named = " and ".join(str(place) for place in places)
-        raise InputError(f"{named} could not be written ({_reason(problem)}).") from problem
+        raise InputError(
+            f"{named} could not be written ({_reason(problem)}); nothing there was changed."
+        ) from problem
     finally:
-        for temporary in temporaries:
-            temporary.unlink(missing_ok=True)
+        publication.drop(temporaries)
 
 
 def write_text(path: str | Path, text: str) -> None:
-    """Write UTF-8 text with newlines as given, atomically."""
+    """Write UTF-8 text with newlines as given, atomically; bytes of a file name that are not UTF-8 as \\udc and hex."""
     with atomic_path(path) as temporary:
-        temporary.write_bytes(text.encode("utf-8"))
+        temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
 
 
-def _temporary(path: Path) -> Path:
-    """An empty file beside `path`, in a folder that is made where it is not there."""
+def _temporary(publication: Publication, path: Path) -> Path:
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        if path.is_dir():
-            raise InputError(f"{path} is a folder, so no file can be written there; give another name.")
-        handle, name = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.", suffix=f".tmp{path.suffix}")
+        return publication.temporary(path)
     except OSError as problem:
         raise InputError(
             f"{path} cannot be written ({_reason(problem)}); choose a folder that can."
         ) from problem
-    os.close(handle)
-    return Path(name)
-
-
-def _mode_of(path: Path) -> int:
-    """The permissions of the file being replaced, else those that a new file would get."""
-    if path.exists():
-        return path.stat().st_mode & 0o777
-    mask = os.umask(0)
-    os.umask(mask)
-    return 0o666 & ~mask
 
 
 def _reason(problem: OSError) -> str:

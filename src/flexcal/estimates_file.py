@@ -21,6 +21,7 @@ from flexcal.atomic import atomic_paths
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.npz_reader import ArrayForm, NpzFile
+from flexcal.publication import current, settle
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import to_plain, yaml_text
 
@@ -103,6 +104,7 @@ def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Bl
     Raises `InputError` with file and line where the YAML does not fit, and where the npz is missing, has other names
     or shapes, or belongs to another YAML.
     """
+    settle(Path(path).parent)
     file = read_yaml_file(path)
     stored = file.structure(StoredEstimates)
     found: dict[Block, Estimate] = {}
@@ -117,8 +119,8 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
     """Put an estimate into its block of the file, made where it is not there; the other blocks stay as they are.
 
     The two files appear whole and together; the YAML carries the SHA-256 of its covariance.
-    Raises `InputError` where another block of the file cannot be read, and `FlexcalError` where the estimate holds a
-    number that is not finite.
+    Raises `InputError` where another block of the file cannot be read, and where the npz is of another program, and `FlexcalError` where
+    the estimate holds a number that is not finite.
     """
     path = Path(path)
     if block not in BLOCKS:
@@ -130,7 +132,8 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
             f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name."
         )
     stored, arrays = StoredEstimates(), {}
-    if path.exists():
+    _refuse_foreign(path.with_suffix(".npz"))
+    if current(path).exists():
         file = read_yaml_file(path)
         stored = file.structure(StoredEstimates)
         for name in BLOCKS:
@@ -186,7 +189,7 @@ def sha256_of(path: str | Path) -> str:
             for file in sorted(file for file in path.rglob("*") if file.is_file()):
                 digest.update(f"{file.relative_to(path).as_posix()}\0{sha256_of(file)}\n".encode())
         else:
-            with path.open("rb") as stream:
+            with current(path).open("rb") as stream:
                 while content := stream.read(2**20):
                     digest.update(content)
     except OSError as problem:
@@ -204,6 +207,21 @@ def block_sha256(path: str | Path, block: Block) -> str:
     content = to_plain({"values": stored.values, "dropped": stored.dropped})
     content["covariance"] = stored.covariance_sha256
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _refuse_foreign(path: Path) -> None:
+    """Raise `InputError` for a file that holds something else than covariances and their names."""
+    if not current(path).exists():
+        return
+    ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
+    try:
+        foreign = NpzFile(path, "").names - ours
+    except InputError:
+        foreign = {"no arrays"}
+    if foreign:
+        raise InputError(
+            f"{path} was not written by flexcal (it holds {min(foreign)}), and such a file is never changed; move it away."
+        )
 
 
 def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.lib.npyio import NpzFile as NpzArrays
 
 from flexcal.errors import InputError
+from flexcal.publication import current
 
 Kind = Literal["real", "complex", "whole", "truth", "text"]
 _KINDS: dict[Kind, tuple[str, str]] = {
@@ -58,6 +59,11 @@ class NpzFile:
     def __contains__(self, name: str) -> bool:
         return name in self._names
 
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of the arrays."""
+        return self._names
+
     def error(self, sentence: str) -> InputError:
         """An `InputError` about this file."""
         return InputError(f"{self.path} {sentence}; {self.remedy}.")
@@ -72,7 +78,7 @@ class NpzFile:
     @contextmanager
     def _opened(self) -> Iterator[NpzArrays]:
         try:
-            stored = np.load(self.path, allow_pickle=False)
+            stored = np.load(current(self.path), allow_pickle=False)
             if not isinstance(stored, NpzArrays):
                 raise self.error("is no .npz file")
             with stored:

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from flexcal.errors import InputError
+from flexcal.publication import current
 from flexcal.structuring import Keys, MisfitError, structure
 from flexcal.yaml_document import parse_document
 from flexcal.yaml_writer import write_yaml
@@ -62,7 +63,7 @@ def read_yaml_file(path: str | Path) -> YamlFile:
     """Read a YAML file as plain data, keeping the lines; raises `InputError` as `read_yaml` does."""
     path = Path(path)
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = current(path).read_text(encoding="utf-8-sig")
     except OSError as problem:
         reason = problem.strerror or str(problem)
         raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem

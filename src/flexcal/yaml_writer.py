@@ -57,7 +57,8 @@ def to_plain(value: Any) -> Any:
 
 
 def _text(dumper: CSafeDumper, text: str) -> ScalarNode:
-    """A text, in double quotes unless it is plain words, read alike everywhere."""
+    """A text, in double quotes unless it is plain words, read alike everywhere; bytes of file names that are not UTF-8 as \\udc and hex."""
+    text = text.encode("utf-8", "backslashreplace").decode("utf-8")
     style = None if _WORDS.fullmatch(text) else '"'
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style)
 

@@ -1,8 +1,12 @@
-"""The command line in this process, and copies of the examples that a test may write to."""
+"""The command line in this process, and copies of the examples that a test may write to.
+
+A verb that opens a file which it is about to replace, instead of the new one that waits for its place, fails its test.
+"""
 
 from __future__ import annotations
 
 import json
+import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,6 +16,7 @@ import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
+from flexcal.publication import Publication
 
 
 @dataclass(frozen=True)
@@ -28,6 +33,20 @@ class Outcome:
         return json.loads(self.out)
 
 
+_stale: list[str] = []
+"""Files that were opened although a newer one waits for their place."""
+
+
+def _watch(event: str, arguments: tuple[Any, ...]) -> None:
+    running = Publication.running() if event == "open" and isinstance(arguments[0], str | Path) else None
+    if running is None or running.waiting(Path(arguments[0])) is None:
+        return
+    if sys._getframe(2).f_code.co_name != "_digest_on_disk":  # the ledger is about the old one
+        _stale.append(str(arguments[0]))
+
+
+sys.addaudithook(_watch)
+
 Run = Callable[..., Outcome]
 
 
@@ -37,8 +56,10 @@ def run(capsys: pytest.CaptureFixture[str]) -> Run:
 
     def call(*arguments: str | Path) -> Outcome:
         capsys.readouterr()
+        _stale.clear()
         status = main([str(argument) for argument in arguments])
         captured = capsys.readouterr()
+        assert _stale == []
         return Outcome(status, captured.out, captured.err)
 
     return call

@@ -9,7 +9,9 @@ import pytest
 from cli_files import snapshot
 from test_bad_input import refused
 
-from flexcal.cli.outputs import LEDGER, outputs
+from flexcal.atomic import write_text
+from flexcal.cli.ledger import LEDGER
+from flexcal.cli.outputs import outputs
 from flexcal.errors import InputError
 
 
@@ -55,10 +57,11 @@ def test_a_place_that_is_no_folder(run, tmp_path: Path, place: str) -> None:
 
 def test_folders_that_are_missing_are_made(tmp_path: Path) -> None:
     with outputs("demo", tmp_path / "a" / "b", ("x*",)):
-        (tmp_path / "a" / "b" / "x1").write_text("1")
+        write_text(tmp_path / "a" / "b" / "x1", "1")
     assert (
         tmp_path / "a" / "b" / LEDGER
     ).read_text() == f"# flexcal demo\n{sha256(tmp_path / 'a' / 'b' / 'x1')}  x1\n"
+    assert sorted(p.name for p in (tmp_path / "a" / "b").iterdir()) == [LEDGER, "x1"]
 
 
 def test_what_an_earlier_run_left_goes(tmp_path: Path) -> None:
@@ -67,32 +70,29 @@ def test_what_an_earlier_run_left_goes(tmp_path: Path) -> None:
     for count in (6, 3):
         with outputs("demo", tmp_path, ("x*",)):
             for k in range(count):
-                (tmp_path / f"x{k}").unlink(missing_ok=True)
-                (tmp_path / f"x{k}").write_text(str(count))
+                write_text(tmp_path / f"x{k}", str(count))
     assert sorted(p.name for p in tmp_path.iterdir()) == [LEDGER, "other", "x0", "x1", "x2"]
 
 
 @pytest.mark.parametrize("problem", [InputError("no"), KeyboardInterrupt()])
 def test_a_verb_that_fails_leaves_nothing(tmp_path: Path, problem: BaseException) -> None:
     with pytest.raises(type(problem)), outputs("demo", tmp_path / "a" / "b", ("x*", "y")):
-        (tmp_path / "a" / "b" / "x1").write_text("1")
+        write_text(tmp_path / "a" / "b" / "x1", "1")
         raise problem
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_verb_that_fails_may_be_run_again(tmp_path: Path) -> None:
-    """What it had replaced of its own by then still counts as its own."""
+def test_a_verb_that_fails_changes_nothing(tmp_path: Path) -> None:
     with outputs("demo", tmp_path, ("x", "y")):
-        (tmp_path / "x").write_text("1")
+        write_text(tmp_path / "x", "1")
+    before = snapshot(tmp_path)
     with pytest.raises(InputError), outputs("demo", tmp_path, ("x", "y")):
-        (tmp_path / "x").unlink()
-        (tmp_path / "x").write_text("2")
-        (tmp_path / "y").write_text("2")
+        write_text(tmp_path / "x", "2")
+        write_text(tmp_path / "y", "2")
         raise InputError("no")
-    assert not (tmp_path / "y").exists()
+    assert snapshot(tmp_path) == before
     with outputs("demo", tmp_path, ("x", "y")):
-        (tmp_path / "x").unlink()
-        (tmp_path / "x").write_text("3")
+        write_text(tmp_path / "x", "3")
     assert (tmp_path / "x").read_text() == "3"
 
 
@@ -116,9 +116,9 @@ def test_results_of_two_verbs_do_not_share_a_folder(run, ur5_folder: Path) -> No
 def test_measurements_do_not_replace_the_plan_of_the_same_name(tmp_path: Path) -> None:
     plan = tmp_path / "poses.csv"
     with outputs("design poses", plan, page=True):
-        plan.write_text("plan")
+        write_text(plan, "plan")
     with pytest.raises(InputError, match="design poses") as caught, outputs("import", plan):
-        plan.write_text("measured")
+        write_text(plan, "measured")
     assert "give 'flexcal import' a file of its own" in str(caught.value)
     assert plan.read_text() == "plan"
 
@@ -128,7 +128,6 @@ def test_a_ledger_without_verbs_hinders_none(tmp_path: Path) -> None:
     (tmp_path / "x").write_text("1")
     (tmp_path / LEDGER).write_text(f"{sha256(tmp_path / 'x')}  x\n")
     with outputs("demo", tmp_path, ("x",)):
-        (tmp_path / "x").unlink()
-        (tmp_path / "x").write_text("2")
+        write_text(tmp_path / "x", "2")
     with pytest.raises(InputError, match="'flexcal demo'"), outputs("verify", tmp_path, ("x",)):
         pass

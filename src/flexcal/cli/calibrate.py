@@ -22,6 +22,7 @@ from flexcal.cli.options import (
     require_files,
     require_robot,
 )
+from flexcal.publication import current
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
@@ -136,7 +137,7 @@ class Calibrate:
         """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
         from flexcal.workflow.point_place import write_point_place
 
-        text = self.robot.read_text(encoding="utf-8")
+        text = current(self.robot).read_text(encoding="utf-8")
         try:
             for name, point in found.found_points.items():
                 write_point_place(self.robot, name, point["found_xyz_m"])

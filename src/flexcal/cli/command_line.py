@@ -22,5 +22,8 @@ def command_line() -> str:
 
 def _from_here(argument: str) -> str:
     path = Path(argument)
-    here = Path.cwd()
+    try:
+        here = Path.cwd()
+    except OSError:  # it has been removed
+        return argument
     return str(path.relative_to(here)) if path.is_absolute() and path.is_relative_to(here) else argument

@@ -10,12 +10,14 @@ import shutil
 import sys
 import textwrap
 from collections.abc import Sequence
-from contextlib import redirect_stderr
+from contextlib import redirect_stderr, suppress
 from importlib import import_module
 
 from flexcal.cli.command_line import keep_command_line
 from flexcal.cli.letters import show_near_letters
 from flexcal.cli.printable import sentence
+from flexcal.cli.stopping import Stopping, stoppable
+from flexcal.cli.streams import held_output, provide_streams
 from flexcal.cli.verbs import Verb, find_verb, overview, unknown_verb
 from flexcal.errors import FlexcalError
 
@@ -26,8 +28,10 @@ INTERRUPTED = 130
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command line (default: that of the process) and return its exit status.
 
-    0: done; 2: an input or argument that cannot be used, one sentence on standard error; 130: interrupted.
+    0: done; 2: an input or argument that cannot be used, one sentence on standard error; 130: interrupted, 143 and 129: stopped by SIGTERM
+    or SIGHUP, one sentence too.
     """
+    provide_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
     # matrices here are small: threads of the linear algebra library cost more than they give
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -35,30 +39,42 @@ def main(arguments: Sequence[str] | None = None) -> int:
     gc.set_threshold(100_000)
     atexit.register(gc.freeze)  # nor does it at exit, which took a tenth of a second
     show_near_letters()
-    keep_command_line(given)
-    try:
-        status = _run(given)
-        sys.stdout.flush()
-        return status
-    except FlexcalError as problem:
-        print(f"flexcal: {sentence(problem)}", file=sys.stderr)
-        return FAILED
-    except BrokenPipeError:
-        # whoever read standard output has gone; nothing more can be said there, not even at exit
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
-    except OSError as problem:
+    with stoppable() as stopping:
+        try:
+            with held_output():
+                return _run(given)
+        except BaseException as problem:
+            told, status = _told(problem, stopping)
+            with suppress(OSError):
+                print(f"flexcal: {sentence(told)}", file=sys.stderr)
+            return status
+
+
+def _told(problem: BaseException, stopping: Stopping) -> tuple[str, int]:
+    """What to say of an exception in a sentence, and the exit status; raises it again where it is none that is expected."""
+    if stopping.number is not None:  # an extension module that is interrupted raises what it likes
+        return stopping.sentence, stopping.status
+    if isinstance(problem, FlexcalError):
+        return str(problem), FAILED
+    if isinstance(problem, FileNotFoundError) and problem.filename is None and not _folder_is_there():
+        return "the current folder has been removed; change to one that is there.", FAILED
+    if isinstance(problem, OSError):
         where = f"{problem.filename}: " if problem.filename else ""
-        print(f"flexcal: {sentence(f'{where}{problem.strerror or problem}.')}", file=sys.stderr)
-        return FAILED
-    except BaseException as problem:
-        if not _was_interrupted(problem):
-            raise
-        print("flexcal: interrupted; no file is left half-written.", file=sys.stderr)
-        return INTERRUPTED
+        return f"{where}{problem.strerror or problem}.", FAILED
+    if _was_interrupted(problem):
+        return "interrupted; no file is left half-written.", INTERRUPTED
+    raise problem
+
+
+def _folder_is_there() -> bool:
+    try:
+        return bool(os.getcwd())
+    except OSError:
+        return False
 
 
 def _run(arguments: list[str]) -> int:
+    keep_command_line(arguments)
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(overview())
         return 0
@@ -86,6 +102,7 @@ def _was_interrupted(problem: BaseException | None) -> bool:
 def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
+    from flexcal.cli.inputs import settle_inputs
     from flexcal.cli.outputs import outputs
     from flexcal.cli.refusal import refusal, refuse_unknown_options
 
@@ -105,6 +122,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         if stop.code == 0:  # --help
             return 0
         raise refusal(verb, said.getvalue()) from None
+    settle_inputs(parsed)
     with outputs(verb.name, parsed.out, verb.leaves, page=verb.page):
         parsed.run()
     return 0

@@ -1,125 +1,138 @@
-"""Protection of existing files: `--out` overwrites only unchanged files of the same verb."""
+"""Protection of existing files: `--out` overwrites only unchanged files of the same verb, and all of them together."""
 
 from __future__ import annotations
 
 import glob
+import hashlib
 import os
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
+from fnmatch import fnmatchcase
 from pathlib import Path
 
+from flexcal.cli.ledger import LEDGER, Ledger
 from flexcal.data import page_beside
 from flexcal.errors import InputError
-from flexcal.estimates_file import sha256_of
+from flexcal.publication import Publication, settle
+from flexcal.publication.regular import refuse_irregular
+from flexcal.publication.stage import Stage, age, living_owner, stages_in
 
-LEDGER = ".flexcal"
-"""In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it, each verb's lines under a comment
-that names it; of a name the last line counts."""
-_COMMENT = "# flexcal "
 _REPORT = "report"
 """The verb that makes the pages of the others anew."""
 
 
 @contextmanager
 def outputs(verb: str, out: Path | None, names: Sequence[str] = (), *, page: bool = False) -> Iterator[None]:
-    """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing.
+    """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing there.
 
     With `page`, it also writes an HTML file of the same name beside `out`.
 
-    Raises `InputError` beforehand where the folder cannot be written to, and where one of the files is there already that flexcal did
-    not write, that another verb wrote, or that was changed since. When the verb fails, what it made is removed again; when it succeeds, so
-    is what an earlier run left under these names.
+    Raises `InputError` beforehand where the folder cannot be written to, where another run is at work on these files, and where one of them
+    is there already that flexcal did not write, that another verb wrote, or that was changed since. All that the verb writes, there and
+    elsewhere, appears when it has succeeded, and what an earlier run left under these names goes; when it fails, nothing changes.
     """
     if out is None:
-        yield
+        with Publication():
+            yield
         return
     if not names and out.is_dir():
         raise InputError(f"{out} is a folder; name a file in it with --out.")
     folder = out if names else out.parent
     patterns = names or [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
-    made = _make(folder)
-    known = _ledger(folder)
-    before = _present(folder, patterns)
-    try:
-        for path in before:
+    if folder.is_dir():
+        settle(folder)
+    place = _Place(verb, folder, patterns, whole_folder=bool(names))
+    place.own_files()
+    with Publication() as run:
+        place.refuse_others(place.stage(run))
+        yield
+        run.publish(lambda: place.enter(run))
+
+
+class _Place:
+    """The files in a folder that a verb writes."""
+
+    def __init__(self, verb: str, folder: Path, patterns: Sequence[str], *, whole_folder: bool) -> None:
+        self.verb, self.folder, self.patterns = verb, folder, tuple(patterns)
+        self.kind = "a folder" if whole_folder else "a file"
+
+    def stage(self, run: Publication) -> Stage:
+        """That of the run; raises `InputError` where the folder cannot be made or written to."""
+        try:
+            return run.stage(self.folder, f"flexcal {self.verb}", self.patterns)
+        except OSError as problem:
+            reason = problem.strerror or str(problem)
+            if isinstance(problem, FileExistsError | NotADirectoryError):
+                reason = "it is a file" if self.folder.is_file() else "it is no folder"
+            raise InputError(
+                f"{self.folder} cannot be written to ({reason}); choose another --out."
+            ) from problem
+
+    def refuse_others(self, own: Stage) -> None:
+        """Raise `InputError` where another run is at work on some of the same files."""
+        for stage in stages_in(own.folder):
+            owner = living_owner(stage) if age(stage) < age(own.path) else None
+            if owner is not None and self._overlap(owner.names):
+                raise InputError(
+                    f"'{owner.verb}' (process {owner.process}) is writing into {self.folder} just now; wait for its end, or give another "
+                    "--out."
+                )
+
+    def own_files(self) -> dict[Path, str]:
+        """Files there that this verb may write over, with their SHA-256; raises `InputError` for the first that it may not."""
+        known = Ledger.read(self.folder).entries if self.folder.is_dir() else {}
+        found: dict[Path, str] = {}
+        for path in self._present():
+            refuse_irregular(path)
             digest, writer = known.get(path.name, ("", ""))
-            if digest != sha256_of(path):
+            if digest != _digest_on_disk(path):
                 raise InputError(
                     f"{path} was not written by flexcal, or has been changed since, and such a file is never changed; "
-                    f"{'' if verb == _REPORT else 'give another --out, or '}move it away."
+                    f"{'' if self.verb == _REPORT else 'give another --out, or '}move it away."
                 )
-            if writer not in ("", verb, _REPORT) and verb != _REPORT:
-                place = "a folder" if names else "a file"
+            if writer not in ("", self.verb, _REPORT) and self.verb != _REPORT:
                 raise InputError(
                     f"{path} was written by 'flexcal {writer}', which another verb does not write over; "
-                    f"give 'flexcal {verb}' {place} of its own with --out."
+                    f"give 'flexcal {self.verb}' {self.kind} of its own with --out."
                 )
-        yield
-    except BaseException:
-        for path in _present(folder, patterns).keys() - before.keys():
-            path.unlink()
-        _record(verb, folder, _present(folder, patterns), before, known)
-        for path in made:
-            with suppress(OSError):
-                path.rmdir()
-        raise
-    after = _present(folder, patterns)
-    for path in before:
-        if after.get(path) == before[path]:
-            path.unlink()
-    _record(verb, folder, after, before, known)
+            found[path] = digest
+        return found
+
+    def enter(self, run: Publication) -> None:
+        """Add to the files of a run the ledger with them, and remove those of an earlier one that it did not write again."""
+        home = Path(os.path.realpath(self.folder))
+        written = {place: file for place, file in run.files.items() if self._is_mine(place, home)}
+        for path in self.own_files():
+            if home / path.name not in written:
+                run.remove(path)
+        if written:
+            digests = {place.name: _digest_on_disk(file) for place, file in written.items()}
+            ledger = run.temporary(self.folder / LEDGER)
+            ledger.write_bytes(Ledger.read(self.folder).with_files(self.verb, digests).content())
+            run.put(self.folder / LEDGER, ledger)
+
+    def _present(self) -> list[Path]:
+        try:
+            names = sorted(os.listdir(self.folder))
+        except OSError:  # there is none, or what is wrong with it is seen when it is written to
+            return []
+        return [self.folder / name for name in names if self._is_named(name)]
+
+    def _is_mine(self, place: Path, home: Path) -> bool:
+        return place.parent == home and self._is_named(place.name)
+
+    def _is_named(self, name: str) -> bool:
+        return any(fnmatchcase(name, pattern) for pattern in self.patterns)
+
+    def _overlap(self, others: Sequence[str]) -> bool:
+        return any(fnmatchcase(one, two) or fnmatchcase(two, one) for one in self.patterns for two in others)
 
 
-def _make(folder: Path) -> list[Path]:
-    """Make a folder; the folders that had to be made for it, the innermost first."""
-    missing = [path for path in (folder, *folder.parents) if not path.exists()]
+def _digest_on_disk(path: Path) -> str:
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except FileExistsError:
-        raise InputError(f"{folder} cannot be written to (it is a file); choose another --out.") from None
+        with path.open("rb") as stream:
+            return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as problem:
         raise InputError(
-            f"{folder} cannot be written to ({problem.strerror or problem}); choose another --out."
+            f"{path} cannot be read ({problem.strerror or problem}); give another --out."
         ) from problem
-    if not os.access(folder, os.W_OK | os.X_OK):
-        raise InputError(f"{folder} cannot be written to (permission denied); choose another --out.")
-    return missing
-
-
-def _present(folder: Path, patterns: Sequence[str]) -> dict[Path, tuple[int, int]]:
-    """The files there by these names, and what changes whenever one is written anew."""
-    files = {path for pattern in patterns for path in folder.glob(pattern) if path.is_file()}
-    return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in sorted(files)}
-
-
-def written_in(folder: Path) -> dict[str, str]:
-    """SHA-256 by name of what flexcal wrote into a folder."""
-    return {name: digest for name, (digest, _) in _ledger(folder).items()}
-
-
-def _ledger(folder: Path) -> dict[str, tuple[str, str]]:
-    """Digest and verb of every file; the verb is empty where an older flexcal did not write it down."""
-    path, verb = folder / LEDGER, ""
-    found: dict[str, tuple[str, str]] = {}
-    for line in path.read_text(encoding="utf-8").splitlines() if path.is_file() else []:
-        if line.startswith("#"):
-            verb = line.removeprefix(_COMMENT)
-        else:
-            digest, _, name = line.partition("  ")
-            found[name] = (digest, verb)
-    return found
-
-
-def _record(
-    verb: str,
-    folder: Path,
-    present: dict[Path, tuple[int, int]],
-    before: dict[Path, tuple[int, int]],
-    known: dict[str, tuple[str, str]],
-) -> None:
-    """Add what was written anew, in one write, so that verbs which run at the same time do not lose each other's lines."""
-    written = {path.name: sha256_of(path) for path in present if present[path] != before.get(path)}
-    lines = [f"{digest}  {name}\n" for name, digest in written.items() if known.get(name) != (digest, verb)]
-    if lines:
-        with (folder / LEDGER).open("a", encoding="utf-8") as stream:
-            stream.write("".join([f"{_COMMENT}{verb}\n", *lines]))

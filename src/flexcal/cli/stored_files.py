@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from flexcal.cli.outputs import written_in
+from flexcal.cli.ledger import Ledger
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimates_file import sha256_of
 
@@ -36,7 +36,7 @@ def stored_files(*folders: Path) -> Iterator[None]:
 
 def _changed(folder: Path) -> Iterator[Path]:
     """The files of a folder that are not as flexcal wrote them; the folder where it is not known what that wrote."""
-    written = written_in(folder)
+    written = {name: digest for name, (digest, _) in Ledger.read(folder).entries.items()}
     if not written:
         yield folder
     for name, digest in written.items():

@@ -13,6 +13,7 @@ import numpy as np
 
 from flexcal.atomic import atomic_path
 from flexcal.errors import InputError
+from flexcal.publication import current
 from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
@@ -89,7 +90,7 @@ class TableFile:
     def _parquet_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
         import polars as pl
 
-        scan = pl.scan_parquet(self.path)
+        scan = pl.scan_parquet(current(self.path))
         try:
             schema = scan.collect_schema()
             for column in self.columns:
@@ -149,11 +150,11 @@ def write_table(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
     if path.suffix not in (".csv", ".parquet"):
         raise InputError(f"{path}: a table must end in .csv or .parquet; give another name.")
     frame = pl.DataFrame({name: pl.Series(values) for name, values in columns.items()})
-    with atomic_path(path) as temporary:
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
         if path.suffix == ".csv":
-            frame.write_csv(temporary)
+            frame.write_csv(stream)
         else:
-            frame.write_parquet(temporary)
+            frame.write_parquet(stream)
 
 
 def tables_in(folder: Path) -> str:
@@ -173,7 +174,7 @@ def tables_in(folder: Path) -> str:
 
 def _open(path: Path) -> BinaryIO:
     try:
-        return path.open("rb")
+        return current(path).open("rb")
     except OSError as problem:
         reason = problem.strerror or str(problem)
         raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
@@ -183,7 +184,11 @@ def _parquet_columns(path: Path) -> tuple[str, ...]:
     import polars as pl
 
     try:
-        return tuple(pl.read_parquet_schema(path))
+        str(path).encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{path}: the path of a Parquet file must be UTF-8; rename what is not.") from None
+    try:
+        return tuple(pl.read_parquet_schema(current(path)))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise InputError(
             f"{path}: not a readable Parquet file ({_one_line(problem)}); export it again."

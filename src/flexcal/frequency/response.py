@@ -14,6 +14,7 @@ from flexcal.frequency.averages import Average, average_response, right_divide
 from flexcal.frequency.periods import experiment_spectra, keep_periods, odd_distortion
 from flexcal.frequency.records import PoseRecords, by_pose
 from flexcal.npz_reader import ArrayForm, NpzFile
+from flexcal.publication import current
 
 POOLED_LINES = 15  # neighbouring lines that share one covariance: 45 degrees of freedom with 4 realisations
 SMALLEST_FREEDOM = 20
@@ -106,7 +107,7 @@ class FrequencyResponse:
     @classmethod
     def load(cls, path: str | Path) -> "FrequencyResponse":
         """Read what `save` wrote; `InputError` where the file is missing or something else."""
-        if not Path(path).exists():
+        if not current(path).exists():
             raise InputError(f"{path} does not exist; run 'flexcal identify response' to make it.")
         file = NpzFile(Path(path), "give what 'flexcal identify response' wrote")
         if "covariance" not in file:

@@ -15,6 +15,7 @@ from flexcal.model.point import ForceSensor, Payload, Point
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
 from flexcal.model.urdf import Description, Frame, read_urdf
+from flexcal.publication import current
 from flexcal.structuring import suggestion
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 
@@ -29,7 +30,7 @@ def load_robot(path: Path, *, estimates: bool) -> RobotModel:
     description = read_urdf(urdf, config.locked)
     model = _assemble(file, config, urdf, description)
     stored = path.parent / config.estimates
-    if estimates and stored.exists():
+    if estimates and current(stored).exists():
         from flexcal.model.stored import apply_estimates
 
         model = apply_estimates(model, stored)

@@ -53,6 +53,10 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
     if not path.is_file():
         raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
     links = carried_links(read_elements(path), locked)
+    try:
+        str(path.absolute()).encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{path}: the URDF's path is not UTF-8; rename what is not.") from None
     with _silenced() as said:
         try:
             model = pin.buildModelFromUrdf(str(path))

@@ -11,6 +11,7 @@ from flexcal.atomic import atomic_path
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.npz_reader import ArrayForm, NpzFile
+from flexcal.publication import current
 from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, ArmPoses, MeasuredPoints
 
@@ -41,8 +42,8 @@ def write_points(folder: Path, points: MeasuredPoints) -> None:
     if points.scatter_rms is not None:
         columns["scatter_rms"] = points.scatter_rms
     columns["ambiguous"] = points.ambiguous
-    with atomic_path(folder / POINTS) as temporary:
-        pl.DataFrame(columns).write_csv(temporary)
+    with atomic_path(folder / POINTS) as temporary, temporary.open("wb") as stream:
+        pl.DataFrame(columns).write_csv(stream)
 
 
 def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
@@ -52,7 +53,7 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
     """
     path = folder / POINTS
     try:
-        table = pl.read_csv(path, schema_overrides=dict.fromkeys(_TEXTS, pl.String))
+        table = pl.read_csv(current(path).read_bytes(), schema_overrides=dict.fromkeys(_TEXTS, pl.String))
         joints = [name for name in table.columns if name[0] == "q" and name[1:].isdigit()]
 
         def vectors(prefix: str) -> np.ndarray:
@@ -128,7 +129,7 @@ def write_loads(folder: Path, loads: GravityLoads) -> None:
 def read_loads(folder: Path) -> GravityLoads | None:
     """What `write_loads` left, None without the file, as in folders of an older flexcal; raises `InputError` where it cannot be read."""
     path = folder / LOADS
-    if not path.is_file():
+    if not current(path).is_file():
         return None
     file = NpzFile(path, _AGAIN)
     loads = ArrayForm("real", ("points", "joints"))

@@ -11,6 +11,7 @@ import numpy as np
 from flexcal.atomic import write_text
 from flexcal.errors import InputError
 from flexcal.model.config import RobotConfig
+from flexcal.publication import current
 from flexcal.yaml_reader import read_yaml_file
 
 _DIGITS = 6
@@ -22,7 +23,7 @@ def write_point_place(robot: Path, name: str, xyz: np.ndarray) -> None:
 
     Raises `InputError`, and changes nothing, where the file says it in a way that cannot be replaced.
     """
-    text = robot.read_text(encoding="utf-8")
+    text = current(robot).read_text(encoding="utf-8")
     before = read_yaml_file(robot).structure(RobotConfig)
     place = tuple(round(float(value), _DIGITS) for value in xyz)
     told = ", ".join(f"{value:.{_DIGITS}f}" for value in place)

@@ -12,6 +12,7 @@ from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
 from flexcal.frequency import FrequencyResponse
+from flexcal.publication import current
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
 from flexcal.report.gains import write_gains_report
@@ -45,7 +46,7 @@ def report_folder(folder: Path) -> Path:
 
     Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
     """
-    if not (folder / RESULTS).is_file():
+    if not current(folder / RESULTS).is_file():
         raise InputError(
             f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out."
         )

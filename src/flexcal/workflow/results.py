@@ -13,6 +13,7 @@ import numpy as np
 from flexcal.atomic import write_text
 from flexcal.errors import InputError
 from flexcal.estimation import Dropped, Estimate, Identifiability
+from flexcal.publication import current, settle
 
 RESULTS = "results.json"
 
@@ -32,10 +33,11 @@ def write_results(folder: Path, document: Mapping[str, Any]) -> None:
 
 def read_results(folder: Path) -> dict[str, Any]:
     """The document that a verb left in `folder`; raises `InputError` where there is none."""
+    settle(folder)
     path = folder / RESULTS
     again = "run the verb that writes it again"
     try:
-        document = json.loads(path.read_text(encoding="utf-8"))
+        document = json.loads(current(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
         raise InputError(f"{path} cannot be read ({problem}); {again}.") from problem
     if not isinstance(document, dict):

@@ -10,6 +10,7 @@ from typing import Any
 from flexcal.atomic import write_text
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
+from flexcal.publication import current
 from flexcal.yaml_reader import read_yaml_file
 
 
@@ -33,7 +34,7 @@ def add_signals(robot: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
         if all(declared.get(quantity) == dict(entry) for quantity, entry in signals.items()):
             return
         raise InputError(f"{robot} has `signals:` already, which is not changed; replace it by: {block}")
-    text = robot.read_text(encoding="utf-8")
+    text = current(robot).read_text(encoding="utf-8")
     write_text(robot, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
     try:
         RobotModel.from_yaml(robot, estimates=False)

@@ -14,6 +14,7 @@ from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.export import Exported
+from flexcal.publication import current
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.report.responses_check import misfit_document
 from flexcal.units import MILLIMETRE
@@ -151,14 +152,14 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
     columns |= {"parameter_rms": elastic.parameter_rms, "scatter_rms": run.measured_verification.scatter_rms}
     columns |= {"model_rms": elastic.scatter_rms}
     columns["unambiguous"] = ~elastic.ambiguous
-    with atomic_path(path) as temporary:
-        pl.DataFrame(columns).write_csv(temporary)
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        pl.DataFrame(columns).write_csv(stream)
 
 
 def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
     """The fresh poses that `write_verification` left, as the tracker read them and in truth; raises `InputError` where it cannot."""
     try:
-        table = pl.read_csv(path)
+        table = pl.read_csv(current(path).read_bytes())
 
         def vectors(prefix: str) -> np.ndarray:
             return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()

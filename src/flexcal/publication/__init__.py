@@ -1,0 +1,6 @@
+"""Files that take their places together: all of them or none, whatever ends the program."""
+
+from flexcal.publication.publication import Publication, current
+from flexcal.publication.settling import settle
+
+__all__ = ["Publication", "current", "settle"]
