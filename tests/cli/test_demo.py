@@ -10,6 +10,7 @@ from typing import Any
 
 import pytest
 
+from flexcal.atomic import write_text
 from flexcal.report.trust import Trust
 
 QUANTITY = {"estimate": 1.05e5, "std": 2e3, "low": 1.01e5, "high": 1.09e5, "truth": 1e5, "identifiable": True}
@@ -42,7 +43,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         made.append({"robot": robot, "out": out, **options})
         options["progress"]("frequency", 0.5)
         assert out.is_dir()
-        (out / "results.json").write_text(json.dumps(DOCUMENT))
+        write_text(out / "results.json", json.dumps(DOCUMENT))
         return SimpleNamespace(trust=Trust())
 
     monkeypatch.setitem(

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from cli_files import FLEXCAL, snapshot
@@ -47,8 +48,8 @@ def folder(ur5_folder: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return ur5_folder
 
 
-def flexcal(*arguments: str | bytes, **options: object) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(  # type: ignore[call-overload]
+def flexcal(*arguments: str | bytes, **options: Any) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
         [str(FLEXCAL), *arguments],
         **{"capture_output": True, "text": True, "errors": "surrogateescape"} | options,
     )
@@ -276,7 +277,7 @@ def test_names_that_are_no_text(folder: Path, name: bytes) -> None:
     place = os.fsencode(folder) + b"/" + name
     os.mkdir(place)
     given, poses = place + b"/" + name + b".dat", place + b"/" + name + b".csv"
-    shutil.copy(folder / "random.csv", given)
+    shutil.copy(folder / "random.csv", os.fsdecode(given))
     for _ in range(2):
         done = flexcal("import", "robot.yaml", given, "--out", poses)
         assert (done.returncode, done.stderr) == (0, "")
@@ -287,7 +288,7 @@ def test_names_that_are_no_text(folder: Path, name: bytes) -> None:
 @pytest.mark.slow
 def test_results_of_files_whose_names_are_no_text(folder: Path) -> None:
     poses = os.fsencode(folder) + b"/\xff\xe9.csv"
-    shutil.copy(folder / "random.csv", poses)
+    shutil.copy(folder / "random.csv", os.fsdecode(poses))
     place = os.fsencode(folder) + b"/\xe9"
     command = (
         "calibrate",

@@ -1,0 +1,220 @@
+"""Verbs that are killed at random moments: the files are of the run before or of the new one, and the next run works.
+
+`python -m benchmarks.kill [--count 40] [--cases calibrate demo identify] [--signals KILL TERM INT HUP] [--seed 0]`; of the moments, half are
+uniform over the run and half in its last part, where the files are written. Before and after a kill, every file is compared by SHA-256 with
+the runs that it can be of; then the folder is opened as any verb does, and compared again.
+"""
+
+from __future__ import annotations
+
+import argparse
+import hashlib
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+EXAMPLES = Path(__file__).parent.parent / "examples"
+LEDGER, STAGES = ".flexcal", ".flexcal-run-*"
+_RERUNS = {"demo": 8}
+"""Of so many kills of a verb one is followed by a run to its end; of the others, by the one that is killed next."""
+
+
+@dataclass(frozen=True)
+class Case:
+    """A verb, in a copy of an example: the command lines of the run before and of the one that is killed, which write into `out`."""
+
+    name: str
+    example: str
+    before: tuple[str, ...]
+    killed: tuple[str, ...]
+    out: str
+    steady: tuple[str, ...]
+    """Files that are the same whenever a command line is run again, as no duration stands in them."""
+
+
+CASES = (
+    Case(
+        "calibrate",
+        "ur5_tracker",
+        ("calibrate", "robot.yaml", "random.csv", "--terms", "kinematic", "--out", "out"),
+        ("calibrate", "robot.yaml", "random.csv", "--terms", "kinematic", "--loss", "cauchy", "--out", "out"),
+        "out",
+        ("estimates.npz", "points.csv", "arm.npz"),
+    ),
+    Case(
+        "identify",
+        "tx40",
+        ("identify", "dynamics", "robot.yaml", "exciting.parquet", "--estimator", "ols", "--out", "out"),
+        ("identify", "dynamics", "robot.yaml", "exciting.parquet", "--estimator", "wls", "--out", "out"),
+        "out",
+        ("estimates.npz", "predictions.npz"),
+    ),
+    Case(
+        "demo",
+        "tx90l",
+        ("demo", "--plan", "quick", "--seed", "1", "--out", "out"),
+        ("demo", "--plan", "quick", "--seed", "2", "--out", "out"),
+        "out",
+        ("truth.yaml", "estimates.npz", "points.csv", "verification.csv", "calibrated.urdf"),
+    ),
+)
+
+
+def run(count: int = 40) -> list[tuple[str, float, str]]:
+    """Share of the kills after which all was well."""
+    rows = []
+    for case in CASES:
+        for name in ("KILL", "TERM"):
+            found = killed_runs(case, getattr(signal, f"SIG{name}"), count, np.random.default_rng(0))
+            good = count - found["torn"] - found["no rerun"]
+            rows.append((f"{case.name}, SIG{name}", good / count, _told(found)))
+    return rows
+
+
+def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -> Counter[str]:
+    """How often each of these was found: old, new, finished (of both, and new once opened), torn, no rerun."""
+    found: Counter[str] = Counter()
+    with tempfile.TemporaryDirectory(prefix="kill_") as place:
+        folder = Path(shutil.copytree(EXAMPLES / case.example, Path(place) / "robot"))
+        out = folder / case.out
+        references = {}
+        for kind, command in (("new", case.killed), ("old", case.before)):
+            shutil.rmtree(out, ignore_errors=True)
+            begun = time.perf_counter()
+            _complete(command, folder)
+            seconds = time.perf_counter() - begun
+            references[kind] = _files(out)
+        before = references["old"]
+        for attempt in range(count):
+            share = rng.uniform() if attempt % 2 else rng.uniform(0.8, 1.05)
+            told = _killed(case.killed, folder, share * seconds, number)
+            raw = _kind(out, before, references["new"], case)
+            subprocess.run([sys.executable, "-c", _OPEN, str(out)], check=True)
+            settled = _kind(out, before, references["new"], case)
+            if settled is None or (raw is not None and raw != settled):
+                found["torn"] += 1
+            else:
+                found[settled if raw == settled else "finished"] += 1
+            found["said more than a line"] += told > 1
+            if list(folder.rglob(STAGES)):
+                found["left over"] += 1
+            if attempt % _RERUNS.get(case.name, 1) == 0:
+                try:
+                    _complete(case.before, folder)
+                    found["reruns"] += 1
+                except subprocess.CalledProcessError as problem:
+                    print(problem.stderr, file=sys.stderr)
+                    found["no rerun"] += 1
+            before = _files(out)
+    return found
+
+
+_OPEN = "import sys; from flexcal.publication import settle; settle(sys.argv[1])"
+
+
+def _killed(command: Sequence[str], folder: Path, seconds: float, number: int) -> int:
+    """Run a command line, send it a signal after a time, and return the number of lines that are no progress."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "flexcal.cli.main", *command],
+        cwd=folder,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.send_signal(number)
+    said = process.communicate()[1].splitlines()
+    for _ in range(100):  # workers end with it
+        try:
+            os.killpg(process.pid, 0)
+        except ProcessLookupError:
+            return sum(not line.endswith("…") for line in said)
+        time.sleep(0.05)
+    raise AssertionError(f"a process of '{' '.join(command)}' lives on")
+
+
+def _complete(command: Sequence[str], folder: Path) -> None:
+    subprocess.run(
+        [sys.executable, "-m", "flexcal.cli.main", *command],
+        cwd=folder,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+
+
+def _files(out: Path) -> dict[str, str]:
+    """SHA-256 of the files in a folder by name, without what waits in hidden folders there."""
+    return {
+        path.name: hashlib.sha256(path.read_bytes()).hexdigest()
+        for path in sorted(out.glob("*"))
+        if path.is_file()
+    }
+
+
+def _kind(out: Path, before: dict[str, str], new: dict[str, str], case: Case) -> str | None:
+    """Which run the files in a folder are of; None where they are not all of one.
+
+    Those of the run before have its digests. Those of the new one have the names and, where no duration stands in them, the digests of one
+    that was left to its end, and all those that the ledger has.
+    """
+    files = _files(out)
+    if files == before:
+        return "old"
+    steady = all(files.get(name) == new[name] for name in case.steady)
+    ledger = dict(_ledger(out))
+    return (
+        "new"
+        if files.keys() == new.keys() and steady and all(files[n] == d for n, d in ledger.items())
+        else None
+    )
+
+
+def _ledger(out: Path) -> Iterator[tuple[str, str]]:
+    for line in (out / LEDGER).read_text().splitlines() if (out / LEDGER).exists() else []:
+        if not line.startswith("#"):
+            digest, _, name = line.partition("  ")
+            yield name, digest
+
+
+def _told(found: Counter[str]) -> str:
+    return ", ".join(f"{count} {what}" for what, count in sorted(found.items()) if count)
+
+
+def main() -> int:
+    """Print the counts, one line a verb and signal; 1 where files were torn or a run did not work."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--count", type=int, default=40)
+    parser.add_argument("--cases", nargs="*", default=[case.name for case in CASES])
+    parser.add_argument("--signals", nargs="*", default=["KILL", "TERM", "INT", "HUP"])
+    parser.add_argument("--seed", type=int, default=0)
+    given = parser.parse_args()
+    failed = False
+    for case in CASES:
+        for name in given.signals if case.name in given.cases else ():
+            rng = np.random.default_rng(given.seed)
+            found = killed_runs(case, getattr(signal, f"SIG{name}"), given.count, rng)
+            failed |= bool(
+                found["torn"] or found["no rerun"] or found["left over"] or found["said more than a line"]
+            )
+            print(f"{case.name:10s} SIG{name:5s} {given.count} times: {_told(found)}", flush=True)
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
