@@ -1,6 +1,6 @@
 """Verbs that are killed at random moments: the files are of the run before or of the new one, and the next run works.
 
-`python -m benchmarks.kill [--count 40] [--cases calibrate demo identify] [--signals KILL TERM INT HUP] [--seed 0]`; of the moments, half are
+`python -m benchmarks.kill [--count 40] [--cases calibrate identify demo] [--signals KILL TERM INT HUP] [--seed 0]`; of the moments, half
 uniform over the run and half in its last part, where the files are written. Before and after a kill, every file is compared by SHA-256 with
 the runs that it can be of; then the folder is opened as any verb does, and compared again.
 """
