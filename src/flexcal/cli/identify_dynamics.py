@@ -26,7 +26,7 @@ from flexcal.errors import InputError
 if TYPE_CHECKING:
     from flexcal.workflow.robot_dynamics import RobotDynamics
 
-_SPRINGS = (".drive.stiffness", ".drive.damping")
+_SPRINGS = (".drive.stiffness", ".drive.damping", ".bearing_x.", ".bearing_y.")
 _ESTIMATORS = """wls: weighted least squares, every joint and log by its own noise.
 ols: ordinary least squares.
 sdp: as wls, with physically consistent inertials.
@@ -67,7 +67,8 @@ class IdentifyDynamics:
         arg(help=_ESTIMATORS),
     ] = "wls"
     flexible: bool = False
-    """Use separate motor and arm equations for elastic joints, and identify the drive stiffness; needs logs with the arm side (qa1…)."""
+    """Use separate motor and arm equations for elastic joints, and identify the drive stiffness; needs logs with the arm side (qa1…).
+    With the tilts of the bearings too (qax1…, qay1…) their stiffness is identified."""
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
     accept: Accept = ()
     jobs: Annotated[int, arg(metavar="N")] = 1

@@ -40,6 +40,7 @@ class Recording:
     q: (N, n) motor positions referred to the joint, rad (m where prismatic).
     torque: (N, n) motor torques referred to the joint, N m (N).
     arm: (N, n) positions on the arm side of elastic joints, where measured.
+    tilt_x, tilt_y: (N, n) tilts of their bearings about x and y, rad, where measured, beside `arm`.
     velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
         `tau_ext`); force, moment: (N, 3), N and N m, as the force sensor reads them; temperature: (N,); payload: (N,), kg, the
         same throughout.
@@ -54,6 +55,8 @@ class Recording:
     arm: np.ndarray | None = None
     start: float = 0.0
     label: RecordingLabel | None = None
+    tilt_x: np.ndarray | None = None
+    tilt_y: np.ndarray | None = None
     velocity: np.ndarray | None = None
     acceleration: np.ndarray | None = None
     arm_velocity: np.ndarray | None = None
@@ -70,7 +73,16 @@ class Recording:
             raise FlexcalError(f"the time step of a recording is {self.time_step} s; it must be positive.")
         if self.q.ndim != 2:
             raise FlexcalError(f"q of a recording has shape {self.q.shape}; (samples, joints) is needed.")
-        for name in ("torque", "arm", "velocity", "acceleration", "arm_velocity", "external_torque"):
+        for name in (
+            "torque",
+            "arm",
+            "tilt_x",
+            "tilt_y",
+            "velocity",
+            "acceleration",
+            "arm_velocity",
+            "external_torque",
+        ):
             values = getattr(self, name)
             if values is not None and values.shape != self.q.shape:
                 raise FlexcalError(

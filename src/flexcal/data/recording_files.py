@@ -23,6 +23,8 @@ _FIELDS = {
     "q": "q",
     "tau": "torque",
     "qa": "arm",
+    "qax": "tilt_x",
+    "qay": "tilt_y",
     "dq": "velocity",
     "ddq": "acceleration",
     "dqa": "arm_velocity",
@@ -35,7 +37,7 @@ _FIELDS = {
 FILL = 0.02
 """s without samples that interpolation may fill in a log of a robot's own motion, which lies below 10 Hz."""
 _REQUIRED = ("t", "q", "tau")
-_OPTIONAL = ("qa", "dq", "ddq", "dqa", "tau_ext", "force", "moment", "temperature", "payload")
+_OPTIONAL = ("qa", "qax", "qay", "dq", "ddq", "dqa", "tau_ext", "force", "moment", "temperature", "payload")
 
 
 def read_recording(

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from flexcal.model import RobotModel
     from flexcal.model.config import SignalConfig
 
-JOINT_QUANTITIES = ("q", "dq", "ddq", "tau", "qa", "dqa", "tau_ext")
+JOINT_QUANTITIES = ("q", "dq", "ddq", "tau", "qa", "qax", "qay", "dqa", "tau_ext")
 """Quantities with one column a joint, numbered from 1."""
 VECTORS = {
     "xyz": ("x", "y", "z"),
@@ -39,7 +39,7 @@ _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0, "A": 1.0, "mA": 1e-3}
 _LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6}
 UNITS: dict[str, dict[str, float]] = {
     "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
-    **dict.fromkeys(("q", "qa"), _ANGLE),
+    **dict.fromkeys(("q", "qa", "qax", "qay"), _ANGLE),
     **dict.fromkeys(("dq", "dqa"), _RATE),
     "ddq": _ACCELERATION,
     **dict.fromkeys(("tau", "tau_ext"), _TORQUE),

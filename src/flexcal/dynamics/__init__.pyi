@@ -3,6 +3,7 @@ from .arm_yield import ArmYield, error_sources
 from .bandwidth import MotionBandwidth, motion_bandwidth
 from .base_parameters import BaseParameters
 from .batched_equations import Batch, ExperimentSystem, experiment_system
+from .bearing_spring import BearingSpring
 from .didim import direct_and_inverse
 from .drive_play import with_play
 from .drive_spring import DriveSpring, Play
@@ -67,6 +68,7 @@ __all__ = [
     "AsymmetricCoulomb",
     "BaseParameters",
     "Batch",
+    "BearingSpring",
     "BlockErrors",
     "Candidate",
     "Column",

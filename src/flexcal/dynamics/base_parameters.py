@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,6 +15,8 @@ from flexcal.estimation import Identifiability, analyse
 _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z", "mass")
 """Of a link, in the order in which a person keeps them: the mass and what lies along the axis are regrouped first."""
 _SAMPLES_PER_PARAMETER = 3
+_TILT = 1e-10
+"""rad, of the tilts of bearings: real ones are so small too that what links add in proportion to them tells nothing of the links."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,14 +48,21 @@ class BaseParameters:
         model, names = observation.model, observation.names
         samples = _SAMPLES_PER_PARAMETER * len(names)
         q, dq, ddq = random_states(model, samples)
-        arm = ArmSide(*np.roll((q, dq, ddq), 1, axis=1))
+        x, y, arm = (ArmSide(*np.roll((q, dq, ddq), shift, axis=1)) for shift in (3, 2, 1))
+        small = (ArmSide(_TILT * side.q, _TILT * side.dq, side.ddq) for side in (x, y))
+        arm = replace(arm, tilts=(next(small), next(small)))
         columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q), arm))
         matrix = np.zeros((len(columns) * samples, len(names)))
         for k, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
             matrix[k * samples : (k + 1) * samples, members] = block.T
-        prefer = [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
+        prefer = [f"{bearing.name(model)}.stiffness" for bearing in observation.bearings]
+        prefer += [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
         prefer += [name for name in names if name not in set(prefer)]
-        return cls(analyse(matrix, names, scale=scale_by_kind(matrix, names), prefer=prefer))
+        scale = scale_by_kind(matrix, names)
+        for bearing in observation.bearings:  # as small as the tilts
+            own = [names.index(f"{bearing.name(model)}.{key}") for key in ("stiffness", "damping")]
+            scale[own] = 1.0 / np.linalg.norm(matrix[:, own], axis=0)
+        return cls(analyse(matrix, names, scale=scale, prefer=prefer))
 
 
 def _written(kept: str, row: np.ndarray, names: tuple[str, ...]) -> str:

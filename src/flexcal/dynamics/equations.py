@@ -30,6 +30,11 @@ class Equations(Protocol):
         """What messages call each equation."""
         ...
 
+    @property
+    def undriven(self) -> range:
+        """Numbers of the equations whose right-hand side is zero: those of bearings."""
+        ...
+
     @cached_property
     def members(self) -> tuple[np.ndarray, ...]:
         """For every equation the numbers of the parameters that stand in it, ascending."""

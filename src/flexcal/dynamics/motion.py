@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import chain, groupby
 from typing import Literal
 
@@ -12,6 +12,7 @@ import numpy as np
 from flexcal.data import Recording
 from flexcal.data.low_pass import LowPass, TooFewSamples
 from flexcal.dynamics.arm_side import ArmSide
+from flexcal.errors import FlexcalError
 
 TorqueLog = Literal["held", "instantaneous", "mean"]
 """What a logged torque is over its sample."""
@@ -65,6 +66,16 @@ class Motion:
         """τ + τ_ext (N, n), the right-hand side of Eq. 2.20."""
         return self.torque if self.external is None else self.torque + self.external
 
+    def tilt(self, component: int, order: int) -> np.ndarray:
+        """Tilts (N, n) of the bearings about x (`component` 0) or y (1), rad, or their derivative by time of that order.
+
+        Raises `FlexcalError` where they were not measured.
+        """
+        if self.arm is None or self.arm.tilts is None:
+            raise FlexcalError(f"{self.name} has no tilts of the bearings.")
+        side = self.arm.tilts[component]
+        return (side.q, side.dq, side.ddq)[order]
+
     def blocks(self) -> Iterator[Motion]:
         """The experiment in parts that follow each other: here one."""
         yield self
@@ -98,7 +109,8 @@ class Motion:
 class FilteredPositions:
     """N samples from `start` (s) on, `time_step` (s) apart: `torque` (N, n), and `q` (N + 4, n), which begins two samples before.
 
-    Where the arm side was measured too, its positions follow those of the motors: `q` (N + 4, 2 n). `external` is (N, n), or (N, 0).
+    Where the arm side was measured too, its positions follow those of the motors, and the tilts about x and y
+    these: `q` (N + 4, 2 n or 4 n). `external` is (N, n), or (N, 0).
     """
 
     start: float
@@ -123,8 +135,13 @@ class FilteredPositions:
         time = self.start + self.time_step * np.arange(len(self))
         n = self.torque.shape[1]
         q, dq, ddq = differences(self.q, self.time_step)
-        dq[np.abs(dq) < AT_REST] = 0.0
-        arm = ArmSide(q[:, n:], dq[:, n:], ddq[:, n:]) if q.shape[1] > n else None
+        turning = dq[:, : 2 * n]  # tilts are slow, and have no friction
+        turning[np.abs(turning) < AT_REST] = 0.0
+        at = [slice(first, first + n) for first in range(n, q.shape[1], n)]
+        sides = [ArmSide(q[:, own], dq[:, own], ddq[:, own]) for own in at]
+        arm = None if not sides else sides[0]
+        if len(sides) == 3:
+            arm = replace(sides[0], tilts=(sides[1], sides[2]))
         external = self.external if self.external.size else None
         return Motion(time, q[:, :n], dq[:, :n], ddq[:, :n], self.torque, arm, external)
 
@@ -213,7 +230,8 @@ def _columns(recordings: Iterable[Recording], torque: TorqueLog) -> Iterator[tup
     """Positions (motor side, then arm side where measured) and the torques that act at the same instants: motors, then from outside."""
     last = None
     for recording in recordings:
-        sides = [recording.q] if recording.arm is None else [recording.q, recording.arm]
+        sides = [recording.q, recording.arm, recording.tilt_x, recording.tilt_y]
+        sides = [side for side in sides if side is not None]
         acted = recording.torque
         if torque != "instantaneous":
             before = np.concatenate([acted[:1] if last is None else last, acted[:-1]])

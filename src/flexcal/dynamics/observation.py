@@ -9,10 +9,12 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.dynamics.arm_side import ArmSide
+from flexcal.dynamics.bearing_spring import BearingSpring
 from flexcal.dynamics.drive_spring import DriveSpring, coupled_columns
 from flexcal.dynamics.drive_terms import Column, DriveTerm, JointSprings, Memory
 from flexcal.dynamics.link_columns import LinkColumns, link_columns
 from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.tilted_arm import TiltedArm
 from flexcal.model import RobotModel, inertial_names, torque_regressor
 from flexcal.model.regressor import INERTIAL, write_torque_regressor
 
@@ -23,7 +25,8 @@ class Observation:
 
     There is one equation a joint, and after them one a motor that is connected by one of the `springs`: that of the motor alone. The
     joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor,
-    and what acts from outside (τ_ext) stands beside the motor's torque.
+    and what acts from outside (τ_ext) stands beside the motor's torque. After them comes one a bearing spring, where tilts were measured:
+    that of the links about the tilt's axis, whose right-hand side is zero.
 
     Of the columns of a joint that the links bring, some always are combinations of others, whatever the motion is. `reduced` leaves them
     out, and `spread` (one an equation) says how the others give them back: W = W_reduced · spread.
@@ -32,6 +35,7 @@ class Observation:
     model: RobotModel
     terms: tuple[DriveTerm, ...]
     springs: tuple[DriveSpring, ...] = ()
+    bearings: tuple[BearingSpring, ...] = ()
 
     @cached_property
     def names(self) -> tuple[str, ...]:
@@ -41,8 +45,15 @@ class Observation:
 
     @property
     def labels(self) -> tuple[str, ...]:
-        """The joints' names, then those of the motors alone."""
-        return (*self.model.joint_names, *(f"{motor}, motor" for motor in self.motors))
+        """The joints' names, then those of the motors alone, then the bearings'."""
+        bearings = (bearing.name(self.model) for bearing in self.bearings)
+        return (*self.model.joint_names, *(f"{motor}, motor" for motor in self.motors), *bearings)
+
+    @property
+    def undriven(self) -> range:
+        """Numbers of the equations whose right-hand side is zero: those of the bearings."""
+        first = self.model.n + len(self.springs)
+        return range(first, first + len(self.bearings))
 
     @property
     def motors(self) -> tuple[str, ...]:
@@ -74,14 +85,27 @@ class Observation:
 
     @cached_property
     def _links(self) -> tuple[LinkColumns, ...]:
-        """For every equation; a motor alone feels no link."""
+        """For every equation; a motor alone feels no link, and where bearings tilt none of the columns is left out."""
         nothing = LinkColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
-        return (*link_columns(self.model), *(nothing for _ in self.springs))
+        motors = (nothing for _ in self.springs)
+        if self._tilted is None:
+            return (*link_columns(self.model), *motors)
+        joints = [(joint, 2) for joint in range(self.model.n)]
+        tilts = [(bearing.joint, bearing.component) for bearing in self.bearings]
+        every = [[_all_of(self._tilted.felt(at)) for at in some] for some in (joints, tilts)]
+        return (*every[0], *motors, *every[1])
+
+    @cached_property
+    def _tilted(self) -> TiltedArm | None:
+        """The arm with its tilts, where there are any."""
+        tilting = sorted({bearing.joint for bearing in self.bearings})
+        return TiltedArm(self.model, tilting) if tilting else None
 
     @cached_property
     def _at_rest(self) -> list[Column]:
         state = np.zeros((1, self.model.n))
-        still = Motion(np.zeros(1), state, state, state, state, ArmSide(state, state, state))
+        side = ArmSide(state, state, state)
+        still = Motion(np.zeros(1), state, state, state, state, replace(side, tilts=(side, side)))
         return list(self._drive_columns(still, {}))
 
     @cached_property
@@ -100,11 +124,22 @@ class Observation:
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
-        """Rows of `reduced`: of the links' entries (n, 10 n), -1 for those left out, and of every drive column in the terms' order."""
+        """Rows of `reduced`: of the links' entries (coordinates, 10 n), -1 for those left out, and of every drive column.
+
+        Coordinates are the joints, or those of the tilted arm.
+        """
         starts = np.cumsum([0, *self.widths])
-        links = np.full((self.model.n, len(INERTIAL) * self.model.n), -1)
-        for joint, own in enumerate(self._links[: self.model.n]):
-            links[joint, own.kept] = starts[joint] + np.arange(len(own.kept))
+        tilts = {
+            (bearing.joint, bearing.component): at
+            for bearing, at in zip(self.bearings, self.undriven, strict=True)
+        }
+        coordinates = [(joint, 2) for joint in range(self.model.n)]
+        coordinates = coordinates if self._tilted is None else self._tilted.coordinates
+        links = np.full((len(coordinates), len(INERTIAL) * self.model.n), -1)
+        for number, (joint, component) in enumerate(coordinates):
+            equation = joint if component == 2 else tilts[joint, component]
+            own = self._links[equation]
+            links[number, own.kept] = starts[equation] + np.arange(len(own.kept))
         number = {name: i for i, name in enumerate(self.names)}
         drives = [
             starts[c.joint]
@@ -122,8 +157,12 @@ class Observation:
         """
         links, drives = self._places
         found = np.empty((sum(self.widths), len(motion)))
-        write_torque_regressor(self.model, *self._link_states(motion), links, found)
-        right = [motion.net, motion.torque[:, self._torques[self.model.n :]]]
+        if self._tilted is None:
+            write_torque_regressor(self.model, *self._link_states(motion), links, found)
+        else:
+            self._tilted.write(self._link_states(motion), motion, links, found)
+        undriven = np.zeros((len(motion), len(self.bearings)))
+        right = [motion.net, motion.torque[:, self._torques[self.model.n :]], undriven]
         found[np.cumsum(self.widths) - 1] = np.hstack(right).T
         columns = self._drive_columns(motion, {} if memory is None else memory)
         for place, column in zip(drives, columns, strict=True):
@@ -152,6 +191,8 @@ class Observation:
         for spring in self.springs:
             yield from spring.columns(self.model, motion, motors[spring.joint])
         yield from coupled_columns(self.model, motion, motors)
+        for bearing, equation in zip(self.bearings, self.undriven, strict=True):
+            yield from bearing.columns(self.model, motion, equation)
 
     def _link_states(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Positions, velocities and accelerations of the links: behind the springs, else as the motors."""
@@ -165,6 +206,8 @@ class Observation:
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
         """For every equation all its columns (members, N) at every sample of the motion, none left out."""
+        if self._tilted is not None:
+            return [system[:-1] for system in self.systems(motion)]
         links = torque_regressor(self.model, *self._link_states(motion))
         found = [np.zeros((len(members), len(motion))) for members in self.members]
         for joint, own in enumerate(self._links[: self.model.n]):
@@ -179,3 +222,8 @@ class Observation:
         """The model's values of all columns (p,), zero where it knows none."""
         known = self.model.values
         return np.nan_to_num([known.get(name, 0.0) for name in self.names])
+
+
+def _all_of(felt: np.ndarray) -> LinkColumns:
+    """All columns that are felt, each its own."""
+    return LinkColumns(felt, felt, np.eye(len(felt)))

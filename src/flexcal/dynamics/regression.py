@@ -24,12 +24,16 @@ _ALL_BATCHES = 512
 
 @dataclass(frozen=True, eq=False)
 class Subsystem:
-    """One of an observation's equations in one experiment; `members` are the numbers of its columns among all."""
+    """One of an observation's equations in one experiment; `members` are the numbers of its columns among all.
+
+    `undriven` tells that its right-hand side is zero, as of a bearing.
+    """
 
     equation: int
     experiment: int
     members: np.ndarray
     triangle: Triangle
+    undriven: bool = False
 
     def floored(self, sigma: float) -> float:
         """A noise level (N m), at least 1e-12 of the torque: equations that are fitted exactly still need one."""
@@ -86,12 +90,23 @@ class RegressionData:
         return found
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
-        """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all equations stacked, and of each of the observation's."""
+        """‖Y − W χ‖ / ‖Y‖ for `parameters` (p,): of all driven equations stacked, and of each of the observation's.
+
+        Where nobody drives, what the links ask stands for Y.
+        """
         missed, size = np.zeros((2, len(self.observation.labels)))
+        driven = np.ones(len(missed), dtype=bool)
         for s in self.subsystems:
             missed[s.equation] += s.triangle.residual(parameters[s.members]) ** 2
-            size[s.equation] += np.sum(s.triangle.right**2)
-        return math.sqrt(missed.sum() / size.sum()), np.sqrt(missed / size)
+            asked = s.triangle.right
+            if s.undriven:
+                driven[s.equation] = False
+                links = s.members < len(INERTIAL) * self.observation.model.n
+                asked = s.triangle.matrix[:, links] @ parameters[s.members[links]]
+            size[s.equation] += np.sum(asked**2)
+        return math.sqrt(missed[driven].sum() / size[driven].sum()), np.sqrt(
+            missed / np.where(size > 0, size, 1.0)
+        )
 
     @classmethod
     def of(
@@ -99,7 +114,7 @@ class RegressionData:
     ) -> RegressionData:
         """The systems of several experiments together."""
         subsystems = [
-            Subsystem(equation, number, members, _merged(system, equation))
+            Subsystem(equation, number, members, _merged(system, equation), equation in observation.undriven)
             for number, system in enumerate(systems)
             for equation, members in enumerate(observation.members)
         ]

@@ -38,6 +38,10 @@ class ScalarEquations(ABC):
     def labels(self) -> tuple[str, ...]:
         return (self.label,)
 
+    @property
+    def undriven(self) -> range:
+        return range(0)
+
     @cached_property
     def members(self) -> tuple[np.ndarray, ...]:
         return (np.arange(len(self.names)),)

@@ -11,14 +11,14 @@ from flexcal.estimation import Estimate
 
 
 def attenuation(data: RegressionData, estimate: Estimate) -> dict[str, float]:
-    """By name of the identified drive stiffnesses, the largest share by which noise of q - θ can have made them too small.
+    """By name of the identified stiffnesses of drives and bearings, the largest share by which noise of q - θ can have made them too small.
 
     Noise of size σ_e in N rows of a column of which the others leave t makes K smaller by K N σ_e² / ‖t‖². It also stands in the
     residual of its equation, K σ_e ≤ σ, so that the share is at most N (σ / (K ‖t‖))²: no size of the noise need be known.
     Raises `FlexcalError` as `noise_levels` does.
     """
     names = data.names
-    stiffnesses = [name for name in names if name.endswith(".drive.stiffness")]
+    stiffnesses = [name for name in names if name.endswith(".stiffness")]
     if not stiffnesses:
         return {}
     matrix = weighted_system(data, noise_levels(data)).matrix

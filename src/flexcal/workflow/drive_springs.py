@@ -5,11 +5,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flexcal.dynamics import DriveSpring, log_blocks
+import numpy as np
+
+from flexcal.dynamics import BearingSpring, DriveSpring, log_blocks
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 from flexcal.workflow.estimators import EstimatorName
 
+_LARGEST_TILT = 0.1
+"""rad"""
+_LARGEST_TILT = 0.1
+"""rad"""
 _KNOWING: tuple[EstimatorName, ...] = ("wls", "ols", "sdp", "irls")
 """Estimators that take any equations, those of motors too; the others are of rigid robots."""
 
@@ -17,7 +23,7 @@ _KNOWING: tuple[EstimatorName, ...] = ("wls", "ols", "sdp", "irls")
 def drive_springs(
     model: RobotModel, logs: Sequence[Path], estimator: EstimatorName
 ) -> tuple[DriveSpring, ...]:
-    """The drives of the elastic joints; bearings are outside the flexible model.
+    """The drives of the elastic joints.
 
     Raises `InputError` for an `estimator` of rigid robots, for a robot without elastic joints, for a coupling of an elastic joint with a
     rigid one or with backlash, and for a log that lacks the arm side.
@@ -53,3 +59,43 @@ def drive_springs(
                 "or leave --flexible out."
             )
     return springs
+
+
+def bearing_springs(model: RobotModel, logs: Sequence[Path]) -> tuple[BearingSpring, ...]:
+    """The bearings' springs, where the logs have the tilts; none where they have not.
+
+    Raises `InputError` for tilts in some logs alone, about one axis alone, of no bearings, beside a force sensor, or larger than bearings
+    tilt.
+    """
+    first = [next(log_blocks(log, model)) for log in logs]
+    seen = [recording.tilt_x is not None or recording.tilt_y is not None for recording in first]
+    if not any(seen):
+        return ()
+    for log, recording in zip(logs, first, strict=True):
+        if recording.tilt_x is None or recording.tilt_y is None:
+            raise InputError(
+                f"{log}: the columns qax1…qax{model.n} and qay1…qay{model.n} (tilts of the bearings about x and y) are not all there; "
+                "record both in all logs, with zeros at joints without bearings, or remove them."
+            )
+        largest = max(float(np.abs(recording.tilt_x).max()), float(np.abs(recording.tilt_y).max()))
+        if largest > _LARGEST_TILT:
+            raise InputError(
+                f"{log}: a bearing tilts by {largest:.3g} rad (qax, qay), farther than bearings do; check the unit, and subtract what the "
+                "sensors read at rest."
+            )
+    bearings = tuple(
+        BearingSpring(joint.index, component)
+        for joint in model.driven
+        if joint.bearings
+        for component in (0, 1)
+    )
+    if not bearings:
+        raise InputError(
+            f"{model.path} declares no bearings, but the logs have their tilts (qax, qay); add `bearing_x:` and `bearing_y:` to the "
+            "elastic joint."
+        )
+    if model.force_sensor is not None:
+        raise InputError(
+            f"{model.path} declares a force sensor, which the equations of the bearings' tilts lack; remove the columns qax and qay."
+        )
+    return bearings

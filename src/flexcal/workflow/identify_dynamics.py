@@ -27,7 +27,7 @@ from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.workflow.distinct_files import require_distinct
 from flexcal.workflow.divided_logs import DividedLogs
-from flexcal.workflow.drive_springs import drive_springs
+from flexcal.workflow.drive_springs import bearing_springs, drive_springs
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
 from flexcal.workflow.log_torques import weight_faults
@@ -77,6 +77,7 @@ def identify_robot_dynamics(
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
     springs = drive_springs(model, [*logs, *validate], estimator) if flexible else ()
+    bearings = bearing_springs(model, [*logs, *validate]) if flexible else ()
     treatment = treatment_of(model, logs, flexible=flexible)
 
     with TemporaryDirectory(prefix="flexcal_") as folder:
@@ -93,7 +94,7 @@ def identify_robot_dynamics(
         )
         declared = model.config.dynamics.friction
         friction = select_friction(model, declared, divided.equations, treatment.decimation)
-        observation = with_play(Observation(model, friction.terms, springs), divided.equations)
+        observation = with_play(Observation(model, friction.terms, springs, bearings), divided.equations)
         base = BaseParameters.of(observation)
         systems = divided.equations(observation)
         train = RegressionData.of(observation, base, systems)

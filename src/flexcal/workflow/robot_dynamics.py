@@ -77,7 +77,11 @@ class RobotDynamics:
             percent["held_out"] = 100 * error
         percent["per_joint"] = dict(zip(joints, 100 * each[: len(joints)], strict=True))
         if self.motors:
-            percent["per_motor"] = dict(zip(self.motors, 100 * each[len(joints) :], strict=True))
+            others = len(joints) + len(self.motors)
+            percent["per_motor"] = dict(zip(self.motors, 100 * each[len(joints) : others], strict=True))
+            bearings = self.train.observation.labels[others:]
+            if bearings:
+                percent["per_bearing"] = dict(zip(bearings, 100 * each[others:], strict=True))
         return {
             "robot": self.train.observation.model.name,
             "structural_rank": self.structural_rank,

@@ -1,0 +1,96 @@
+"""Springs of bearings and drives from logs with the tilts, on a robot simulated in MuJoCo with a hinge for every tilt."""
+
+from __future__ import annotations
+
+import pickle
+from pathlib import Path
+
+import polars as pl
+import pytest
+from tilting_robot import BEARING, BEARING_DAMPING, DRIVE, ROBOT, URDF, write_tilting
+
+from flexcal.cli.main import main
+from flexcal.errors import InputError
+from flexcal.workflow.estimators import EstimatorName
+from flexcal.workflow.identify_dynamics import identify_robot_dynamics
+
+
+def robot_of(folder: Path, *, before: bool = False) -> Path:
+    (folder / "tilting.urdf").write_text(URDF)
+    path = folder / "robot.yaml"
+    path.write_text(ROBOT.format(bearings="before" if before else "after"))
+    return path
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_tilting(tmp_path_factory.mktemp("tilts") / "log.parquet", 3, noise=0.002, tilt_noise=1e-6)
+
+
+@pytest.mark.parametrize("before", [False, True])
+def test_bearings_and_drives_are_found(before: bool, tmp_path: Path) -> None:
+    """Wherever the bearings tilt; what gravity does to a tilted column is that of CAD, whose error is 4e-5 of its stiffness."""
+    own = write_tilting(tmp_path / "log.parquet", 5, before=before, noise=0.002, tilt_noise=1e-6)
+    found = identify_robot_dynamics(robot_of(tmp_path, before=before), [own], flexible=True)
+    document = found.document()
+    truth = {f"{name}.stiffness": value for name, value in BEARING.items()}
+    truth |= {f"{joint}.drive.stiffness": value for joint, value in DRIVE.items()}
+    truth |= {f"{name}.damping": BEARING_DAMPING for name in BEARING}
+    for name, value in truth.items():
+        item = document["parameters"][name]
+        assert abs(item["estimate"] - value) < 4 * item["std"] + 1e-4 * value, name
+        assert item["std"] < (0.1 if name.endswith("damping") else 0.002) * value, name
+    assert max(document["error_percent"]["per_bearing"].values()) < 1.0
+    pickle.dumps(found.train.observation)
+
+
+def test_without_the_tilts_the_arm_fits_worse(log: Path, tmp_path: Path) -> None:
+    robot, rigid = robot_of(tmp_path), tmp_path / "rigid.parquet"
+    pl.read_parquet(log).drop("qax1", "qax2", "qay1", "qay2").write_parquet(rigid)
+    with_tilts, without = (
+        identify_robot_dynamics(robot, [own], flexible=True).document()["error_percent"]["per_joint"]["turn"]
+        for own in (log, rigid)
+    )
+    assert with_tilts < 0.5 * without
+
+
+@pytest.mark.parametrize("estimator", ["ols", "irls", "sdp"])
+def test_estimators_of_the_flexible_model(estimator: EstimatorName, log: Path, tmp_path: Path) -> None:
+    found = identify_robot_dynamics(robot_of(tmp_path), [log], flexible=True, estimator=estimator).estimate
+    for name, value in BEARING.items():
+        assert found.values[f"{name}.stiffness"] == pytest.approx(value, rel=0.02)
+
+
+def test_the_command_shows_the_bearings(
+    log: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    arguments = [str(robot_of(tmp_path)), str(log), "--flexible", "--out", str(tmp_path / "out")]
+    assert main(["identify", "dynamics", *arguments]) == 0
+    assert "turn.bearing_y.stiffness" in capsys.readouterr().out
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+@pytest.mark.parametrize(
+    ("change", "sentence"),
+    [
+        (lambda table: table.drop("qay1", "qay2"), "qay1…qay2 .* are not all there"),
+        (
+            lambda table: table.with_columns(pl.col("qax1") * 1e3),
+            "a bearing tilts by .* farther than bearings do",
+        ),
+    ],
+)
+def test_tilts_that_cannot_be(change, sentence: str, log: Path, tmp_path: Path) -> None:
+    own = tmp_path / "log.parquet"
+    change(pl.read_parquet(log)).write_parquet(own)
+    with pytest.raises(InputError, match=sentence):
+        identify_robot_dynamics(robot_of(tmp_path), [own], flexible=True)
+
+
+def test_tilts_of_no_bearings(log: Path, tmp_path: Path) -> None:
+    robot = robot_of(tmp_path)
+    lines = robot.read_text().splitlines()
+    start = lines.index("elastic:")
+    robot.write_text("\n".join([*lines[: start + 1], "  - {joint: turn, drive: {stiffness: 5000}}"]))
+    with pytest.raises(InputError, match="declares no bearings, but the logs have their tilts"):
+        identify_robot_dynamics(robot, [log], flexible=True)
