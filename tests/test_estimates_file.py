@@ -147,6 +147,8 @@ def test_a_damaged_other_block_is_not_overwritten(tmp_path: Path) -> None:
     [
         ("stiffness:\n", "stifness:\n", ["line 1", "unknown key 'stifness'", "'stiffness'?"]),
         ("rank: 3", "rnk: 3", ["unknown key 'rnk' in stiffness.fit", "'rank'?"]),
+        ("rank: 3", "rank: -3", ["must not be negative"]),
+        ("std: ", "std: -", ["a standard deviation must not be negative"]),
         ("rank: 3", "rank: three", ["stiffness.fit.rank", "a whole number"]),
         ("scale: log", "scale: cubic", ["scale", "'linear', 'log'"]),
         ("estimate: 47900.0", "estimate: .nan", ["joint_1.drive.stiffness.estimate", "finite"]),

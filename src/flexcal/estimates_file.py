@@ -46,6 +46,12 @@ class StoredValue:
     prior_std: float | None = None
     prior_mean: float | None = None
 
+    def __post_init__(self) -> None:
+        if self.std is not None and self.std < 0:
+            raise FlexcalError(f"a standard deviation must not be negative, not {self.std:g}.")
+        if self.low is not None and self.high is not None and not self.low <= self.high:
+            raise FlexcalError(f"the interval from {self.low:g} to {self.high:g} has its ends exchanged.")
+
 
 @dataclass(frozen=True)
 class StoredDropped:
@@ -69,6 +75,10 @@ class StoredFit:
     outliers: tuple[int, ...] = ()
     covariance_freedom: float | None = None
     misfit: Misfit | None = None
+
+    def __post_init__(self) -> None:
+        if min(self.rank, self.chi2, self.degrees_of_freedom, self.iterations) < 0:
+            raise FlexcalError("rank, chi2, degrees_of_freedom and iterations must not be negative.")
 
 
 @dataclass(frozen=True)

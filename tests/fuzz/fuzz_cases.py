@@ -61,7 +61,7 @@ SUBJECTS = (
             "export urdf robot.yaml --out new.urdf",
             CALIBRATE,
             DYNAMICS,
-            "design poses robot.yaml --count 4 --candidates 30 --out new.yaml",
+            "design poses robot.yaml --count 6 --candidates 30 --out new.yaml",
             "measure plan.yaml --robot robot.yaml --cell virtual --config cell.yaml --out new",
             "identify stiffness robot.yaml responses --out new",
             "compensate robot.yaml targets.csv --out new.csv",
@@ -168,8 +168,10 @@ SUBJECTS = (
 
 
 def cases(seeds: Path, *, every_line: bool = False) -> Iterator[Case]:
-    """Every subject's mutations; the command lines take turns, or all of them read each with `every_line`."""
+    """Mutations of every subject that is among the `seeds`; the command lines take turns, or all of them read each with `every_line`."""
     for subject in SUBJECTS:
+        if not (seeds / subject.file).is_file():
+            continue
         content = (seeds / subject.file).read_bytes()
         turn = 0
         for mutation in subject.mutations:
@@ -179,3 +181,10 @@ def cases(seeds: Path, *, every_line: bool = False) -> Iterator[Case]:
                 for line in lines:
                     verb = line.partition(" ")[0] if len(lines) == 1 else "_".join(line.split()[:2])
                     yield Case(f"{subject.file}-{label}-{verb}", subject.file, broken, tuple(line.split()))
+
+
+def names_of(case: Case) -> list[str]:
+    """Names one of which a refusal has to mention: of the broken file, its folder, or a file or folder on the command line."""
+    named = [Path(case.file).name, case.file.partition("/")[0]]
+    folders = ("results", "verification", "responses", "frequency")
+    return [*named, *(word for word in case.arguments if "." in word or word in folders)]

@@ -10,6 +10,7 @@ from flexcal.errors import InputError
 from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model import RobotModel, static_equilibrium
+from flexcal.model.names import unit_of
 from flexcal.model.stored import apply_estimates
 
 
@@ -124,13 +125,20 @@ def test_springs_do_not_stand_on_links_that_no_body_can_be(examples: Path, tmp_p
     inertial = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
     values = {f"link_3.{key}": nominal.value(f"link_3.{key}") for key in inertial}
     path = tmp_path / "estimates.yaml"
-    write_estimates(path, "dynamics", estimate(*(Parameter(n, "1", v) for n, v in values.items())))
+    write_estimates(path, "dynamics", estimate(*(Parameter(n, unit_of(n), v) for n, v in values.items())))
     assert RobotModel.from_yaml(robot).value("link_3.Ixx") == pytest.approx(values["link_3.Ixx"])
     values["link_3.Ixx"] *= 9
-    write_estimates(path, "dynamics", estimate(*(Parameter(n, "1", v) for n, v in values.items())))
+    write_estimates(path, "dynamics", estimate(*(Parameter(n, unit_of(n), v) for n, v in values.items())))
     with pytest.raises(
         InputError, match=r"estimates\.yaml: .* not physically consistent for link_3, .* --estimator sdp"
     ):
         RobotModel.from_yaml(robot)
     rigid = replace(nominal, bearing_frames={})
     assert apply_estimates(rigid, path).value("link_3.Ixx") == pytest.approx(values["link_3.Ixx"])
+
+
+def test_an_estimate_in_another_unit_is_refused(robot: Path) -> None:
+    path = robot.parent / "estimates.yaml"
+    write_estimates(path, "calibration", estimate(Parameter("tool.length_x", "mm", -0.2)))
+    with pytest.raises(InputError, match=r"estimates\.yaml: .*'tool\.length_x' in 'mm', not in m"):
+        RobotModel.from_yaml(robot)

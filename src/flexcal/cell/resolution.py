@@ -37,8 +37,14 @@ def resolved_plant(
         for refinement in REFINEMENTS:
             substeps = config.controller.substeps * refinement
             step = 1 / (rate_hz * substeps)
-            plant = build_plant(truth, tried, q=q, free=free, payload=payload, time_step=step)
-            missed = unresolved(plant)
+            try:
+                plant = build_plant(truth, tried, q=q, free=free, payload=payload, time_step=step)
+                missed = unresolved(plant)
+            except ValueError as problem:  # of MuJoCo's compiler, and of a mass matrix that is singular
+                raise FlexcalError(
+                    f"the virtual robot of {truth.path} cannot be simulated ({' '.join(str(problem).split())}); correct its masses, "
+                    "inertias and springs, there or in the truth."
+                ) from problem
             if missed is None:
                 return plant, substeps
             phrase = f"plant steps of {step * 1e3:g} ms are too long for {missed}"

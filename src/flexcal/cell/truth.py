@@ -14,6 +14,7 @@ from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY, SPRINGS, STATION, unit_of
 from flexcal.model.stored import NUISANCE
 from flexcal.structuring import Keys, suggestion
+from flexcal.units import LARGEST
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import write_yaml
 
@@ -141,7 +142,7 @@ def _is_block(item: object) -> bool:
 
 def _value(file: YamlFile, keys: Keys, entry: object) -> float:
     value = entry.get("estimate") if isinstance(entry, Mapping) else entry
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
         raise file.error(
             keys, f"the true value of '{keys[-1]}' is not a number; write one, or `{{estimate: 1.0}}`."
         )

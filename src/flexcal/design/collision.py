@@ -13,6 +13,7 @@ from flexcal.model import RobotModel
 from flexcal.model.joint_space import even_configurations
 from flexcal.model.kinematics import joint_batch
 from flexcal.model.urdf import locked_joints
+from flexcal.model.urdf_xml import read_elements
 
 _SAMPLES = 200
 _FLOOR = "floor"
@@ -49,7 +50,7 @@ class CollisionChecker:
         self.model = model
         self.margin = margin
         self.floor = floor
-        whole = pin.buildModelFromUrdf(str(model.urdf))
+        whole = pin.buildModelFromXML(read_elements(model.urdf).text())
         shapes = _shapes(whole, model.urdf)
         self.kinematics: Any
         self.kinematics, self.geometry = pin.buildReducedModel(
@@ -186,9 +187,9 @@ def _shapes(pin_model: Any, urdf: Path) -> Any:
     import pinocchio as pin
 
     try:
-        geometry = pin.buildGeomFromUrdf(
+        geometry = pin.buildGeomFromUrdfString(
             pin_model,
-            str(urdf),
+            read_elements(urdf).text(),
             pin.GeometryType.COLLISION,
             package_dirs=[str(above) for above in urdf.absolute().parents],
         )
@@ -211,7 +212,7 @@ def _add_obstacle(geometry: Any, path: Path) -> None:
     if not path.is_file():
         raise InputError(f"{path}: there is no such obstacle; correct `obstacles:` in robot.yaml.")
     try:
-        model = pin.buildModelFromUrdf(str(path))
+        model = pin.buildModelFromXML(read_elements(path).text())
     except (ValueError, RuntimeError) as problem:
         raise InputError(f"{path}: not a valid URDF; correct it or remove it from `obstacles:`.") from problem
     if model.njoints > 1:

@@ -16,6 +16,7 @@ from flexcal.estimation import Estimate
 from flexcal.model.config import Bearings
 from flexcal.model.further_springs import with_estimated_springs
 from flexcal.model.held_payload import holding
+from flexcal.model.names import unit_in, unit_of
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.model.robot_model import RobotModel
 
@@ -39,10 +40,11 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
 
     A joint whose backlash was estimated counts as declared to have backlash, one whose drive stiffness was estimated as elastic, and a
     payload that was identified as declared in its frame.
-    Raises `InputError` for a name that the robot does not have: the file is then of another robot, or robot.yaml has changed since; where
-    robot.yaml declares the payload in another frame; and for an elastic robot where `dynamics` has links that no body can be, as linear
-    least squares may: they give the right torques at the joints, and wrong ones everywhere else. Bearings that robot.yaml does not declare
-    are those of the blocks; raises too where they are others than declared, or not the same in all blocks.
+    Raises `InputError` for a unit that is not the parameter's; for a name that the robot does not have: the file is then of another
+    robot, or robot.yaml has changed since; where robot.yaml declares the payload in another frame; and for an elastic robot where
+    `dynamics` has links that no body can be, as linear least squares may: they give the right torques at the joints, and wrong ones
+    everywhere else. Bearings that robot.yaml does not declare are those of the blocks; raises too where they are others than declared, or
+    not the same in all blocks.
     """
     model = _with_bearings(model, blocks, path)
     if "payload" in blocks:
@@ -57,10 +59,20 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
                 f"{path}: the block '{block}' has '{unknown[0]}', which the robot of {model.path} does not have; "
                 "identify again, or give the robot.yaml that belongs to it."
             )
+        _check_units(model, block, estimate, path)
         model = _with_backlash_joints(model.with_estimate(estimate), estimate)
         if block == "dynamics" and model.elastic:
             _check_bodies(model, estimate, path)
     return model
+
+
+def _check_units(model: RobotModel, block: Block, estimate: Estimate, path: Path) -> None:
+    for parameter in estimate.parameters:
+        units = (unit_in(model, parameter.name), unit_of(parameter.name))
+        if parameter.name in model.values and parameter.unit not in units:
+            raise InputError(
+                f"{path}: the block '{block}' has '{parameter.name}' in '{parameter.unit}', not in {units[0]}; identify again."
+            )
 
 
 def _with_bearings(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:

@@ -52,14 +52,11 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
 
     if not path.is_file():
         raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
-    links = carried_links(read_elements(path), locked)
-    try:
-        str(path.absolute()).encode("utf-8")
-    except UnicodeEncodeError:
-        raise InputError(f"{path}: the URDF's path is not UTF-8; rename what is not.") from None
+    robot = read_elements(path)
+    links = carried_links(robot, locked)
     with _silenced() as said:
         try:
-            model = pin.buildModelFromUrdf(str(path))
+            model = pin.buildModelFromXML(robot.text())
         except (ValueError, RuntimeError) as problem:
             raise InputError(f"{path}: not a valid URDF ({_first_complaint(said)}); correct it.") from problem
     _check_locked(path, model, locked)

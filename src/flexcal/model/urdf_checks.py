@@ -10,6 +10,8 @@ from flexcal.model.urdf_xml import Element
 
 KINDS = ("revolute", "continuous", "prismatic", "fixed")
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+MOST_JOINTS = 100
+"""Movable ones of a robot."""
 _ROUNDING = 1e-9
 """Share of its largest moment by which an inertia may fail to be positive."""
 
@@ -64,15 +66,27 @@ def carried_links(robot: Element, locked: Container[str]) -> dict[str, str]:
             raise link.error(
                 f"the link '{name}' is carried by itself; correct the joints' parents and children."
             )
+    moving = [
+        name for name in carried if joints[name].attributes.get("type") != "fixed" and name not in locked
+    ]
+    if len(moving) > MOST_JOINTS:
+        raise joints[moving[MOST_JOINTS]].error(
+            f"the robot has {len(moving)} movable joints, but flexcal handles at most {MOST_JOINTS}; say where the others stand under "
+            "`locked:` in robot.yaml."
+        )
     return {joint: carried[joint] for joint in _beyond(roots[0], carried, parents)}
 
 
 def _beyond(link: str, carried: dict[str, str], parents: dict[str, str]) -> Iterator[str]:
     """The joints beyond a link, each followed by those beyond the link that it carries."""
+    of: dict[str, list[str]] = {}
     for joint, child in carried.items():
-        if parents[child] == link:
-            yield joint
-            yield from _beyond(child, carried, parents)
+        of.setdefault(parents[child], []).append(joint)
+    waiting = of.get(link, [])[::-1]
+    while waiting:
+        joint = waiting.pop()
+        yield joint
+        waiting += of.get(carried[joint], [])[::-1]
 
 
 def _named(robot: Element, tag: str) -> dict[str, Element]:

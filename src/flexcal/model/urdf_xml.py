@@ -6,12 +6,14 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.units import LARGEST
 
+_DEEPEST = 50
 _QUOTED = 60
 """Letters of an attribute that a message quotes."""
 
@@ -33,6 +35,12 @@ class Element:
     def find(self, tag: str) -> Element | None:
         """The first child of this tag."""
         return next(self.all(tag), None)
+
+    def text(self) -> str:
+        """The element as XML, with attributes and children alone: no text, comments, entities or encoding."""
+        attributes = "".join(f" {name}={quoteattr(value)}" for name, value in self.attributes.items())
+        inside = "".join(child.text() for child in self.children)
+        return f"<{self.tag}{attributes}>{inside}</{self.tag}>" if inside else f"<{self.tag}{attributes}/>"
 
     def error(self, sentence: str) -> InputError:
         """An `InputError` that places `sentence` at the element's line."""
@@ -64,6 +72,10 @@ def read_elements(path: Path) -> Element:
 
     def start(tag: str, attributes: dict[str, str]) -> None:
         element = Element(path, tag, attributes, parser.CurrentLineNumber)
+        if len(above) > _DEEPEST:
+            raise element.error(
+                f"elements nest more than {_DEEPEST} deep, so this is no URDF; name the robot's URDF."
+            )
         (above[-1].children if above else roots).append(element)
         above.append(element)
 
@@ -81,5 +93,9 @@ def read_elements(path: Path) -> Element:
         raise InputError(
             f"{path} line {problem.lineno}, column {problem.offset + 1}: not well-formed XML "
             f"({expat.ErrorString(problem.code)}); correct it there."
+        ) from problem
+    except (ValueError, LookupError) as problem:
+        raise InputError(
+            f"{path} line 1: its encoding is not supported ({problem}); save it as UTF-8."
         ) from problem
     return roots[0]

@@ -11,6 +11,7 @@ from flexcal.design.skeleton import link_frames
 from flexcal.model import RobotModel
 from flexcal.model.placement import joint_placement, point_placement
 from flexcal.model.urdf import locked_joints
+from flexcal.model.urdf_xml import read_elements
 from flexcal.report.primitives import box, capsule, cylinder, decimated, ellipsoid
 
 _MOST = 6000
@@ -59,11 +60,12 @@ def _urdf_shapes(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
     """(joint, vertices in its link, triangles) of every shape; empty where the URDF has none that can be read."""
     import pinocchio as pin
 
-    whole = pin.buildModelFromUrdf(str(model.urdf))
+    urdf = read_elements(model.urdf).text()
+    whole = pin.buildModelFromXML(urdf)
     folders = [str(above) for above in model.urdf.absolute().parents]
     for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION):
         try:
-            shapes = pin.buildGeomFromUrdf(whole, str(model.urdf), kind, package_dirs=folders)
+            shapes = pin.buildGeomFromUrdfString(whole, urdf, kind, package_dirs=folders)
         except (ValueError, RuntimeError):
             continue
         reduced, shapes = pin.buildReducedModel(whole, shapes, *locked_joints(whole, model.config.locked))

@@ -50,8 +50,8 @@ def read_fitting_plan(path: Path, model: RobotModel) -> Plan:
     return plan
 
 
-def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyResponse]]:
-    """Frequency responses from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
+def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path], list[FrequencyResponse]]:
+    """Frequency responses of a robot from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
     files: list[Path] = []
     for path in paths:
         found = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
@@ -62,6 +62,11 @@ def read_responses(paths: Sequence[Path]) -> tuple[list[Path], list[FrequencyRes
         files += found
     require_distinct(files)
     responses = [FrequencyResponse.load(file) for file in files]
+    for file, response in zip(files, responses, strict=True):
+        if response.q_mean.size != model.n:
+            raise InputError(
+                f"{file} is of a robot of {response.q_mean.size} joints, but {model.path} has {model.n}; give the responses of this robot."
+            )
     order = sorted(range(len(files)), key=lambda i: responses[i].pose)
     return [files[i] for i in order], [responses[i] for i in order]
 

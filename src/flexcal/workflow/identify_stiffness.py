@@ -124,7 +124,7 @@ def identify_robot_stiffness(
     if calibrated is not None:
         geometric = {n: v for n, v in calibrated.values.items() if n.rpartition(".")[2] in _GEOMETRIC}
         model = model.with_values(geometric)
-    inputs, responses = read_responses(files)
+    inputs, responses = read_responses(files, bare)
     plans = plan_files(inputs)
     plan = common_plan(plans)
     result = identify_stiffness(

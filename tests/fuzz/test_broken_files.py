@@ -1,0 +1,83 @@
+"""Broken files: every one ends in success or in one sentence that names a file; never in a traceback, a crash, a hang, or an escape
+sequence on the terminal.
+
+`make test-all` runs `STORED` and every `STRIDE`-th of all generated cases, `make test` a few of both.
+"""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from fuzz_cases import Case, cases, names_of
+from fuzz_process import FlexcalProcesses
+from fuzz_seeds import run_verbs, write_files
+
+STRIDE = 14
+QUICK = 700
+BATCHES = 12
+
+
+@pytest.fixture(scope="module")
+def flexcal() -> Iterator[FlexcalProcesses]:
+    with FlexcalProcesses() as processes:
+        yield processes
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The arm's own files."""
+    folder = tmp_path_factory.mktemp("files")
+    write_files(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def all_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Those, and what verbs made of them."""
+    folder = tmp_path_factory.mktemp("all_files")
+    write_files(folder)
+    run_verbs(folder)
+    return folder
+
+
+def faults(flexcal: FlexcalProcesses, chosen: list[Case], seeds: Path, folder: Path) -> list[str]:
+    """What is wrong with the endings of some cases, one text a case."""
+    found = []
+    for case in chosen:
+        case.lay_out(seeds, folder / "case")
+        fault = flexcal.run(case.arguments, folder / "case").fault(names_of(case))
+        if fault:
+            found.append(f"{case.name}: flexcal {' '.join(case.arguments)}\n{fault}")
+        shutil.rmtree(folder / "case")
+    return found
+
+
+def test_the_arm_is_valid(flexcal: FlexcalProcesses, files: Path, tmp_path: Path) -> None:
+    """Else every case would end well."""
+    for words in (
+        "export urdf robot.yaml --out new.urdf",
+        "design poses robot.yaml --count 6 --candidates 30 --out new.yaml",
+    ):
+        shutil.copytree(files, tmp_path / "case")
+        ending = flexcal.run(words.split(), tmp_path / "case")
+        assert ending.status == 0 and ending.fault([]) is None, ending
+        shutil.rmtree(tmp_path / "case")
+
+
+def test_a_few_broken_files(flexcal: FlexcalProcesses, files: Path, tmp_path: Path) -> None:
+    chosen = list(cases(files))[::QUICK]
+    assert len(chosen) >= 10
+    assert not faults(flexcal, chosen, files, tmp_path)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("batch", range(BATCHES))
+def test_broken_files(batch: int, flexcal: FlexcalProcesses, all_files: Path, tmp_path: Path) -> None:
+    everything = list(cases(all_files))
+    assert len(everything) > 15_000
+    chosen = everything[::STRIDE][batch::BATCHES]
+    assert len(chosen) * BATCHES > 1000
+    assert not faults(flexcal, chosen, all_files, tmp_path)
