@@ -3,6 +3,7 @@ from .before import ErrorsBefore, RobotBefore, robot_before
 from .drift import Drift
 from .elastic_prior import ElasticPrior
 from .error_statistics import ErrorStatistics
+from .even_sample import EvenSample, all_errors
 from .gauge import POINT_KNOWN, found_point, point_uncertainty, probable_robot, probable_robots
 from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
@@ -38,6 +39,7 @@ __all__ = [
     "ErrorScale",
     "ErrorStatistics",
     "ErrorsBefore",
+    "EvenSample",
     "Moved",
     "Placement",
     "PoseDrift",
@@ -51,6 +53,7 @@ __all__ = [
     "TermSelection",
     "Verification",
     "accuracy_map",
+    "all_errors",
     "best_placement",
     "calibrate",
     "common_way",

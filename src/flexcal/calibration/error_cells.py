@@ -12,7 +12,7 @@ from flexcal.data import PoseSet
 
 _CELL_VISITS, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
 """Visits to poses a block of the model error, and bounds on the number of blocks."""
-_SAME_COMMAND = 1e-4
+SAME_COMMAND = 1e-4
 """Joint positions (rad or m) closer than this are one command."""
 _FEWEST_REPEATED = 5
 """Commands visited more than once that a variance between commands needs."""
@@ -36,8 +36,8 @@ class ErrorCells:
     def of(cls, poses: PoseSet) -> ErrorCells:
         """Rows of one pose number are a visit; those of a target that the visit already has begin another."""
         _, target = np.unique(poses.target, return_inverse=True)
-        visit = _labels(np.column_stack([poses.pose, _occurrence(_labels(poses.pose, target))]))
-        commands = _labels(np.column_stack([np.round(poses.q / _SAME_COMMAND), target]))
+        visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
+        commands = distinct(np.column_stack([np.round(poses.q / SAME_COMMAND), target]))
         repeated = int((np.bincount(commands) > 1).sum())
         command = commands if repeated >= _FEWEST_REPEATED else None
         size = np.bincount(visit)
@@ -50,8 +50,8 @@ class ErrorCells:
 
     def subset(self, rows: np.ndarray) -> ErrorCells:
         """Those of the rows with these indices, or where this mask is true."""
-        blocks = {name: _labels(labels[rows]) for name, labels in self.blocks.items()}
-        return ErrorCells(_labels(self.pose[rows]), **blocks)
+        blocks = {name: distinct(labels[rows]) for name, labels in self.blocks.items()}
+        return ErrorCells(distinct(self.pose[rows]), **blocks)
 
     @property
     def blocks(self) -> dict[str, np.ndarray]:
@@ -67,7 +67,7 @@ class ErrorCells:
     @cached_property
     def visits(self) -> np.ndarray:
         """Rows (G, T) of every visit to a pose, in measuring order; -1 where it has fewer than T."""
-        place = _occurrence(self.pose)
+        place = occurrence(self.pose)
         result = np.full((self.pose.max() + 1, place.max() + 1), -1)
         result[self.pose, place] = np.arange(len(self.pose))
         return result
@@ -91,13 +91,13 @@ def block_columns(labels: np.ndarray) -> np.ndarray:
     return np.kron(rows, np.eye(3)).reshape(len(labels), 3, -1)
 
 
-def _labels(*columns: np.ndarray) -> np.ndarray:
+def distinct(*columns: np.ndarray) -> np.ndarray:
     """Numbers (N,) from 0 of the distinct rows, in the order in which they first appear."""
     _, first, inverse = np.unique(np.column_stack(columns), axis=0, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[inverse.ravel()]
 
 
-def _occurrence(labels: np.ndarray) -> np.ndarray:
+def occurrence(labels: np.ndarray) -> np.ndarray:
     """How many earlier rows (N,) have the same label."""
     order = np.argsort(labels, kind="stable")
     starts = np.flatnonzero(np.diff(labels[order], prepend=labels[order][0] - 1))

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from dataclasses import dataclass
 
 import numpy as np
 
+from flexcal.calibration.error_cells import distinct
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 
 SAME_COMMAND = 1e-4
 """rad or m: rows whose joint positions differ by no more than this are visits to one commanded pose."""
+_CELL = 10 * SAME_COMMAND
+"""Of the look-up of a command; no less than the tolerance."""
 CYCLES = 30
 """Visits to each pose that the standard asks for."""
 _NOISE = np.sqrt(8 / np.pi) + 3 * np.sqrt(3 - 8 / np.pi)
@@ -46,7 +50,8 @@ def repeatability(poses: PoseSet) -> list[PoseRepeatability]:
     if poses.length is not None:
         raise FlexcalError("lengths of a wire do not show where a point is; give points x, y, z.")
     number = _numbers(poses)
-    groups = [np.flatnonzero(number == k) for k in range(number.max() + 1)]
+    order = np.argsort(number, kind="stable")
+    groups = np.split(order, np.cumsum(np.bincount(number))[:-1])
     found = [_evaluate(poses, rows, number) for rows in groups if len(rows) > 1]
     if not found:
         raise FlexcalError(
@@ -68,23 +73,40 @@ def noise_repeatability(sigma: np.ndarray) -> float:
 
 
 def _numbers(poses: PoseSet) -> np.ndarray:
-    """The commanded pose (N,) of every row, counted from 0 in the order in which they first appear."""
+    """The commanded pose (N,) of every row, counted from 0 in the order in which they first appear.
+
+    A row belongs to the first pose before it that it is like; those are looked up in cells of their first and last joints, so that the time
+    is linear in the rows.
+    """
     payload = np.zeros(len(poses)) if poses.payload is None else poses.payload
+    kinds = [np.unique(labels, return_inverse=True)[1] for labels in (poses.target, poses.station)]
+    exact = distinct(np.column_stack([poses.q, payload, *kinds]))
+    rows = np.unique(exact, return_index=True)[1]
+    places = np.floor(poses.q[rows][:, [0, -1]] / _CELL).astype(np.int64).tolist()
     first: list[int] = []
-    number = np.zeros(len(poses), dtype=int)
-    for row in range(len(poses)):
+    cells: defaultdict[tuple[int, int], list[int]] = defaultdict(list)
+    found = []
+    for row, (one, other) in zip(rows.tolist(), places, strict=True):
+        others = sorted(
+            k
+            for a in (one - 1, one, one + 1)
+            for b in (other - 1, other, other + 1)
+            for k in cells.get((a, b), ())
+        )
+        leaders = [first[k] for k in others]
         alike = (
-            (np.abs(poses.q[first] - poses.q[row]) <= SAME_COMMAND).all(axis=1)
-            & (poses.target[first] == poses.target[row])
-            & (poses.station[first] == poses.station[row])
-            & (payload[first] == payload[row])
+            (np.abs(poses.q[leaders] - poses.q[row]) <= SAME_COMMAND).all(axis=1)
+            & (kinds[0][leaders] == kinds[0][row])
+            & (kinds[1][leaders] == kinds[1][row])
+            & (payload[leaders] == payload[row])
         )
         if alike.any():
-            number[row] = int(np.argmax(alike))
+            found.append(others[int(np.argmax(alike))])
         else:
-            number[row] = len(first)
+            found.append(len(first))
+            cells[one, other].append(len(first))
             first.append(row)
-    return number
+    return np.array(found)[exact]
 
 
 def _evaluate(poses: PoseSet, rows: np.ndarray, number: np.ndarray) -> PoseRepeatability:
@@ -108,12 +130,10 @@ def _rotation_spread(quaternion_wxyz: np.ndarray) -> np.ndarray:
 def _direction_variation(points: np.ndarray, rows: np.ndarray, number: np.ndarray) -> float | None:
     """Directions of approach are distinguished by the commanded pose that was measured before."""
     before = np.where(rows > 0, number[np.maximum(rows - 1, 0)], -1)
-    centres = [
-        points[before == k].mean(axis=0)
-        for k in np.unique(before)
-        if k not in (-1, number[rows[0]]) and (before == k).sum() > 1
-    ]
-    if len(centres) < 2:
+    labels, own, counts = np.unique(before, return_inverse=True, return_counts=True)
+    sums = np.array([np.bincount(own, coordinate) for coordinate in points.T]).T
+    several = (counts > 1) & (labels != -1) & (labels != number[rows[0]])
+    if several.sum() < 2:
         return None
-    apart = np.array(centres)
-    return float(np.linalg.norm(apart[:, None] - apart[None], axis=2).max())
+    centres = sums[several] / counts[several, None]
+    return max(float(np.linalg.norm(centres - one, axis=1).max()) for one in centres)

@@ -189,6 +189,11 @@ class DesignPoses:
 
     def _say_pool(self, console: Console, document: Mapping[str, Any]) -> None:
         if self.pool is not None:
+            if "drawn" in document:
+                drawn = document["drawn"]
+                console.say(
+                    f"of {drawn['among']} poses {drawn['considered']}, drawn at random, were considered"
+                )
             console.say(f"chosen from {self.pool}: {', '.join(map(str, document['chosen']))}")
             unsure, hidden = len(document["flank_not_sure"]), len(document["not_seen"])
             if unsure:

@@ -41,14 +41,16 @@ class Verify:
         require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
         console = Console(self.json)
-        found = verify_robot(
-            self.robot,
-            self.poses,
-            estimates=self.estimates,
-            refit=tuple(dict.fromkeys(self.refit)),
-            out=self.out,
-            command=command_line(),
-        )
+        with console.progress() as progress:
+            found = verify_robot(
+                self.robot,
+                self.poses,
+                estimates=self.estimates,
+                refit=tuple(dict.fromkeys(self.refit)),
+                out=self.out,
+                command=command_line(),
+                progress=progress,
+            )
         document = found.document()
         blocks = document["verification"]
         labels = {"measured": "calibrated"}

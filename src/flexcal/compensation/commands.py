@@ -104,4 +104,4 @@ def _solve(
         model, q[done], commands.torque[commands.found], carried_mass(model, targets.payload, size)[done]
     )
     unambiguous[done] = certain[:, list(model.backlash_joints)].all(axis=1)
-    return Compensation(q, known, before, unambiguous, elsewhere, reason.astype(str))
+    return Compensation(q, known, before, unambiguous, elsewhere, reason)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,12 +13,13 @@ from flexcal.errors import FlexcalError
 class PosePool:
     """N feasible poses: `q` (N, n) rad, their numbers `pose` (N,), and the `payload` (kg) held in all of them; None as declared.
 
-    Raises `FlexcalError` where shapes do not fit or a number stands twice.
+    They may have been drawn from `among` poses. Raises `FlexcalError` where shapes do not fit or a number stands twice.
     """
 
     q: np.ndarray
     pose: np.ndarray
     payload: float | None = None
+    among: int | None = None
 
     def __post_init__(self) -> None:
         if self.q.ndim != 2 or self.pose.shape != self.q.shape[:1]:
@@ -33,4 +34,11 @@ class PosePool:
 
     def subset(self, rows: np.ndarray) -> PosePool:
         """The poses with these indices, or where this mask is true, in their order."""
-        return PosePool(self.q[rows], self.pose[rows], self.payload)
+        return replace(self, q=self.q[rows], pose=self.pose[rows])
+
+    def drawn(self, most: int) -> PosePool:
+        """At most so many of them, at random but always the same ones, in their order."""
+        if len(self) <= most:
+            return self
+        rows = np.sort(np.random.default_rng(0).choice(len(self), most, replace=False))
+        return replace(self.subset(rows), among=len(self))

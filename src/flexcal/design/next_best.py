@@ -11,7 +11,7 @@ from flexcal.design.best_possible import least_trace
 from flexcal.design.criteria import DOptimal, TraceOptimal
 from flexcal.design.exchange_algorithm import greedy
 from flexcal.design.feasible_poses import PoseCandidates
-from flexcal.design.geometry_sensitivity import geometry_jacobian, measuring_noise
+from flexcal.design.geometry_sensitivity import BLOCK, geometry_jacobian, measuring_noise
 from flexcal.design.poses import CriterionName, PoseDesign, criterion_named, tool_error
 from flexcal.design.setup import MeasuringSetup
 from flexcal.errors import FlexcalError
@@ -61,9 +61,8 @@ def next_poses(
     if not isinstance(merit, DOptimal | TraceOptimal):
         raise FlexcalError(f"the criterion of the next poses must be c, A or D, not {criterion}.")
     before = found.base.sensitivity
-    rows, noisier = measured_rows(found, measured)
-    flat = rows.reshape(-1, rows.shape[2])
-    information = before.prior_information + flat.T @ flat
+    added, noisier = measured_information(found, measured)
+    information = before.prior_information + added
     known = Sensitivity(before.jacobian / noisier, before.parameters, information)
     base = replace(found.base, sensitivity=known)
     selection = greedy(known, count, merit)
@@ -76,20 +75,30 @@ def next_poses(
     return NextPoses(design, done, np.array(errors), np.minimum(least, errors))
 
 
-def measured_rows(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
-    """Whitened rows (N, 3, rank) of measured poses in the combinations that the candidates tell apart, and their noise by the setup's."""
+def measured_information(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, float]:
+    """Information (rank, rank) of measured poses on the combinations that the candidates tell apart, and their noise by the setup's."""
+    _check(found.model, measured, found.setup)
+    information, noisier = np.zeros(2 * (len(found.base.scale),)), []
+    for first in range(0, len(measured), BLOCK):
+        rows, ratio = _rows(found, measured.subset(slice(first, first + BLOCK)))
+        flat = rows.reshape(-1, rows.shape[2])
+        information = information + flat.T @ flat
+        noisier.append(ratio)
+    return information, float(np.median(np.concatenate(noisier)))
+
+
+def _rows(found: PoseCandidates, measured: PoseSet) -> tuple[np.ndarray, np.ndarray]:
+    """Whitened rows (N, 3, rank) and noise by the setup's (N, 3)."""
     model, setup = found.model, found.setup
-    _check(model, measured, setup)
     payload = np.full(len(measured), np.nan) if measured.payload is None else measured.payload
     rows = np.zeros((len(measured), 3, len(found.base.scale)))
     for mass in np.unique(payload):
         held = np.isnan(payload) if np.isnan(mass) else payload == mass
         own = replace(setup, payload=setup.payload if np.isnan(mass) else float(mass))
-        jacobian = found.base.columns(geometry_jacobian(model, measured.q[held], own)[1])
-        rows[held] = jacobian
+        rows[held] = found.base.columns(geometry_jacobian(model, measured.q[held], own)[1])
     expected = measuring_noise(model, measured.q, setup)[:, None]
-    std = measured.sigma if measured.sigma_given else expected
-    return rows / std[..., None], float(np.median(std / expected))
+    std = measured.sigma if measured.sigma_given else np.broadcast_to(expected, (len(measured), 3))
+    return rows / std[..., None], std / expected
 
 
 def _check(model: RobotModel, measured: PoseSet, setup: MeasuringSetup) -> None:

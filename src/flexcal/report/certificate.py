@@ -133,7 +133,10 @@ def _judgement(results: Mapping[str, Any]) -> str:
 
 
 def error_strip(before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
-    """Dots of the distances on a logarithmic scale: places of ticks and dots in a drawing 640 wide, with its height."""
+    """Dots of the distances on a logarithmic scale: places of ticks and dots in a drawing 640 wide, with its height.
+
+    Dots at one place of the drawing are drawn once.
+    """
     distances = [np.linalg.norm(errors, axis=1) / MILLIMETRE for errors in (before, after)]
     every = np.concatenate(distances)
     low = np.floor(np.log10(max(float(np.quantile(every, 0.01)), 1e-4)))
@@ -141,7 +144,7 @@ def error_strip(before: np.ndarray, after: np.ndarray) -> dict[str, Any]:
 
     def place(values: np.ndarray) -> list[float]:
         share = (np.log10(np.maximum(values, 10.0**low)) - low) / (high - low)
-        return (_WIDTH * share).round(1).tolist()
+        return np.unique((_WIDTH * share).round(1)).tolist()
 
     powers = np.arange(low, high + 1)
     return {

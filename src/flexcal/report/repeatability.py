@@ -21,6 +21,10 @@ from flexcal.report.sections.provenance import provenance_section
 KINDS = {"nominal": "AP before (the robot's own)", "calibrated": "AP calibrated"}
 
 
+_DRAWN, _LISTED = 20_000, 1000
+"""Visits in a figure and poses in a table, at most."""
+
+
 @dataclass(frozen=True, eq=False)
 class RepeatabilityStudy:
     """The `visited` among `poses` of the robot called `name`, and `results` as the verb prints them."""
@@ -90,7 +94,11 @@ def repeatability_table(results: Mapping[str, Any]) -> Table:
     kinds = [kind for kind in KINDS if f"ap_{kind}_mm" in results]
     columns = ("pose", "visits", *(f"{KINDS[kind]} / mm" for kind in kinds), "RP / mm", "vAP / mm")
     rows = []
-    for item in results["each"]:
+    most = sorted(results["each"], key=lambda item: -item["rp_mm"])[:_LISTED]
+    listed = (
+        sorted(most, key=lambda item: item["pose"]) if len(results["each"]) > _LISTED else results["each"]
+    )
+    for item in listed:
         accuracy = [document_millimetres(item[f"ap_{kind}_mm"]) for kind in kinds]
         rows.append(
             (
@@ -101,7 +109,12 @@ def repeatability_table(results: Mapping[str, Any]) -> Table:
                 document_millimetres(item["vap_mm"]),
             )
         )
-    return Table("table-poses", "Pose by pose", columns, tuple(rows))
+    caption = (
+        "Pose by pose"
+        if listed is results["each"]
+        else f"The {_LISTED} poses with the largest RP, of {results['poses']}"
+    )
+    return Table("table-poses", caption, columns, tuple(rows))
 
 
 def _checks(study: RepeatabilityStudy) -> tuple[Check, ...]:
@@ -197,11 +210,16 @@ def _poses_section(study: RepeatabilityStudy) -> Section:
 def _order_section(study: RepeatabilityStudy) -> Section:
     rows = np.concatenate([pose.rows for pose in study.visited])
     deviations = np.concatenate([pose.deviations for pose in study.visited])
+    stride = -(-len(rows) // _DRAWN)
+    drawn = np.argsort(rows)[::stride]
+    thinned = f" Of {len(rows)} visits one in {stride} is drawn." if stride > 1 else ""
     block = FigureBlock(
         "figure-order",
         "Deviations from the barycentre, in the order of measuring",
-        residual_trend(rows, deviations, "row of the file, in order", "measured minus barycentre"),
-        "A trend indicates drift: a robot that warms up or an instrument that settles.",
+        residual_trend(
+            rows[drawn], deviations[drawn], "row of the file, in order", "measured minus barycentre"
+        ),
+        f"A trend indicates drift: a robot that warms up or an instrument that settles.{thinned}",
         "Components of the deviations in measuring order.",
     )
     return Section("order", "In the order of measuring", "", (block,))

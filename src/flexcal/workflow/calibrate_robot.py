@@ -16,7 +16,10 @@ from flexcal.calibration import (
     CrossValidation,
     Drift,
     ErrorsBefore,
+    ErrorStatistics,
+    EvenSample,
     TermSelection,
+    all_errors,
     calibrate,
     compare_bearings,
     cross_validated,
@@ -61,6 +64,7 @@ from flexcal.workflow.results import (
     quantities,
     write_results,
 )
+from flexcal.workflow.sample_remarks import fitted_sample, sample_document
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 
 AUTO = "auto"
@@ -73,7 +77,8 @@ class RobotCalibration:
     `before` are the errors of the uncalibrated robot; `rigid` is the fit without elasticity and further terms, `selected` the one that is
     stored in the file `estimates`; `selection`, and `validated`, the errors of `selected` at poses left out, are None where the terms were
     given. `command` is the command line, where there was one. `bearings` says which bearing axes the points prefer; `stiffness` is what
-    stage 1 left in the estimates, where it did.
+    stage 1 left in the estimates, where it did. Of more points than a fit takes, `sample` says which were fitted, and `everywhere` are the
+    errors of `selected` at all of them.
     """
 
     before: ErrorsBefore
@@ -86,6 +91,8 @@ class RobotCalibration:
     bearings: BearingAxes | None = None
     stiffness: Estimate | None = None
     validated: CrossValidation | None = None
+    sample: EvenSample | None = None
+    everywhere: ErrorStatistics | None = None
 
     @property
     def points(self) -> MeasuredPoints:
@@ -164,6 +171,7 @@ class RobotCalibration:
             },
             "variances": selected.variances,
             "drift": drift.document(),
+            "sample": sample_document(self.sample, self.everywhere),
             "outliers": [
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)
@@ -171,6 +179,7 @@ class RobotCalibration:
             "bearings": bearings_block(self.bearings),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
+                *fitted_sample(self.sample, self.everywhere),
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *calibration_remarks(selected, bearings if blamed else ()),
                 *(() if blamed else bearings),
@@ -213,8 +222,10 @@ def calibrate_robot(
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
     model = with_blocks(bare, blocks, source)
-    poses = read_poses(list(files), model)
-    require_points(poses, " and ".join(str(file) for file in files))
+    measured = read_poses(list(files), model)
+    require_points(measured, " and ".join(str(file) for file in files))
+    sample = EvenSample.of(measured)
+    poses = measured if sample is None else measured.subset(sample.rows)
     wanted = _terms(model, terms)
     progress("reading", 1.0)
 
@@ -276,6 +287,8 @@ def calibrate_robot(
         bearings,
         blocks.get("stiffness"),
         None if selection is None else cross_validated(selected),
+        sample,
+        None if sample is None else all_errors(selected.model, measured, progress),
     )
     store_block(source, target, blocks, "calibration", estimate)
     if out is not None:

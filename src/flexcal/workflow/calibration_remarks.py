@@ -21,6 +21,7 @@ _OVERSTATED, _UNDERSTATED = 0.5, 2.0
 """Estimated noise over the stated sigma, below and above which a remark is made."""
 
 _SHOWN = 3
+_LISTED = 20
 
 
 @dataclass(frozen=True)
@@ -46,8 +47,9 @@ def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[st
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
     if outliers:
-        listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers)
-        remarks.append(f"{len(outliers)} outliers: {listed}")
+        listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers[:_LISTED])
+        more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
+        remarks.append(f"{len(outliers)} outliers: {listed}{more}")
     remarks += [*_undetermined(fit), *_noise(fit)]
     drift = Drift.of(fit)
     if drift.certain:

@@ -15,6 +15,7 @@ from flexcal.calibration import (
     ErrorCovariance,
     ErrorScale,
     ErrorStatistics,
+    EvenSample,
     PoseRepeatability,
     Verification,
     best_placement,
@@ -82,7 +83,7 @@ class RobotCertificate:
     """Before and after at the same targets; `refitted`: after, with instrument and point registered by best fit, as before.
 
     `before` are the robot's own errors, `declared` and `registered` the others of `RobotBefore`. `verification` and `scale`: the
-    measurements after against what the calibration predicts. `command`: the command line.
+    measurements after against what the calibration predicts, of a `sample` where there are very many. `command`: the command line.
     """
 
     robot: CalibratedRobot
@@ -94,6 +95,7 @@ class RobotCertificate:
     uncompared: int
     verification: Verification
     scale: ErrorScale
+    sample: EvenSample | None
     files: Mapping[str, str]
     fitted: tuple[str, ...]
     command: str = ""
@@ -118,6 +120,11 @@ class RobotCertificate:
         if self.uncompared:
             remarks.append(
                 f"targets that were measured only before or only after are not compared: {self.uncompared}"
+            )
+        if self.sample is not None:
+            remarks.append(
+                f"accuracy is that of all {self.sample.total} points; the prediction is compared at {len(self.sample.rows)} of them, drawn "
+                "evenly over positions and stations"
             )
         if self.fitted:
             remarks.append(
@@ -218,7 +225,9 @@ def certify_robot(
         raise InputError(
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
         )
-    known, covariance = verify_jointly(model, visited[after][0])
+    sample = EvenSample.of(visited[after][0])
+    judged = slice(None) if sample is None else sample.rows
+    known, covariance = verify_jointly(model, visited[after][0].subset(judged))
     there = _visited(visited[after][0], _placed(model, *visited[after]))
     start = visited[before][0]
     declared = as_declared[rows[before][np.isin(wanted.pose[rows[before]], common)]]
@@ -233,6 +242,7 @@ def certify_robot(
         len(every) - len(common),
         known,
         error_scale(known, _measured_noise(there, covariance)),
+        sample,
         _files(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
@@ -275,9 +285,11 @@ def _rows(file: Path, poses: PoseSet, targets: Path, wanted: ToolTargets) -> np.
 
 def _placed(model: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray:
     """Targets (N, 3), given as `points` (N, 3) in the base frame, where `model` has the instrument's stations; m."""
-    places = np.array([model.station[model.station_index(name)] for name in poses.station.tolist()])
-    turns = np.array([vector_rotation(place[3:]) for place in places])
-    return np.matmul(turns, points[:, :, None])[:, :, 0] + places[:, :3]
+    placed = np.empty_like(points)
+    for name in poses.stations:
+        own, place = poses.station == name, model.station[model.station_index(name)]
+        placed[own] = points[own] @ vector_rotation(place[3:]).T + place[:3]
+    return placed
 
 
 def _registered(poses: PoseSet, points: np.ndarray) -> np.ndarray:
@@ -295,8 +307,8 @@ def _best_fit(nominal: RobotModel, poses: PoseSet, points: np.ndarray) -> np.nda
 
 def _visited(poses: PoseSet, targets: np.ndarray) -> Visited:
     errors = poses.position - targets
-    numbers = np.unique(poses.pose)
-    centres = np.array([errors[poses.pose == k].mean(axis=0) for k in numbers])
+    numbers, own, counts = np.unique(poses.pose, return_inverse=True, return_counts=True)
+    centres = np.array([np.bincount(own, coordinate) for coordinate in errors.T]).T / counts[:, None]
     visits = repeatability(poses) if len(numbers) < len(poses) else None
     return Visited(poses, errors, numbers, centres, visits)
 
@@ -306,7 +318,7 @@ def _measured_noise(visited: Visited, covariance: ErrorCovariance) -> ErrorCovar
     if visited.visits is None:
         return covariance
     variance = _visit_to_visit(visited.visits) ** 2 / 3
-    return replace(covariance, independent=np.tile(variance * np.eye(3), (len(visited.errors), 1, 1)))
+    return replace(covariance, independent=np.tile(variance * np.eye(3), (len(covariance.roots), 1, 1)))
 
 
 def _visit_to_visit(visits: list[PoseRepeatability]) -> float:

@@ -115,11 +115,13 @@ def pool_block(design: PoseDesign, pool: PosePool | None, seed: int) -> dict[str
     if pool is None:
         return {"seed": seed}
     left_out = np.setdiff1d(pool.pose, design.candidates.pose)
+    drawn = {} if pool.among is None else {"drawn": {"considered": len(pool), "among": pool.among}}
     return {
         "seed": None,
         "chosen": design.numbers,
         "flank_not_sure": np.setdiff1d(left_out, design.hidden),
         "not_seen": design.hidden,
+        **drawn,
     }
 
 

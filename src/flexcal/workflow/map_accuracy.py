@@ -13,6 +13,7 @@ from flexcal.calibration import (
     AccuracyMap,
     ErrorsBefore,
     ErrorScale,
+    EvenSample,
     Propagation,
     Verification,
     accuracy_map,
@@ -236,6 +237,8 @@ def _verified(
     if not files:
         return None, None, None, ()
     poses = verification_poses(calibrated, files)
+    sample = EvenSample.of(poses)
+    poses = poses if sample is None else poses.subset(sample.rows)
     found, covariance = verify_jointly(calibrated.model, poses)
     if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
         (said,) = refit_remarks(found, poses, None, moved)

@@ -21,6 +21,9 @@ from flexcal.errors import InputError
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.progress import Progress
 
+MOST_GIVEN = 20_000
+"""Poses of a file that are considered; more are drawn from."""
+
 
 @dataclass(frozen=True, eq=False)
 class PoseChoice:
@@ -51,7 +54,11 @@ class PoseChoice:
         """
         checker = CollisionChecker(model)
         place = working_volume(checker, working, seed)
-        given = read_pose_pool(candidates, model) if isinstance(candidates, Path) else candidates
+        given = (
+            read_pose_pool(candidates, model).drawn(MOST_GIVEN)
+            if isinstance(candidates, Path)
+            else candidates
+        )
         found = pose_candidates(
             model,
             rng=rng,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -10,10 +10,14 @@ import numpy as np
 
 from flexcal.calibration import ErrorStatistics
 from flexcal.data import ToolTargets, read_commands, write_targets
-from flexcal.model import carried_mass, tool_at_rest
+from flexcal.model import RobotModel, carried_mass, tool_at_rest
 from flexcal.model.flank import certain_flank
 from flexcal.model.resting_tool import points_kinematics
+from flexcal.progress import Progress, silent
 from flexcal.workflow.calibrated_robot import calibrated_robot
+
+_BLOCK = 20_000
+"""Commands whose tool poses are computed together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,25 +40,37 @@ class RobotPrediction:
         }
 
 
-def predict_robot(robot: Path, file: Path, out: Path, *, estimates: Path | None = None) -> RobotPrediction:
+def predict_robot(
+    robot: Path, file: Path, out: Path, *, estimates: Path | None = None, progress: Progress = silent
+) -> RobotPrediction:
     """Write position and orientation of the real tool at the commands of `file`, in the base frame, to `out`, CSV or Parquet.
 
     Raises `FlexcalError` where there is no calibration or a file does not fit; then nothing is written.
     """
     calibrated = calibrated_robot(robot, estimates, "predict with")
-    model = calibrated.probable
-    commands = read_commands(file, model)
+    progress("reading", 0.0)
+    commands = read_commands(file, calibrated.probable)
+    progress("reading", 1.0)
+    parts = []
+    for first in range(0, len(commands), _BLOCK):
+        progress("predicting", first / len(commands))
+        block = commands.subset(slice(first, first + _BLOCK))
+        parts.append(_predicted(calibrated.probable, calibrated.found, block))
+    progress("predicting", 1.0)
+    position, rotation, beside, certain = (np.concatenate(part) for part in zip(*parts, strict=True))
+    tool = replace(commands, q=None, position=position, rotation=rotation)
+    write_targets(out, tool)
+    return RobotPrediction(tool, beside, certain)
+
+
+def _predicted(
+    model: RobotModel, nominal: RobotModel, commands: ToolTargets
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Positions (N, 3), orientations (N, 3, 3), how far these positions are from the nominal robot's (N, 3), and sure flanks (N,)."""
     assert commands.q is not None
     at = tool_at_rest(model, commands.q, commands.payload, commands.target)
-    nominal = points_kinematics(calibrated.found, commands.q, None, commands.target, jacobians=False)
+    there = points_kinematics(nominal, commands.q, None, commands.target, jacobians=False).position
     payload = carried_mass(model, commands.payload, len(commands))
     certain = certain_flank(model, commands.q, at.rest.torque, payload)[:, list(model.backlash_joints)]
-    tool = ToolTargets(
-        pose=commands.pose,
-        target=commands.target,
-        position=at.kinematics.position,
-        rotation=at.kinematics.orientation,
-        payload=commands.payload,
-    )
-    write_targets(out, tool)
-    return RobotPrediction(tool, at.kinematics.position - nominal.position, np.all(certain, axis=1))
+    position = at.kinematics.position
+    return position, at.kinematics.orientation, position - there, np.all(certain, axis=1)

@@ -13,9 +13,12 @@ import numpy as np
 from flexcal.calibration import (
     ErrorCovariance,
     ErrorsBefore,
+    ErrorStatistics,
+    EvenSample,
     Refit,
     Refitted,
     Verification,
+    all_errors,
     prediction_document,
     refitted,
     require_points,
@@ -26,6 +29,7 @@ from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
 from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
@@ -40,6 +44,7 @@ from flexcal.workflow.pose_remarks import unused_columns
 from flexcal.workflow.refit_remarks import proposed_refit, refit_document, refit_remarks
 from flexcal.workflow.report_folder import report_folder
 from flexcal.workflow.results import write_results
+from flexcal.workflow.sample_remarks import sample_document, verified_sample
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +55,8 @@ class RobotVerification:
     leave-one-out errors, and `as_calibrated` those without. `better` has what would explain most of the errors placed again, None where
     nothing would. `uncalibrated` are points that the calibration did not measure and that were not refitted; `outside` says which poses
     lie outside the joint ranges of the calibration. `fitted` are the files among them that the calibration was made from, `provenance`
-    all files with their hashes, `command` the command line, where there was one.
+    all files with their hashes, `command` the command line, where there was one. Of very many points all this is of a `sample`, and
+    `everywhere` are the errors at all of them.
     """
 
     model: RobotModel
@@ -66,6 +72,8 @@ class RobotVerification:
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
+    sample: EvenSample | None = None
+    everywhere: ErrorStatistics | None = None
 
     @property
     def points(self) -> MeasuredPoints:
@@ -79,6 +87,7 @@ class RobotVerification:
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
         remarks = [
+            *verified_sample(self.sample, self.everywhere),
             *unused_columns(self.poses),
             *([self.outside] if self.outside else []),
             *refit_remarks(self.result, self.poses, self.refit, self.better),
@@ -112,7 +121,7 @@ class RobotVerification:
         neither instrument nor robot are known), `measured` what was found.
         """
         result = self.result
-        measured = result.all.in_millimetres()
+        measured = (self.everywhere or result.all).in_millimetres()
         blocks = {"measured": measured, "measured_unambiguous": result.unambiguous.in_millimetres()}
         if self.as_calibrated is not None:
             blocks["as_calibrated"] = self.as_calibrated.all.in_millimetres()
@@ -135,6 +144,7 @@ class RobotVerification:
             },
             "prediction": prediction_document(result, self.covariance),
             "ambiguous_poses": int(result.ambiguous.sum()),
+            "sample": sample_document(self.sample, self.everywhere),
             "fitted": list(self.fitted),
             "remarks": list(self.remarks),
             "provenance": dict(self.provenance),
@@ -150,6 +160,7 @@ def verify_robot(
     refit: Sequence[Refit] = (),
     out: Path | None = None,
     command: str = "",
+    progress: Progress = silent,
 ) -> RobotVerification:
     """Predict the points of `files` with the calibrated robot and compare.
 
@@ -161,7 +172,11 @@ def verify_robot(
     require_distinct(files)
     calibrated = calibrated_robot(robot, estimates, "verify")
     bare, blocks = calibrated.nominal, calibrated.blocks
-    poses = verification_poses(calibrated, files, placed_again="station" in refit)
+    progress("reading", 0.0)
+    measured = verification_poses(calibrated, files, placed_again="station" in refit)
+    sample = EvenSample.of(measured)
+    poses = measured if sample is None else measured.subset(sample.rows)
+    progress("reading", 1.0)
     unmeasured = tuple(name for name in poses.targets if name not in calibrated.measured)
     model = calibrated.probable if unmeasured else calibrated.model
     before = robot_before(bare, poses).errors(poses)
@@ -172,8 +187,9 @@ def verify_robot(
     anew = refitted(model, poses, refit) if refit else None
     found = stands if anew is None else (anew.result, anew.covariance)
     assert found is not None
+    standing = model if anew is None else anew.model
     result = RobotVerification(
-        model=model if anew is None else anew.model,
+        model=standing,
         poses=poses,
         result=found[0],
         covariance=found[1],
@@ -182,10 +198,12 @@ def verify_robot(
         as_calibrated=stands[0] if stands is not None and refit else None,
         better=proposed_refit(model, poses, found[0]) if anew is None else None,
         uncalibrated=() if "point" in refit else unmeasured,
-        outside=outside_ranges(calibrated, poses.q),
+        outside=outside_ranges(calibrated, measured.q),
         fitted=fitted,
         provenance=origin,
         command=command,
+        sample=sample,
+        everywhere=None if sample is None else all_errors(standing, measured, progress),
     )
     if out is not None:
         write_results(out, result.document())

@@ -1,0 +1,80 @@
+"""Rows that stand for a measurement of more points than a fit with variance components can take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.error_cells import SAME_COMMAND, distinct, occurrence
+from flexcal.calibration.error_statistics import ErrorStatistics
+from flexcal.calibration.prediction import predict
+from flexcal.data import PoseSet
+from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
+
+MOST = 10_000
+"""Points of a fit: their noise moves the calibrated tool by a hundredth of its size, far below every instrument's own error."""
+_COMMANDS = 400
+"""Positions of which several visits are kept."""
+_LEAST = 100
+"""Positions of every station and payload, as far as there are any."""
+_BLOCK = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class EvenSample:
+    """`rows` (M,) of `total` that were drawn evenly over positions, stations and payloads, in measuring order.
+
+    Visits to a pose are kept whole. Where positions were visited again, several visits, evenly in time, of fewer positions are kept.
+    """
+
+    rows: np.ndarray
+    total: int
+
+    @classmethod
+    def of(cls, poses: PoseSet, most: int = MOST) -> EvenSample | None:
+        """About `most` rows, always the same ones; None where there are no more than that."""
+        if len(poses) <= most:
+            return None
+        _, target = np.unique(poses.target, return_inverse=True)
+        visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
+        first = np.unique(visit, return_index=True)[1]
+        command = distinct(np.round(poses.q[first] / SAME_COMMAND))
+        _, station = np.unique(poses.station[first], return_inverse=True)
+        held = np.zeros(len(first)) if poses.payload is None else poses.payload[first]
+        kept = _kept_visits(command, distinct(station, held), most * len(first) // len(poses))
+        return cls(np.flatnonzero(np.isin(visit, kept)), len(poses))
+
+
+def _kept_visits(command: np.ndarray, stratum: np.ndarray, budget: int) -> np.ndarray:
+    """Numbers of about `budget` visits, whose commands and strata are given (V,)."""
+    rng = np.random.default_rng(0)
+    order = np.argsort(command, kind="stable")
+    starts = np.flatnonzero(np.diff(command[order], prepend=-1))
+    counts = np.diff(np.append(starts, len(command)))
+    again = len(command) >= 2 * len(starts)
+    wanted = min(len(starts), _COMMANDS if again else budget)
+    each = max(1, budget // wanted) if again else 1
+    chosen = []
+    own = stratum[order[starts]]
+    for one in np.unique(own):
+        members = np.flatnonzero(own == one)
+        share = max(min(len(members), _LEAST), wanted * len(members) // len(starts))
+        chosen.append(rng.permutation(members)[:share])
+    kept = []
+    for k in np.concatenate(chosen):
+        places = np.unique(np.linspace(0, counts[k] - 1, min(each, int(counts[k]))).astype(int))
+        kept.append(order[starts[k] + places])
+    return np.concatenate(kept)
+
+
+def all_errors(model: RobotModel, poses: PoseSet, progress: Progress = silent) -> ErrorStatistics:
+    """Errors of a calibrated robot at any number of poses, in constant memory beside these."""
+    parts = []
+    for start in range(0, len(poses), _BLOCK):
+        progress("all points", start / len(poses))
+        block = poses.subset(slice(start, start + _BLOCK))
+        parts.append(block.position - predict(model, block).position)
+    progress("all points", 1.0)
+    return ErrorStatistics.of(np.concatenate(parts))

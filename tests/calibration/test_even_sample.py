@@ -1,0 +1,71 @@
+"""Very many points: which of them are fitted, and that their errors are those of all."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.calibration import EvenSample, repeatability
+from flexcal.calibration.pose_repeatability import SAME_COMMAND
+from flexcal.data import PoseSet
+
+
+def poses_of(q: np.ndarray, pose: np.ndarray, **more: np.ndarray) -> PoseSet:
+    rows = len(q)
+    given = {
+        "position": np.random.default_rng(1).standard_normal((rows, 3)),
+        "target": np.full(rows, "a"),
+        "station": np.full(rows, "s"),
+    }
+    fixed = {"sigma": np.full((rows, 3), 1e-4), "torque": None, "payload": None, "temperature": None}
+    return PoseSet(q=q, pose=pose, **fixed, **(given | more))
+
+
+def test_few_points_are_all_taken() -> None:
+    q = np.random.default_rng(0).uniform(-1, 1, (100, 6))
+    assert EvenSample.of(poses_of(q, np.arange(100)), 100) is None
+
+
+def test_distinct_poses_keep_visits_whole_and_small_stations() -> None:
+    """Two targets a pose, and one of three stations with a hundredth of the poses."""
+    rng = np.random.default_rng(2)
+    q = np.repeat(rng.uniform(-2, 2, (5000, 6)), 2, axis=0)
+    pose = np.repeat(np.arange(5000), 2)
+    station = np.repeat(np.where(np.arange(5000) < 50, "rare", np.where(np.arange(5000) < 2500, "b", "c")), 2)
+    poses = poses_of(q, pose, target=np.tile(["a", "b"], 5000), station=station)
+    found = EvenSample.of(poses, 1000)
+    assert found is not None and found.total == 10_000 and 900 <= len(found.rows) <= 1200
+    assert (np.diff(found.rows) > 0).all()
+    assert (np.bincount(pose[found.rows], minlength=5000) != 1).all()
+    counts = {name: (station[found.rows] == name).sum() for name in ("rare", "b", "c")}
+    assert counts["rare"] == 100 and abs(counts["b"] - counts["c"]) < 100
+    again = EvenSample.of(poses, 1000)
+    assert again is not None and np.array_equal(found.rows, again.rows)
+
+
+def test_repeated_visits_are_kept_evenly_in_time() -> None:
+    rng = np.random.default_rng(3)
+    command = rng.permutation(np.repeat(np.arange(1000), 20))
+    poses = poses_of(rng.uniform(-2, 2, (1000, 6))[command], np.arange(20_000))
+    found = EvenSample.of(poses, 4000)
+    assert found is not None
+    counts = np.bincount(command[found.rows], minlength=1000)
+    assert (counts > 0).sum() == 400 and set(counts) == {0, 10}
+    assert abs(found.rows.mean() / 20_000 - 0.5) < 0.02
+
+
+def test_commands_are_told_as_by_comparing_each_with_all_before() -> None:
+    """With encoder noise about the tolerance's size, over cell borders of the look-up, in a file in any order."""
+    rng = np.random.default_rng(4)
+    centres = rng.uniform(-2e-3, 2e-3, (30, 3))
+    number = rng.integers(0, 30, 600)
+    q = centres[number] + 0.3 * SAME_COMMAND * rng.standard_normal((600, 3))
+    leaders: list[int] = []
+    label = np.zeros(600, dtype=int)
+    for row in range(600):
+        alike = [k for k, lead in enumerate(leaders) if np.abs(q[lead] - q[row]).max() <= SAME_COMMAND]
+        if not alike:
+            leaders.append(row)
+        label[row] = alike[0] if alike else len(leaders) - 1
+    expected = [np.flatnonzero(label == k) for k in range(len(leaders))]
+    found = repeatability(poses_of(q, np.arange(600)))
+    assert [pose.rows.tolist() for pose in found] == [rows.tolist() for rows in expected if len(rows) > 1]
