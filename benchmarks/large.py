@@ -230,7 +230,7 @@ def _responses(folder: Path, rows: int) -> None:
         realisations=4,
         signs=True,
         reference_amplitude=0.02,
-        reference_frequency_hz=0.5 * base,
+        reference_frequency_hz=10.5 * base,
         kp=np.full(arm.n, 1000.0),
         kd=np.full(arm.n, 100.0),
         rate_hz=rate,

@@ -122,3 +122,20 @@ def test_what_the_urdf_lacks_is_asked_for(run, gantry: Path, pattern: str, lacki
     outcome = run("design", "trajectory", gantry, "--count", 1, "--out", gantry.parent / "plan.yaml")
     assert outcome.status == 2 and said in outcome.err and "nan" not in outcome.err
     assert not list(gantry.parent.glob("plan*"))
+
+
+def test_a_file_of_another_beside_the_plan_is_refused(run, gantry: Path) -> None:
+    """And those of an earlier plan with more trajectories go."""
+    folder, quick = gantry.parent, ("--searches", 1, "--steps", 2)
+    plan = ("design", "trajectory", gantry, *quick, "--out", folder / "plan.yaml")
+    assert run(*plan, "--count", 2).status == 0 and run(*plan, "--count", 1).status == 0
+    assert sorted(path.name for path in folder.glob("plan*")) == [
+        "plan.html",
+        "plan.yaml",
+        "plan_1.csv",
+        "plan_1_ros.yaml",
+    ]
+    (folder / "plan_2.csv").write_text("mine\n")
+    outcome = run(*plan, "--count", 2)
+    assert outcome.status == 2 and "plan_2.csv was not written by flexcal" in outcome.err
+    assert (folder / "plan_2.csv").read_text() == "mine\n"

@@ -123,7 +123,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
             return 0
         raise refusal(verb, said.getvalue()) from None
     settle_inputs(parsed)
-    with outputs(verb.name, parsed.out, verb.leaves, page=verb.page):
+    with outputs(verb.name, parsed.out, verb.leaves, page=verb.page, beside=verb.beside):
         parsed.run()
     return 0
 

@@ -22,10 +22,17 @@ _REPORT = "report"
 
 
 @contextmanager
-def outputs(verb: str, out: Path | None, names: Sequence[str] = (), *, page: bool = False) -> Iterator[None]:
+def outputs(
+    verb: str,
+    out: Path | None,
+    names: Sequence[str] = (),
+    *,
+    page: bool = False,
+    beside: Sequence[str] = (),
+) -> Iterator[None]:
     """Around `verb`, which writes the file `out`, or into the folder `out` the files `names` (glob patterns); None writes nothing there.
 
-    With `page`, it also writes an HTML file of the same name beside `out`.
+    With `page`, it also writes an HTML file of the same name beside `out`, and files whose names end, after its stem, as `beside` says.
 
     Raises `InputError` beforehand where the folder cannot be written to, where another run is at work on these files, and where one of them
     is there already that flexcal did not write, that another verb wrote, or that was changed since. All that the verb writes, there and
@@ -38,7 +45,8 @@ def outputs(verb: str, out: Path | None, names: Sequence[str] = (), *, page: boo
     if not names and out.is_dir():
         raise InputError(f"{out} is a folder; name a file in it with --out.")
     folder = out if names else out.parent
-    patterns = names or [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
+    own = [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
+    patterns = names or [*own, *(glob.escape(out.stem) + ending for ending in beside)]
     if folder.is_dir():
         settle(folder)
     place = _Place(verb, folder, patterns, whole_folder=bool(names))

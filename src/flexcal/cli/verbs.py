@@ -12,7 +12,7 @@ class Verb:
     """A verb: its words, the module and class that carry it out, what it does in a line, and a command line to copy.
 
     `leaves` are the files (glob patterns) that it leaves in the folder of --out; none where --out is the file itself, beside which it may
-    leave a `page` of the same name.
+    leave a `page` of the same name, and files `beside` it: glob patterns of what follows its stem.
     """
 
     words: tuple[str, ...]
@@ -22,6 +22,7 @@ class Verb:
     example: str
     leaves: tuple[str, ...] = ()
     page: bool = False
+    beside: tuple[str, ...] = ()
 
     @property
     def name(self) -> str:
@@ -94,6 +95,8 @@ STEPS = (
                 "DesignTrajectory",
                 "plan exciting trajectories of the whole robot",
                 "flexcal design trajectory robot.yaml --out trajectory.yaml",
+                page=True,
+                beside=("_[1-9].csv", "_[1-9][0-9].csv", "_[1-9]_ros.yaml", "_[1-9][0-9]_ros.yaml"),
             ),
             Verb(
                 ("identify", "inertials"),
