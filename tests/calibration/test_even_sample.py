@@ -9,15 +9,21 @@ from flexcal.calibration.pose_repeatability import SAME_COMMAND
 from flexcal.data import PoseSet
 
 
-def poses_of(q: np.ndarray, pose: np.ndarray, **more: np.ndarray) -> PoseSet:
+def poses_of(
+    q: np.ndarray, pose: np.ndarray, target: np.ndarray | None = None, station: np.ndarray | None = None
+) -> PoseSet:
     rows = len(q)
-    given = {
-        "position": np.random.default_rng(1).standard_normal((rows, 3)),
-        "target": np.full(rows, "a"),
-        "station": np.full(rows, "s"),
-    }
-    fixed = {"sigma": np.full((rows, 3), 1e-4), "torque": None, "payload": None, "temperature": None}
-    return PoseSet(q=q, pose=pose, **fixed, **(given | more))
+    return PoseSet(
+        q=q,
+        pose=pose,
+        position=np.random.default_rng(1).standard_normal((rows, 3)),
+        sigma=np.full((rows, 3), 1e-4),
+        target=np.full(rows, "a") if target is None else target,
+        station=np.full(rows, "s") if station is None else station,
+        torque=None,
+        payload=None,
+        temperature=None,
+    )
 
 
 def test_few_points_are_all_taken() -> None:
