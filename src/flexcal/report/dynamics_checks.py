@@ -61,7 +61,7 @@ def check_base(results: Mapping[str, Any]) -> Check:
     answer = f"{rank} of {len(base)} are determined, by {results['equations']} equations."
     if rank >= len(base):
         return Check(question, answer, "good")
-    lost = [row["name"].split()[0] for row in base if row["std"] is None]
+    lost = [row["kept"] for row in base if row["std"] is None]
     more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
     return Check(
         question,

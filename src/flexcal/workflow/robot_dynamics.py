@@ -128,7 +128,8 @@ class RobotDynamics:
     def _base_parameters(self) -> list[dict[str, Any]]:
         """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell.
 
-        `essential` is its value where the others are left out, None where it is left out itself.
+        `kept` is the parameter that it is counted as; `essential` its value where the others are left out, None where it is left out
+        itself.
         """
         essential = dict(zip(self.essential.names, self.essential.values, strict=True))
         base, x = self.train.base, self.estimate.parameters.coordinates()
@@ -144,6 +145,7 @@ class RobotDynamics:
             rows.append(
                 {
                     "name": expression,
+                    "kept": name,
                     "unit": unit,
                     "estimate": value,
                     "std": std,

@@ -42,7 +42,7 @@ def base_correlation(
     base: Sequence[Mapping[str, Any]], estimate: Estimate
 ) -> tuple[tuple[str, ...], np.ndarray]:
     """Names (k) and correlation (k, k) of the base parameters that are determined, from the covariance of the estimate."""
-    names = tuple(row["name"].split()[0] for row in base if row["std"])
+    names = tuple(row["kept"] for row in base if row["std"])
     at = [estimate.parameters.index(name) for name in names]
     covariance = estimate.covariance[np.ix_(at, at)]
     std = np.sqrt(np.diag(covariance))
