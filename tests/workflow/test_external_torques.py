@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -35,6 +36,12 @@ def other() -> Pushed:
     return pushed(2, 8.0, push=1.5)
 
 
+def tared(robot: Path) -> Path:
+    """A sensor that reads zero without load."""
+    robot.write_text(robot.read_text().replace("wrench: on_robot", "wrench: on_robot, offset: zero"))
+    return robot
+
+
 def error(document: dict) -> float:
     return document["error_percent"]["held_out"]
 
@@ -56,12 +63,12 @@ def test_springs_and_cables_are_found(tmp_path: Path, motion: Pushed, other: Pus
         and units["roll.viscous"] == "N m s/rad"
     )
     written = [row["name"] for row in document["base_parameters"]]
-    assert "roll.torque_offset + roll.cable_torque" in written
-    assert "elbow.torque_offset + elbow.spring_torque" in written
+    assert any(name.startswith("roll.torque_offset + roll.cable_torque") for name in written)
+    assert any(name.startswith("elbow.torque_offset + elbow.spring_torque") for name in written)
     offset = next(
         r["estimate"] for r in document["base_parameters"] if r["name"].startswith("roll.torque_offset")
     )
-    assert offset == pytest.approx(CABLE, abs=0.02) and error(document) < 0.5
+    assert offset == pytest.approx(CABLE, abs=0.1) and error(document) < 0.5
     assert not any("cable" in remark for remark in document["remarks"])
 
 
@@ -74,7 +81,8 @@ def test_what_robot_yaml_knows_is_taken_from_the_torques(
     ).document()
     assert not any("spring" in name or "cable" in name for name in document["parameters"])
     assert error(document) < 0.5
-    assert document["parameters"]["roll.torque_offset"]["estimate"] == pytest.approx(0.0, abs=0.02)
+    offset = document["parameters"]["roll.torque_offset"]
+    assert abs(offset["estimate"]) < 4 * offset["std"] < 0.2
     bare = identify_robot_dynamics(pushed_yaml(tmp_path), logs[:1], validate=logs[1:]).document()
     assert error(bare) > 3.0
 
@@ -84,7 +92,7 @@ def test_every_estimator_counts_the_wrench(
     estimator: EstimatorName, tmp_path: Path, motion: Pushed, other: Pushed
 ) -> None:
     """The external torques are a third of the motors'; without them nothing fits."""
-    robot = pushed_yaml(tmp_path, dynamics=SPRINGS)
+    robot = tared(pushed_yaml(tmp_path, dynamics=SPRINGS))
     logs = [motion.write(tmp_path / "a.csv", noise=_NOISE), other.write(tmp_path / "b.csv", seed=1)]
     document = identify_robot_dynamics(robot, logs[:1], validate=logs[1:], estimator=estimator).document()
     assert error(document) < (2.0 if estimator == "ekf" else 1.0)
@@ -98,7 +106,7 @@ def test_maximum_likelihood_counts_the_wrench(tmp_path: Path, other: Pushed) -> 
     q, torque, wrench = (
         np.concatenate([getattr(p, key)[:769] for p in parts]) for key in ("q", "torque", "wrench")
     )
-    robot = pushed_yaml(tmp_path, dynamics=SPRINGS)
+    robot = tared(pushed_yaml(tmp_path, dynamics=SPRINGS))
     repeated = Pushed(np.arange(len(q)) / 100.0, q, torque, wrench)
     logs = [repeated.write(tmp_path / "a.csv", noise=_NOISE), other.write(tmp_path / "b.csv", seed=1)]
     document = identify_robot_dynamics(robot, logs[:1], validate=logs[1:], estimator="ml").document()
@@ -122,6 +130,24 @@ def test_a_wrong_sensor_is_seen(change: str, words: str, tmp_path: Path, motion:
         robot.write_text(robot.read_text().replace("rpy: [0.3", "rpy: [1.9"))
     found = identify_robot_dynamics(robot, [log])
     assert found.trust.status == "bad" and any(words in check.answer for check in found.trust.deciding)
+
+
+def test_the_offset_of_a_sensor_is_found(tmp_path: Path, motion: Pushed, other: Pushed) -> None:
+    """As of one that was tared with a tool: it reads the same too much all the time."""
+    offset = np.array([6.0, -4.0, 9.0, 0.5, -0.8, 0.3])
+    logs = [
+        replace(each, wrench=each.wrench + offset).write(tmp_path / f"{k}.csv", noise=_NOISE * (k == 0))
+        for k, each in enumerate((motion, other))
+    ]
+    robot = pushed_yaml(tmp_path, dynamics=SPRINGS)
+    document = identify_robot_dynamics(robot, logs[:1], validate=logs[1:]).document()
+    assert error(document) < 0.5
+    for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), offset, strict=True):
+        item = document["parameters"][f"force_sensor.{name}_offset"]
+        assert item["identifiable"] is False or abs(item["estimate"] - value) < 4 * item["std"], name
+    seen = [name for name in document["parameters"] if name.startswith("force_sensor.")]
+    assert sum(document["parameters"][name]["identifiable"] for name in seen) >= 5
+    assert not any("force_sensor" in remark for remark in document["remarks"])
 
 
 def test_columns_and_sensor_belong_together(tmp_path: Path, motion: Pushed) -> None:

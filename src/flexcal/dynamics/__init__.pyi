@@ -50,6 +50,7 @@ from .regression import RegressionData, Subsystem, batches_each, observe
 from .residual_learning import BlockErrors, learn_residual
 from .robot_prior import RobotPrior
 from .rows import Experiment, Window
+from .sensor_offset import SensorOffset
 from .sensor_share import ExternalExcess, ExternalShare, external_share
 from .simulated_experiment import SimulatedExperiment
 from .spring_attenuation import attenuation
@@ -101,6 +102,7 @@ __all__ = [
     "ResidualErrors",
     "RobotPrior",
     "RotorInertia",
+    "SensorOffset",
     "SimulatedExperiment",
     "Stribeck",
     "SublinearViscous",

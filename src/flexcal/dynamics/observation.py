@@ -14,6 +14,7 @@ from flexcal.dynamics.drive_spring import DriveSpring, coupled_columns
 from flexcal.dynamics.drive_terms import Column, DriveTerm, JointSprings, Memory
 from flexcal.dynamics.link_columns import LinkColumns, link_columns
 from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.sensor_offset import SensorOffset
 from flexcal.dynamics.tilted_arm import TiltedArm
 from flexcal.model import RobotModel, inertial_names, torque_regressor
 from flexcal.model.regressor import INERTIAL, write_torque_regressor
@@ -183,7 +184,7 @@ class Observation:
         motors = {spring.joint: self.model.n + k for k, spring in enumerate(self.springs)}
         behind = replace(motion, q=self._link_states(motion)[0])
         for term in self.terms:
-            on_arm = isinstance(term, JointSprings)
+            on_arm = isinstance(term, JointSprings | SensorOffset)
             for column in term.columns(self.model, behind if on_arm else motion, memory):
                 yield column
                 if column.joint in motors and not on_arm:

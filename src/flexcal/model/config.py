@@ -218,13 +218,14 @@ class ForceSensorConfig:
     """A force and torque sensor whose axes lie at `xyz` (m), turned by `rpy` (rad), in the URDF frame `frame`.
 
     wrench: whether the columns fx, fy, fz, mx, my, mz are what everything beyond the sensor does to the robot ("on_robot"), or the robot
-    to that ("on_environment").
+    to that ("on_environment"). offset: what they are without load; "zero" for a sensor that is tared there.
     """
 
     frame: str
     wrench: Literal["on_robot", "on_environment"]
     xyz: Triple = (0.0, 0.0, 0.0)
     rpy: Triple = (0.0, 0.0, 0.0)
+    offset: Literal["estimated", "zero"] = "estimated"
 
 
 @dataclass(frozen=True)

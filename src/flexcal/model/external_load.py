@@ -16,15 +16,17 @@ def wrench_torque(model: RobotModel, q: np.ndarray, wrench: np.ndarray) -> np.nd
     sensor feel it, the others do not. Raises `AssertionError` for a robot without force sensor, and `FlexcalError` for another number of
     joints.
     """
+    return np.einsum("snw,sw->sn", sensor_jacobian(model, q), wrench)
+
+
+def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Jᵀ (samples, n, 6): torques on the robot by each component that the force sensor reads; raises as `wrench_torque` does."""
     sensor = model.force_sensor
     assert sensor is not None
     q = joint_batch(model, q)
-    carrying, joint = [], sensor.joint
-    while joint >= 0:
-        carrying.insert(0, joint)
-        joint = model.joints[joint].parent
-    rotation, position = np.eye(3)[None], np.zeros((1, 3))
+    rotation, position = np.eye(3), np.zeros(3)
     axes, origins = {}, {}
+    carrying = _path(model, sensor.joint)
     for i in carrying:
         offset, turn = joint_placement(model, i)
         position, rotation = position + rotation @ offset, rotation @ turn
@@ -36,13 +38,23 @@ def wrench_torque(model: RobotModel, q: np.ndarray, wrench: np.ndarray) -> np.nd
             rotation = rotation @ _turns(axis, moved)
     place = position + rotation @ sensor.translation
     rotation = sensor.sign * (rotation @ sensor.rotation)
-    force, moment = (np.einsum("sij,sj->si", rotation, part) for part in (wrench[:, :3], wrench[:, 3:]))
-    found = np.zeros_like(q)
+    found = np.zeros((*q.shape, 6))
     for i in carrying:
+        along = np.matmul(np.broadcast_to(axes[i], place.shape)[:, None], rotation)[:, 0]
         if model.joints[i].kind == "prismatic":
-            found[:, i] = np.sum(axes[i] * force, axis=1)
+            found[:, i, :3] = along
         else:
-            found[:, i] = np.sum(axes[i] * (moment + np.cross(place - origins[i], force)), axis=1)
+            lever = np.cross(axes[i], place - origins[i])
+            found[:, i, :3], found[:, i, 3:] = np.matmul(lever[:, None], rotation)[:, 0], along
+    return found
+
+
+def _path(model: RobotModel, joint: int) -> list[int]:
+    """The joints from the base to a joint."""
+    found: list[int] = []
+    while joint >= 0:
+        found.insert(0, joint)
+        joint = model.joints[joint].parent
     return found
 
 

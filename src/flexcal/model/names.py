@@ -25,6 +25,7 @@ _UNITS = {
     "stiffness": "N m/rad", "damping": "N m s/rad",
     "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
     "spring_stiffness": "N m/rad", "spring_torque": "N m", "cable_torque": "N m",
+    **dict.fromkeys(("fx_offset", "fy_offset", "fz_offset"), "N"), **dict.fromkeys(("mx_offset", "my_offset", "mz_offset"), "N m"),
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",

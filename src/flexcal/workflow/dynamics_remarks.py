@@ -11,6 +11,7 @@ from flexcal.workflow.estimators import EstimatorName
 
 _SHOWN = 3
 _REGROUPED = ("rotor_inertia", "arm_inertia", "spring_torque", "cable_torque")
+_REGROUPED += tuple(f"{name}_offset" for name in ("fx", "fy", "fz", "mx", "my", "mz"))
 """Parameters that are always absorbed, by the inertias of links and by torque offsets."""
 _LARGEST_ATTENUATION = 0.5
 """Bias of a stiffness, in its standard deviations, up to which no remark is made."""

@@ -14,6 +14,7 @@ from flexcal.dynamics import (
     ExternalExcess,
     Observation,
     RegressionData,
+    SensorOffset,
     essential_parameters,
     external_share,
     require_scikit_learn,
@@ -94,7 +95,10 @@ def identify_robot_dynamics(
         )
         declared = model.config.dynamics.friction
         friction = select_friction(model, declared, divided.equations, treatment.decimation)
-        observation = with_play(Observation(model, friction.terms, springs, bearings), divided.equations)
+        sensor = model.config.force_sensor
+        shifted = sensor is not None and sensor.offset == "estimated"
+        terms = (*friction.terms, SensorOffset()) if shifted else friction.terms
+        observation = with_play(Observation(model, terms, springs, bearings), divided.equations)
         base = BaseParameters.of(observation)
         systems = divided.equations(observation)
         train = RegressionData.of(observation, base, systems)
@@ -120,7 +124,7 @@ def identify_robot_dynamics(
         used = source if blocks else None
         origin = provenance([robot, bare.urdf, *logs], options, used, tuple(blocks))
         estimate = replace(estimate, provenance=origin)
-        plain = observation if friction.terms == CLASSIC else replace(observation, terms=CLASSIC)
+        plain = observation if terms == CLASSIC else replace(observation, terms=CLASSIC)
         result = RobotDynamics(
             estimate=estimate,
             estimator=estimator,
