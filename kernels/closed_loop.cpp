@@ -46,6 +46,7 @@ std::size_t closed_loop(const SteppedPlant& plant, std::vector<Spring>& springs,
 
     for (std::size_t k = 0; k < signals.ticks; ++k) {
         const std::size_t row = k * count;
+        if (signals.state) std::copy(plant.position, plant.position + dofs, signals.state + k * dofs);
         for (std::size_t m = 0; m < count; ++m) {
             MotorController& controller = controllers[m];
             const double position = plant.position[motors[m]];
@@ -92,7 +93,7 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
                                 nb::handle derivative_, double tick, std::size_t substeps, double encoder_resolution,
                                 double rate_filter, nb::handle feed_forward_, nb::handle reference_,
                                 nb::handle reference_rate_, nb::handle position_log_, nb::handle torque_log_,
-                                nb::handle arm_log_) {
+                                nb::handle arm_log_, nb::handle state_log_) {
     if (!step || !model || !data) throw nb::value_error("step, model and data must be addresses");
     if (substeps == 0 || !(tick > 0.0)) throw nb::value_error("tick and substeps must be positive");
     const auto position = written_reals(position_, {any}, "position");  // of hinges and slides: as many as velocities
@@ -113,6 +114,8 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
     const auto position_log = written_reals(position_log_, {ticks, count}, "position_log");
     const auto torque_log = written_reals(torque_log_, {ticks, count}, "torque_log");
     const auto arm_log = written_reals(arm_log_, {ticks, count}, "arm_log");
+    double* state = nullptr;
+    if (!state_log_.is_none()) state = written_reals(state_log_, {ticks, dofs}, "state_log").data();
 
     std::vector<Spring> spring(dofs);
     for (std::size_t i = 0; i < dofs; ++i)
@@ -139,7 +142,8 @@ std::size_t closed_loop_binding(std::uintptr_t step, std::uintptr_t model, std::
                               reference_rate.data(),
                               position_log.data(),
                               torque_log.data(),
-                              arm_log.data()};
+                              arm_log.data(),
+                              state};
     nb::gil_scoped_release release;
     return closed_loop(plant, spring, friction, motor, twist, controllers, sampling, substeps, signals);
 }
@@ -154,10 +158,11 @@ void bind_closed_loop(nb::module_& m) {
           nb::arg("proportional"), nb::arg("derivative"), nb::arg("tick"), nb::arg("substeps"),
           nb::arg("encoder_resolution"), nb::arg("rate_filter"), nb::arg("feed_forward"), nb::arg("reference"),
           nb::arg("reference_rate"), nb::arg("position_log"), nb::arg("torque_log"),
-          nb::arg("arm_log"),
+          nb::arg("arm_log"), nb::arg("state_log") = nb::none(),
           "Run the virtual cell's closed loop on a MuJoCo plant; returns the ticks done.\n\n"
           "step, model, data: addresses of mj_step, of an mjModel and an mjData; position, velocity, force: views of\n"
           "its qpos, qvel and qfrc_applied. springs (dofs, 6): stiffness, damping, half gap, cubic, hysteresis torque\n"
           "and width; frictions (motors, 5): viscous, coulomb, its velocity, stribeck, its velocity. Signals and logs\n"
-          "are (ticks, motors). The interpreter lock is released.");
+          "are (ticks, motors); state_log (ticks, dofs), where it is given, gets all positions at the ticks. The\n"
+          "interpreter lock is released.");
 }

@@ -24,7 +24,7 @@ struct Friction {
     double torque(double rate) const;
 };
 
-// What the loop reads and writes, all (ticks, motors), row-major; `arm` may be null.
+// What the loop reads and writes, all (ticks, motors), row-major, but `state`, (ticks, dofs); `arm` and `state` may be null.
 struct LoopSignals {
     std::size_t ticks;
     const double* feed_forward;
@@ -33,6 +33,7 @@ struct LoopSignals {
     double* position;
     double* torque;
     double* arm;
+    double* state;
 };
 
 // Runs the closed loop with `substeps` of the plant a tick; returns the number of ticks done (fewer than asked when the plant diverges).

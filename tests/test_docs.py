@@ -11,6 +11,7 @@ import shlex
 import shutil
 import subprocess
 import sys
+from dataclasses import replace
 from inspect import isclass, isroutine
 from pathlib import Path
 from types import ModuleType
@@ -26,6 +27,8 @@ from flexcal.elasticity import stage_one_parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.frequency.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
+from flexcal.model.config import ArmSensorConfig
 from flexcal.model.names import unit_of
 
 NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15}
@@ -62,6 +65,9 @@ def pattern(name: str) -> str:
 def produced(model: RobotModel) -> dict[str, str]:
     """Every name that the program gives a value on the TX90L, with its unit."""
     lines = 30
+    config = ArmSensorConfig(frame="flange", xyz=(0.0, 0.0, 0.0), direction=(0.0, 0.0, 1.0))
+    sensor = ArmSensor("hand", 5, np.zeros(3), np.array([0.0, 0.0, 1.0]), True, 2, config)
+    model = replace(model, sensors={"hand": sensor})
     response = FrequencyResponse(
         frequencies_hz=np.arange(1.0, lines + 1),
         response=np.tile(np.eye(3, dtype=complex), (lines, 1, 1)),
@@ -74,6 +80,9 @@ def produced(model: RobotModel) -> dict[str, str]:
         payload=None,
         pose=0,
         sample_time=2.5e-4,
+        sensors=("hand",),
+        sensor_response=np.ones((lines, 1, 3), dtype=complex),
+        joint_covariance=np.tile(1e-6 * np.eye(12, dtype=complex), (lines, 1, 1)),
     )
     gains = [gain_name(joint) for joint in model.joint_names]
     names = {name: unit_of(name) for name in (*model.values, *gains)}

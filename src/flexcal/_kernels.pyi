@@ -84,6 +84,7 @@ def closed_loop(
     position_log: np.ndarray,
     torque_log: np.ndarray,
     arm_log: np.ndarray,
+    state_log: np.ndarray | None = None,
 ) -> int: ...
 def geared_loop(
     step: int,

@@ -36,6 +36,7 @@ class RobotStandIn:
     payload: object | None = "declared"
     reach: float = 1.2
     stations: tuple[str, ...] = ("tracker",)
+    sensors: dict[str, object] = field(default_factory=dict)
 
     @property
     def n(self) -> int:

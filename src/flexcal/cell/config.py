@@ -39,7 +39,8 @@ class LoopConfig:
 class SensorConfig:
     """Encoder counts per joint turn (0 = ideal), torque noise (N m, 1σ), tracker noise (m, and m per m of distance; 1σ an axis).
 
-    With `arm_encoders` the excited joints are measured on the arm side too.
+    With `arm_encoders` the excited joints are measured on the arm side too. Sensors on the arm that robot.yaml declares have the noise of
+    their quantity (m/s², m/s or m, 1σ of a sample), and are as far off as robot.yaml says.
     """
 
     encoder_counts: int = 2**18
@@ -47,6 +48,9 @@ class SensorConfig:
     torque_noise: float = 1.0
     tracker_noise_m: float = 15e-6
     tracker_noise_per_m: float = 6e-6
+    acceleration_noise: float = 0.02
+    velocity_noise: float = 5e-5
+    displacement_noise: float = 1e-6
 
     def __post_init__(self) -> None:
         _not_negative(self)

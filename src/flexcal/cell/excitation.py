@@ -10,6 +10,7 @@ from itertools import product
 
 import numpy as np
 
+from flexcal.cell.arm_readings import arm_readings, mounted, reading_noise, sensitivities
 from flexcal.cell.config import CellConfig
 from flexcal.cell.feed_forward import inverse_dynamics
 from flexcal.cell.plant import Plant, build_plant
@@ -21,11 +22,13 @@ from flexcal.data import MultisinePlan, Recording, RecordingLabel
 from flexcal.errors import FlexcalError
 from flexcal.frequency import multisine
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
 
 
 @dataclass(frozen=True, eq=False)
 class Excitation:
-    """What all recordings of one pose share: the pose (n,), plant, loop, start (d,), and the command without excitation."""
+    """What all recordings of one pose share: the pose (n,), plant, loop, start (d,), the command without excitation, and the sensors on the
+    arm of the `truth` where they really are."""
 
     pose: np.ndarray
     plant: Plant
@@ -33,6 +36,8 @@ class Excitation:
     start: np.ndarray
     start_rate: np.ndarray
     command: LoopCommand
+    truth: RobotModel
+    sensors: tuple[ArmSensor, ...]
 
 
 def recordings(
@@ -49,7 +54,7 @@ def recordings(
         waiting: deque[Future[Recording]] = deque()
         try:
             for number, pose in enumerate(plan.poses):
-                excitation = prepare(truth, believed, config, plan, pose)
+                excitation = prepare(truth, believed, config, plan, pose, seed)
                 for realisation, experiment, sign in schedule:
                     label = RecordingLabel(number, realisation, experiment, sign)
                     waiting.append(pool.submit(run, excitation, config, plan, label, seed))
@@ -62,14 +67,20 @@ def recordings(
 
 
 def prepare(
-    truth: RobotModel, believed: RobotModel, config: CellConfig, plan: MultisinePlan, pose: np.ndarray
+    truth: RobotModel,
+    believed: RobotModel,
+    config: CellConfig,
+    plan: MultisinePlan,
+    pose: np.ndarray,
+    seed: int = 0,
 ) -> Excitation:
     """Build the plant at a pose (n,) and the feed-forward of the controller, whose own model is `believed`."""
     import mujoco
 
     free = sorted(plan.joints)
+    sensors = mounted(truth, seed)
     plant, substeps = resolved_plant(
-        truth, config, q=pose, free=free, payload=plan.payload, rate_hz=plan.rate_hz
+        truth, config, q=pose, free=free, payload=plan.payload, rate_hz=plan.rate_hz, sensors=sensors
     )
     assumed = build_plant(believed, config, q=pose, free=free, payload=plan.payload)
     samples = plan.periods * multisine.samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
@@ -83,7 +94,8 @@ def prepare(
     start_rate[plant.motors] = rate[0]
     kp, kd = plan.kp[free], plan.kd[free]
     gains = LoopGains(kp, kd, plan.rate_hz, substeps, config.controller.rate_filter_hz)
-    return Excitation(pose, plant, gains, start, start_rate, LoopCommand(torque, pose[free] + motion, rate))
+    command = LoopCommand(torque, pose[free] + motion, rate)
+    return Excitation(pose, plant, gains, start, start_rate, command, truth, sensors)
 
 
 def run(
@@ -100,6 +112,7 @@ def run(
         start=excitation.start,
         start_rate=excitation.start_rate,
         encoder_resolution=encoder_resolution(sensors),
+        states=bool(excitation.sensors),
     )
     key = (plan.seed, label.pose, label.realisation, label.experiment, int(label.sign < 0))
     rng = np.random.default_rng(np.random.SeedSequence(seed, spawn_key=key))
@@ -114,4 +127,19 @@ def run(
     if sensors.arm_encoders:
         arm = q.copy()
         arm[:, plant.joints] = read_encoder(sensors, log.arm)
-    return Recording(time_step=1 / plan.rate_hz, q=q, torque=torque, arm=arm, start=0.0, label=label)
+    sensed = None
+    if log.states is not None:
+        on_arm = excitation.sensors
+        true = arm_readings(excitation.truth, plant, on_arm, log.states, 1 / plan.rate_hz)
+        noise = reading_noise(on_arm, sensors) * rng.standard_normal(true.shape)
+        sensed = sensitivities(on_arm, seed) * true + noise
+    return Recording(
+        time_step=1 / plan.rate_hz,
+        q=q,
+        torque=torque,
+        arm=arm,
+        start=0.0,
+        label=label,
+        sensors=tuple(sensor.name for sensor in excitation.sensors),
+        sensed=sensed,
+    )

@@ -6,7 +6,7 @@ are applied to it, so that the laws are those of METHODS (a dead band, tanh fric
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +17,7 @@ from flexcal.cell.scheme import growth
 from flexcal.errors import FlexcalError
 from flexcal.export.mjcf import mjcf_spec
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.further_springs import with_drive_springs
 
 if TYPE_CHECKING:
@@ -91,8 +92,12 @@ def build_plant(
     free: Collection[int] | None = None,
     payload: float | None = None,
     time_step: float | None = None,
+    sensors: Sequence[ArmSensor] = (),
 ) -> Plant:
-    """The plant of a true robot, its joints outside `free` locked at `q` (n,), to be stepped by `time_step` s; see `mjcf_spec`."""
+    """The plant of a true robot, its joints outside `free` locked at `q` (n,), to be stepped by `time_step` s; see `mjcf_spec`.
+
+    Every one of the `sensors` has a site, whose axes are those of its link.
+    """
     import mujoco
 
     rigid = set(range(model.n)) - {e.index for e in model.elastic}
@@ -101,6 +106,8 @@ def build_plant(
         stiffness = config.mismatch.elastic_wrist
         model = with_drive_springs(model, dict.fromkeys(wrist, (stiffness, WRIST_DAMPING * stiffness)))
     spec = mjcf_spec(model, q=q, free=free, payload=payload)
+    for sensor in sensors:
+        spec.body(model.joints[sensor.joint].link).add_site(name=sensor_site(sensor), pos=sensor.xyz)
     spec.compiler.fusestatic = True
     spec.option.integrator = mujoco.mjtIntegrator.mjINT_EULER
     bits = (getattr(mujoco.mjtDisableBit, f"mjDSBL_{name}", None) for name in _UNWANTED)
@@ -115,6 +122,11 @@ def build_plant(
     twists = np.array([names.index(d) if d in names else -1 for d in drives], dtype=np.int64)
     springs = _springs(model, config, names)
     return Plant(compiled, names, joints, motors, twists, springs, _frictions(model, config, joints))
+
+
+def sensor_site(sensor: ArmSensor) -> str:
+    """Name of the site where a sensor on the arm is."""
+    return f"sensor.{sensor.name}"
 
 
 def linearise(plant: Plant, position: np.ndarray) -> PlantLinearisation:

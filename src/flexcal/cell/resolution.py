@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from flexcal.cell.config import CellConfig
 from flexcal.cell.plant import Plant, build_plant, unresolved
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
 
 REFINEMENTS = (1, 2, 4, 8)
 
@@ -23,6 +24,7 @@ def resolved_plant(
     free: Collection[int],
     payload: float | None,
     rate_hz: float,
+    sensors: Sequence[ArmSensor] = (),
 ) -> tuple[Plant, int]:
     """The plant and its steps per tick: as many as configured, doubled until the true robot's fastest modes are resolved.
 
@@ -38,7 +40,9 @@ def resolved_plant(
             substeps = config.controller.substeps * refinement
             step = 1 / (rate_hz * substeps)
             try:
-                plant = build_plant(truth, tried, q=q, free=free, payload=payload, time_step=step)
+                plant = build_plant(
+                    truth, tried, q=q, free=free, payload=payload, time_step=step, sensors=sensors
+                )
                 missed = unresolved(plant)
             except ValueError as problem:  # of MuJoCo's compiler, and of a mass matrix that is singular
                 raise FlexcalError(

@@ -34,11 +34,15 @@ class LoopCommand:
 
 @dataclass(frozen=True, eq=False)
 class LoopLog:
-    """What happened, all (ticks, m): encoder position at the tick, torque that acted until the next, true arm position."""
+    """What happened, all (ticks, m): encoder position at the tick, torque that acted until the next, true arm position.
+
+    `states` (ticks, d) are all coordinates of the plant at the tick, where they were asked for.
+    """
 
     position: np.ndarray
     torque: np.ndarray
     arm: np.ndarray
+    states: np.ndarray | None = None
 
 
 def run_loop(
@@ -49,8 +53,10 @@ def run_loop(
     start: np.ndarray,
     start_rate: np.ndarray,
     encoder_resolution: float = 0.0,
+    states: bool = False,
 ) -> LoopLog:
-    """Run the loop from a position (d,) and the rate (d,) half a plant step before; raises `FlexcalError` where it diverges.
+    """Run the loop from a position (d,) and the rate (d,) half a plant step before; with `states` all coordinates are logged. Raises
+    `FlexcalError` where it diverges.
 
     A plant step is MuJoCo's semi-implicit Euler, M (q₊ − 2 q + q₋)/h² = τ̄ − forces; how τ̄ and the forces are taken so that the
     torque is held exactly, springs are right to fourth and dampers to third order is in `flexcal.cell.scheme`.
@@ -67,7 +73,9 @@ def run_loop(
     data.qpos[:] = start
     data.qvel[:] = start_rate
     shape = command.torque.shape
-    log = LoopLog(np.empty(shape), np.empty(shape), np.empty(shape))
+    log = LoopLog(
+        np.empty(shape), np.empty(shape), np.empty(shape), np.empty((shape[0], model.nv)) if states else None
+    )
     done = closed_loop(
         step=step_address(),
         model=model._address,
@@ -91,6 +99,7 @@ def run_loop(
         position_log=log.position,
         torque_log=log.torque,
         arm_log=log.arm,
+        state_log=log.states,
     )
     if done < shape[0]:
         raise FlexcalError(

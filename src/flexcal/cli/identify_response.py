@@ -49,6 +49,8 @@ class IdentifyResponse:
             )
         document = found.document()
         console.show(response_table(document["responses"]))
+        for remark in found.sensor_remarks:
+            console.say(remark)
         console.say(found.trust.sentence)
         console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, f"flexcal identify stiffness {self.robot} {self.out}")

@@ -44,6 +44,7 @@ class Recording:
     velocity, acceleration, arm_velocity, external_torque: (N, n) where the log has them (`dq`, `ddq`, `dqa`,
         `tau_ext`); force, moment: (N, 3), N and N m, as the force sensor reads them; temperature: (N,); payload: (N,), kg, the
         same throughout.
+    sensors, sensed: names of the S sensors on the arm that recorded too, and their readings (N, S) in m/s², m/s or m.
     time_base, file: how the time stamps were and the file itself, where the recording comes from one.
 
     Raises `FlexcalError` where shapes do not fit or the time step is not positive.
@@ -67,6 +68,8 @@ class Recording:
     payload: np.ndarray | None = None
     time_base: TimeBase | None = None
     file: Path | None = None
+    sensors: tuple[str, ...] = ()
+    sensed: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         if not 0 < self.time_step < np.inf:
@@ -92,6 +95,10 @@ class Recording:
             values = getattr(self, name)
             if values is not None and values.shape != (len(self), 3):
                 raise FlexcalError(f"{name} of a recording has shape {values.shape}, not ({len(self)}, 3).")
+        if self.sensor_readings.shape != (len(self), len(self.sensors)):
+            raise FlexcalError(
+                f"readings of {len(self.sensors)} sensors have shape {self.sensor_readings.shape}, but q has {self.q.shape}."
+            )
         for name in ("temperature", "payload"):
             values = getattr(self, name)
             if values is not None and values.shape != self.q.shape[:1]:
@@ -99,6 +106,11 @@ class Recording:
 
     def __len__(self) -> int:
         return self.q.shape[0]
+
+    @property
+    def sensor_readings(self) -> np.ndarray:
+        """`sensed`, (N, 0) without sensors."""
+        return np.empty((len(self), 0)) if self.sensed is None else self.sensed
 
     @property
     def name(self) -> str:

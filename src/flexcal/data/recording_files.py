@@ -15,6 +15,7 @@ from flexcal.data.signals import UNITS, Signal, assign, standard_columns
 from flexcal.data.table import Table, open_table, write_table
 from flexcal.data.time_base import TimeBase, uniform_blocks
 from flexcal.errors import InputError
+from flexcal.model.arm_sensor import sensor_column
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
@@ -50,7 +51,7 @@ def read_recording(
     1 Hz to 20 kHz, and angles that cannot be in rad. `recording.time_base` says how the time stamps were.
     """
     file = open_table(path)
-    signals = assign(file, model, _REQUIRED, _OPTIONAL)
+    signals = assign(file, model, _REQUIRED, (*_OPTIONAL, *_sensor_columns(model)))
     table = file.read()
     t = signals["t"].values(table)[:, 0]
     _check_time(table, signals["t"], t, None)
@@ -65,7 +66,7 @@ def read_recording(
             f"a gap of {later.gap:.6g} s{several} precedes this sample, where {base.time_step:.6g} s is usual; "
             "record again, or cut the log there into two files.",
         )
-    return _recording(path, signals, whole, base, label, model.n)
+    return _recording(path, signals, whole, base, label, model)
 
 
 def read_recording_blocks(
@@ -78,12 +79,12 @@ def read_recording_blocks(
     `read_recording` does, except for gaps.
     """
     file = open_table(path)
-    signals = assign(file, model, _REQUIRED, _OPTIONAL)
+    signals = assign(file, model, _REQUIRED, (*_OPTIONAL, *_sensor_columns(model)))
     empty = True
     stamped = _stamped(model, signals, file.blocks((), rows))
     for base, values in uniform_blocks(stamped, positions=model.n, fill=FILL):
         empty = False
-        yield _recording(path, signals, values, base, label, model.n)
+        yield _recording(path, signals, values, base, label, model)
     if empty:
         raise file.error("the file has a header but no rows; add some.")
 
@@ -105,7 +106,15 @@ def write_recording(path: str | Path, recording: Recording) -> None:
             )
         names = standard_columns(quantity, recording.q.shape[1])
         columns |= {name: values[:, i] for i, name in enumerate(names)}
+    columns |= {
+        sensor_column(name): recording.sensor_readings[:, k] for k, name in enumerate(recording.sensors)
+    }
     write_table(path, columns)
+
+
+def _sensor_columns(model: RobotModel) -> dict[str, str]:
+    """Column and name of every sensor on the arm that robot.yaml declares."""
+    return {sensor.column: name for name, sensor in model.sensors.items()}
 
 
 def _stamped(
@@ -164,17 +173,21 @@ def _recording(
     values: np.ndarray,
     base: TimeBase,
     label: RecordingLabel | None,
-    n: int,
+    model: RobotModel,
 ) -> Recording:
     fields: dict[str, np.ndarray] = {}
+    sensors, sensed = _sensor_columns(model), {}
     column = 0
     for quantity in signals:
         if quantity == "t":
             continue
-        width = len(standard_columns(quantity, n))
+        width = len(standard_columns(quantity, model.n))
         part = values[:, column : column + width]
-        fields[_FIELDS[quantity]] = part[:, 0] if quantity in ("temperature", "payload") else part
         column += width
+        if quantity in sensors:
+            sensed[sensors[quantity]] = part[:, 0]
+            continue
+        fields[_FIELDS[quantity]] = part[:, 0] if quantity in ("temperature", "payload") else part
     return Recording(
         time_step=base.time_step,
         start=base.start,
@@ -183,6 +196,8 @@ def _recording(
         file=Path(path),
         q=fields.pop("q"),
         torque=fields.pop("torque"),
+        sensors=tuple(sensed),
+        sensed=np.stack(list(sensed.values()), axis=1) if sensed else None,
         **fields,
     )
 

@@ -52,6 +52,13 @@ UNITS: dict[str, dict[str, float]] = {
 }
 """The quantities that `signals:` can map, and the factors of their units to SI; currents take a gain in N m/A."""
 
+SENSOR_UNITS: tuple[dict[str, float], ...] = (
+    _LENGTH,
+    {"m/s": 1.0, "mm/s": MILLIMETRE},
+    {"m/s^2": 1.0, "mm/s^2": MILLIMETRE, "g": 9.80665},
+)
+"""Units of the readings of a sensor on the arm, by the time derivative that it measures."""
+
 
 @dataclass(frozen=True, eq=False)
 class Signal:
@@ -181,18 +188,20 @@ def _mapped(model: RobotModel, name: str, config: SignalConfig) -> Signal:
     def wrong(key: str, sentence: str) -> InputError:
         return read_yaml_file(model.path).error(("signals", name, key), f"signals.{name}: {sentence}")
 
-    if name not in UNITS:
+    sensors = {sensor.column: SENSOR_UNITS[sensor.order] for sensor in model.sensors.values()}
+    known = {**UNITS, **sensors}
+    if name not in known:
         raise wrong(
             "",
-            f"this quantity is not known{suggestion(name, list(UNITS)) or '; known are ' + ', '.join(UNITS) + '.'}",
+            f"this quantity is not known{suggestion(name, list(known)) or '; known are ' + ', '.join(known) + '.'}",
         )
     k, m = len(config.columns), len(standard_columns(name, model.n))
     unit = 1.0
     if config.unit is not None:
-        if config.unit not in UNITS[name]:
-            listed = ", ".join(UNITS[name]) or "none"
+        if config.unit not in known[name]:
+            listed = ", ".join(known[name]) or "none"
             raise wrong("unit", f"the unit '{config.unit}' does not fit; possible are {listed}.")
-        unit = UNITS[name][config.unit]
+        unit = known[name][config.unit]
         if config.unit in ("A", "mA") and config.gain is None and config.matrix is None:
             raise wrong(
                 "unit", "currents become torques only by a gain; add `gain:` with N m/A, one per column."

@@ -16,7 +16,7 @@ from flexcal.model.linearisation import linearise
 
 @dataclass(frozen=True, eq=False)
 class ExperimentEffect:
-    """`shift` (L, E, E) is added to what the robot at rest would show; `by_friction` (L, E, E, 2 E) is its derivative by the
+    """`shift` (L, E + S, E) is added to what the robot at rest would show; `by_friction` (L, E + S, E, 2 E) is its derivative by the
     logarithm of the strength, then of the width, of the friction pulses of every motor.
     """
 
@@ -26,7 +26,7 @@ class ExperimentEffect:
     @classmethod
     def none(cls, response: FrequencyResponse) -> ExperimentEffect:
         """At rest."""
-        shape = response.response.shape
+        shape = response.stacked.shape
         return cls(np.zeros(shape, complex), np.zeros((*shape, 0), complex))
 
 
@@ -50,11 +50,10 @@ def _effect(
     axes = [joint.index for joint in robot.driven]
     excess = np.maximum(robot.viscous - np.nan_to_num(model.robot.viscous), 0.0)
     strength = np.where(model.robot.coulomb > 0, excess, 0.0)[axes]
-    system = linearise(robot, pose.q, payload)
+    system = linearise(robot, pose.q, payload, sensors=pose.sensors)
     pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)
     ratio = pose.stiffness_ratio(natural)
     opening = 1.0 - ratio / ratio.mean(axis=0)
-    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening)
-    late = np.array([natural[number] if number >= 0 else 0.0 for number in pose.delays])
-    phase = np.exp(-2j * np.pi * pose.frequencies_hz[:, None] * late)[:, None, :]
-    return ExperimentEffect((moving + pulses.shift) * phase, pulses.shift_by_form() * phase[..., None])
+    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening, pose.sensors)
+    factor = pose.measured(natural)
+    return ExperimentEffect((moving + pulses.shift) * factor, pulses.shift_by_form() * factor[..., None])

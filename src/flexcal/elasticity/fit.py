@@ -84,7 +84,7 @@ class ResponseFit:
         return rows if self.error is None else self.error.whiten(rows)
 
     def predicted(self) -> tuple[np.ndarray, ...]:
-        """Responses (L, E, E) of every pose at the optimum, effects of the experiment included."""
+        """Responses (L, E + S, E) of every pose at the optimum, effects of the experiment included."""
         responses = self.residual.model.responses(self.x)
         return tuple(g + effect.shift for g, effect in zip(responses, self.effects, strict=True))
 

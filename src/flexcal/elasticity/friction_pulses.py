@@ -30,12 +30,14 @@ class FrictionPulses:
     `strength` (E,) N m s/rad is the part of each motor's viscous coefficient that friction makes. The derivative of friction by the
     velocity is a delta function at rest; under a multisine of the velocity v (standard deviation at the reversals) on top of
     A Ω cos Ωt it becomes two Gaussian pulses a cycle, of the width σ = v / (A Ω²) in s, `width` (E,), and the Fourier coefficients
-    (-1)^(m/2) exp(-(m Ω σ)²/2) for even orders m. `mobility` (L, k, E, E) rad/s per N m is that of the motors.
+    (-1)^(m/2) exp(-(m Ω σ)²/2) for even orders m. `mobility` (L, k, E, E) rad/s per N m is that of the motors, `sensed` (L, S, E) what
+    sensors on the arm read at the line per N m, in the closed loop.
     """
 
     sidebands: Sidebands
     omega: float
     mobility: np.ndarray
+    sensed: np.ndarray
     strength: np.ndarray
     width: np.ndarray
 
@@ -48,9 +50,12 @@ class FrictionPulses:
         omega = 2 * np.pi * motion.frequency_hz
         orders = 2 * np.arange(-SIDEBANDS, SIDEBANDS + 1)
         bands = Sidebands.of(system, frequencies_hz, motion, orders)
-        moved = bands.response(np.eye(len(system.mass), count))[:, :, :count]
-        mobility = bands.s[:, :, None, None] * moved
-        pulses = cls(bands, omega, mobility, strength, np.zeros(count))
+        moved = bands.response(np.eye(len(system.mass), count))
+        mobility = bands.s[:, :, None, None] * moved[:, :, :count]
+        sensed = np.zeros((len(mobility), 0, count))
+        if system.sensed is not None:
+            sensed = system.sensed.at(bands.s[:, bands.middle]) @ moved[:, bands.middle]
+        pulses = cls(bands, omega, mobility, sensed, strength, np.zeros(count))
         velocity = np.where((orders == 0)[:, None, None], mobility, 0.0)
         for _ in range(WIDTH_PASSES):
             speed = _reversal_velocity(velocity, orders, motion.excitation)
@@ -78,13 +83,27 @@ class FrictionPulses:
 
     @cached_property
     def shift(self) -> np.ndarray:
-        """G with pulsed friction less G with its mean, (L, E, E) rad/s² per N m."""
+        """G with pulsed friction less G with its mean, (L, E + S, E): rad/s² per N m, then the sensors' readings.
+
+        The readings follow the forces at the line: the torque less friction, over the measured torque, of which the controller's is part.
+        """
         bands = self.sidebands
-        pulsed, mean = (v[:, bands.middle] for v in (self.velocity(), self.mobility))
-        return bands.acceleration(pulsed) - bands.acceleration(mean)
+        velocity, middle = self.velocity(), bands.middle
+        pulsed, mean = (v[:, middle] for v in (velocity, self.mobility))
+        change = bands.acceleration(pulsed) - bands.acceleration(mean)
+        if not self.sensed.shape[1]:
+            return change
+        friction = np.einsum("li,Llij->Lij", self.coefficients()[middle], velocity)
+        still = self.sensed @ np.linalg.inv(np.eye(mean.shape[1]) - bands.loop @ mean)
+        moving = (
+            self.sensed
+            @ (np.eye(mean.shape[1]) - friction)
+            @ np.linalg.inv(np.eye(mean.shape[1]) - bands.loop @ pulsed)
+        )
+        return np.concatenate([change, moving - still], axis=1)
 
     def shift_by_form(self) -> np.ndarray:
-        """∂ `shift` (L, E, E, 2 E) by the logarithm of every strength, then of every width, by forward differences."""
+        """∂ `shift` (L, E + S, E, 2 E) by the logarithm of every strength, then of every width, by forward differences."""
         base, step = self.shift, 0.05
         growth = np.exp(step * np.eye(len(self.width)))
         changed = [replace(self, strength=g * self.strength) for g in growth]

@@ -14,7 +14,7 @@ from flexcal.elasticity.held_joints import HeldJoints
 from flexcal.elasticity.misfit import misfit_of_fit, misfit_std
 from flexcal.elasticity.model_error import Tolerances
 from flexcal.elasticity.naming import held_inertia_name
-from flexcal.elasticity.parameters import check_responses
+from flexcal.elasticity.parameters import check_responses, check_sensors
 from flexcal.elasticity.profile import profile_stretch
 from flexcal.elasticity.response_bearings import ResponseBearings, with_fitting_bearings
 from flexcal.elasticity.search import MultiStart, Search
@@ -37,7 +37,8 @@ class StiffnessResult:
     `estimate` holds springs and nuisances; `springs` their names in the order of the paper's Table 1, stiffness first. Per pose:
     `predicted` (L, n, n) of the fitted model, the reference motion included; `errors` (L, n, n), the complex errors Δ of Eq. (27);
     `misfit` (poses, n, n), mean |error|² over the measured variance: above 1 where the model does not explain an element.
-    `bearings` says with which bearing axes the robot was fitted, and why; None for one without bearings.
+    `bearings` says with which bearing axes the robot was fitted, and why; None for one without bearings. `sensed` (L, S, n) per
+    pose is what sensors on the arm are predicted to read.
     """
 
     estimate: Estimate
@@ -47,6 +48,22 @@ class StiffnessResult:
     misfit: np.ndarray
     springs: tuple[str, ...]
     bearings: ResponseBearings | None = None
+    sensed: tuple[np.ndarray, ...] = ()
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors on the arm that recorded in any pose."""
+        return tuple(dict.fromkeys(name for response in self.responses for name in response.sensors))
+
+    def sensor_difference(self, name: str) -> float:
+        """Median over lines and poses of how far a sensor's readings are from those predicted, relative to their size."""
+        shares = []
+        for response, predicted in zip(self.responses, self.sensed, strict=True):
+            if response.sensor_response is not None and name in response.sensors:
+                row = response.sensors.index(name)
+                error = np.linalg.norm(response.sensor_response[:, row] - predicted[:, row], axis=1)
+                shares.append(error / np.linalg.norm(predicted[:, row], axis=1))
+        return float(np.median(np.concatenate(shares)))
 
     def robot(self, model: RobotModel) -> RobotModel:
         """`model` with what was found: its springs, and the bearing axes that they belong to."""
@@ -94,6 +111,7 @@ def identify_stiffness(
         inertias_known,
     )
     check_responses(model, responses)
+    check_sensors(model, responses)
     model = with_brakes(model, responses[0].joints)
     search = MultiStart() if search is None else search
     x = search.find(model, responses, *data.parameters(model), rng, progress)
@@ -119,9 +137,10 @@ def identify_stiffness(
     progress("fitting", 0.8)
     estimate = _widened(fit, data)
     progress("fitting", 1.0)
-    predicted = fit.predicted()
-    pairs = zip(fit.residual.poses, predicted, strict=True)
-    errors = tuple(pose.errors(g) for pose, g in pairs)
+    stacked, axes = fit.predicted(), len(responses[0].joints)
+    pairs = zip(fit.residual.poses, stacked, strict=True)
+    errors = tuple(pose.errors(g)[:, :axes] for pose, g in pairs)
+    predicted = tuple(g[:, :axes] for g in stacked)
     misfit = np.array(
         [
             np.mean(np.abs(r.response - g) ** 2 / r.std**2, axis=0)
@@ -129,7 +148,14 @@ def identify_stiffness(
         ]
     )
     return StiffnessResult(
-        estimate, tuple(responses), predicted, errors, misfit, spring_names(model), bearings
+        estimate,
+        tuple(responses),
+        predicted,
+        errors,
+        misfit,
+        spring_names(model),
+        bearings,
+        tuple(g[:, axes:] for g in stacked),
     )
 
 

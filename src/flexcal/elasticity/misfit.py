@@ -68,8 +68,9 @@ def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> M
         return None
     first, last = _around(means, at)
     band = slice(first, min(last + BAND_LINES, len(powers[worst])))
-    error = np.abs(response.response - fit.predicted()[worst])[band] / response.std[band]
-    axis = response.joints[int(np.argmax(np.mean(error**2, axis=(0, 2))))]
+    error = np.abs(response.stacked - fit.predicted()[worst])[band] / response.stacked_std[band]
+    outputs = (*response.joints, *(f"sensor {name}" for name in response.sensors))
+    axis = outputs[int(np.argmax(np.mean(error**2, axis=(0, 2))))]
     far = far_springs(fit)
     return Misfit(
         reduced_chi2=float(estimate.reduced_chi2),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -105,6 +105,7 @@ class ModelError:
         blocks, columns = [], []
         predictions = model.predict(x)
         shifts = geometric_shifts(model, x, tolerances)
+        mounted = mounting_shifts(model, x)
         natural = model.parameters.natural(x)
         values = dict(zip(model.parameters.names, natural, strict=True))
         labels = pose_labels(responses)
@@ -125,7 +126,7 @@ class ModelError:
             form = effects[k].by_friction * np.repeat([tolerances.strength, tolerances.width], half)
             change = np.concatenate([change, 0.5 * form], axis=-1)
             blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
-            shared = np.concatenate([shifts[k], form], axis=-1)
+            shared = np.concatenate([shifts[k], mounted[k], form], axis=-1)
             columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shared, none))))
         return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
 
@@ -140,7 +141,7 @@ class ModelError:
 
 
 def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances) -> list[np.ndarray]:
-    """∂G (lines, E, E, g) of every pose by one standard deviation of each geometric error, by forward differences."""
+    """∂G (lines, E + S, E, g) of every pose by one standard deviation of each geometric error, by forward differences."""
     base = model.responses(x)
     shifts: list[list[np.ndarray]] = [[] for _ in base]
     for joint in model.robot.joints:
@@ -153,3 +154,24 @@ def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances
             for k, response in enumerate(moved.responses(x)):
                 shifts[k].append(response - base[k])
     return [np.stack(columns, axis=-1) for columns in shifts]
+
+
+def mounting_shifts(model: ResponseModel, x: np.ndarray) -> list[np.ndarray]:
+    """∂G (lines, E + S, E, 5 sensors) of every pose by one standard deviation of each sensor's position and direction, by forward
+    differences."""
+    base = model.responses(x)
+    shifts: list[list[np.ndarray]] = [[] for _ in base]
+    for sensor in {s.name: s for pose in model.poses for s in pose.sensors}.values():
+        for misplaced in sensor.misplaced():
+            poses = tuple(
+                replace(
+                    pose, sensors=tuple(misplaced if s.name == misplaced.name else s for s in pose.sensors)
+                )
+                for pose in model.poses
+            )
+            for k, response in enumerate(replace(model, poses=poses).responses(x)):
+                shifts[k].append(response - base[k])
+    return [
+        np.stack(columns, axis=-1) if columns else np.zeros((*still.shape, 0))
+        for columns, still in zip(shifts, base, strict=True)
+    ]

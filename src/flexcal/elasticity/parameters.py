@@ -11,6 +11,8 @@ from flexcal.elasticity.naming import (
     hardening_name,
     held_inertia_name,
     pose_labels,
+    sensitivity_name,
+    sensor_delay_name,
     viscous_name,
 )
 from flexcal.errors import FlexcalError
@@ -18,7 +20,9 @@ from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.declared import FRICTION_LOG_STD, elastic_inertials, springs_and_rotors
+from flexcal.model.linearisation import linearise
 from flexcal.model.names import unit_of
+from flexcal.model.transfer import transfer_matrix
 
 HALF_GAP_STD = 1e-4
 """Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
@@ -53,6 +57,7 @@ def stage_one_parameters(
     for joint in model.driven:
         name = f"{joint.name}.delay"
         items.append(Parameter(name, "s", 0.0, prior_std=max(r.sample_time for r in responses)))
+    items += sensor_parameters(model, responses)
     for response, label in zip(responses, pose_labels(responses), strict=True):
         loss = apparent_viscous(response)
         items += [
@@ -98,6 +103,19 @@ def held_inertias(model: RobotModel) -> list[Parameter]:
     return items
 
 
+def sensor_parameters(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list[Parameter]:
+    """Sensitivity of every sensor on the arm that recorded, about that stated, and the delay of its readings, 0 ± the sample time."""
+    late = max(response.sample_time for response in responses)
+    items = []
+    for name in dict.fromkeys(name for response in responses for name in response.sensors):
+        std = model.sensors[name].config.sensitivity_std
+        items += [
+            Parameter(sensitivity_name(name), "1", 1.0, prior_std=std, scale="log"),
+            Parameter(sensor_delay_name(name), "s", 0.0, prior_std=late),
+        ]
+    return items
+
+
 def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
     """Motor loss (axes,) N m s/rad seen at the lowest tenth of the lines: the real part of the impedance jω Ĝ⁻¹."""
     low = slice(0, max(3, len(response.frequencies_hz) // 10))
@@ -127,12 +145,61 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
                 f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, that of pose {responses[0].pose} of "
                 f"{', '.join(responses[0].joints)}; excite the same joints in all poses."
             )
+        unknown = [name for name in response.sensors if name not in model.sensors]
+        if unknown:
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} has the sensor {unknown[0]}, which {model.path} does not declare; add it "
+                "under `sensors:` with its frame, xyz and direction."
+            )
         if response.q_mean.shape != (model.n,):
             raise FlexcalError(
                 f"The frequency response of pose {response.pose} has a mean position of {response.q_mean.size} joints, "
                 f"but the robot has {model.n}."
             )
-        if not (np.isfinite(response.response).all() and np.isfinite(response.covariance).all()):
+        if not (np.isfinite(response.stacked).all() and np.isfinite(response.stacked_covariance).all()):
             raise FlexcalError(
                 f"The frequency response of pose {response.pose} holds a NaN or an infinite number."
             )
+
+
+def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
+    """Raises `FlexcalError` where the readings of a sensor on the arm are of another size or sign than those of robot.yaml's robot.
+
+    Over the lowest third of the lines, where the arm follows its motors nearly rigidly, whatever the springs are.
+    """
+    for name in dict.fromkeys(name for response in responses for name in response.sensors):
+        sensor, cross, power = model.sensors[name], 0.0j, 0.0
+        for response in responses:
+            if name not in response.sensors:
+                continue
+            row = len(response.joints) + response.sensors.index(name)
+            low = slice(0, max(3, len(response.frequencies_hz) // 3))
+            system = linearise(model, response.q_mean, response.payload, sensors=[sensor])
+            expected = transfer_matrix(system, response.frequencies_hz[low]).response
+            # from motors' motion to readings: what friction and inertia do to the motors is in both
+            still = np.swapaxes(
+                np.linalg.solve(np.swapaxes(expected[:, :-1], 1, 2), expected[:, -1:].swapaxes(1, 2)), 1, 2
+            )
+            predicted = (still @ response.response[low])[:, 0]
+            cross += np.sum(predicted.conj() * response.stacked[low, row])
+            power += float(np.sum(np.abs(predicted) ** 2))
+        if power > 0:
+            _check_gain(model, name, complex(cross / power))
+
+
+def _check_gain(model: RobotModel, name: str, gain: complex) -> None:
+    size = abs(gain)
+    where = f"the readings of the sensor {name}"
+    if not 0.5 < size < 2.0:
+        ratio = f"{1 / size:.2g} times smaller" if size < 1 else f"{size:.2g} times larger"
+        unit = " (they seem to be in g)" if 8 < 1 / size < 12 and model.sensors[name].order == 2 else ""
+        raise FlexcalError(
+            f"{where} are {ratio} than those of the robot of {model.path}{unit}; give them in m/s², m/s or m, name their unit under "
+            f"`signals:`, or correct its quantity, frame, xyz or direction under `sensors:`."
+        )
+    if gain.real < 0.5 * size:
+        what = "are in the opposite direction to" if gain.real < -0.5 * size else "have another phase than"
+        raise FlexcalError(
+            f"{where} {what} those of the robot of {model.path}; correct its direction, frame or quantity under `sensors:`, and check that "
+            "they are of the same instants as the torques."
+        )

@@ -8,12 +8,14 @@ forces at the sidebands, and the gap that opens once a cycle brings them back to
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from flexcal.elasticity.reference_motion import ArmState, ReferenceMotion
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.closed_loop import drive_pull
 from flexcal.model.elastic_arm import ElasticArm
 from flexcal.model.linearisation import linearise
@@ -36,13 +38,17 @@ def reference_shift(
     frequencies_hz: np.ndarray,
     motion: ReferenceMotion,
     opening: np.ndarray | None = None,
+    sensors: Sequence[ArmSensor] = (),
 ) -> np.ndarray:
-    """G under the reference motion less G at rest, (L, E, E) rad/s² per N m, for motors about `q` (n,) with `payload` kg.
+    """G under the reference motion less G at rest, (L, E + S, E), for motors about `q` (n,) with `payload` kg and `sensors` on the arm.
+
+    Rows are rad/s² per N m, then the sensors' readings. Their rows of the Jacobian are those at rest: what changes of them along the motion
+    is of the first order in its amplitude, and so are the sidebands that it multiplies.
 
     `opening` (phases, E) of the stiffness and damping of every drive of `robot` is missing at that phase of the motion, with their mean
     put back: the drives of `robot` have their mean softness. The arm follows its motors rigidly.
     """
-    rest = linearise(robot, q, payload)
+    rest = linearise(robot, q, payload, sensors=sensors)
     still = transfer_matrix(rest, frequencies_hz).response
     if motion.amplitude == 0.0:
         return np.zeros_like(still)
@@ -72,7 +78,11 @@ def reference_shift(
     forces = np.zeros((width, count))
     forces[middle : middle + count] = np.eye(count)
     moved = np.linalg.solve(system.reshape(-1, width, width), np.broadcast_to(forces, (len(s), width, count)))
-    return s[:, sidebands, None, None] ** 2 * moved[:, middle : middle + count] - still
+    at_line, s = moved[:, middle : middle + size], s[:, sidebands]
+    moving = s[:, None, None] ** 2 * at_line[:, :count]
+    if rest.sensed is not None:
+        moving = np.concatenate([moving, rest.sensed.at(s) @ at_line], axis=1)
+    return moving - still
 
 
 def _arm_changes(

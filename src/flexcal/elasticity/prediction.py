@@ -9,17 +9,25 @@ import numpy as np
 
 from flexcal.data import MultisinePlan
 from flexcal.elasticity.drive_torque import DriveTorque, Hardened
-from flexcal.elasticity.naming import half_gap_name, hardening_name, pose_labels, viscous_name
+from flexcal.elasticity.naming import (
+    half_gap_name,
+    hardening_name,
+    pose_labels,
+    sensitivity_name,
+    sensor_delay_name,
+    viscous_name,
+)
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction:
-    """G (lines, E, E) in one pose, and ∂G (lines, E, E, c) by the parameters numbered `columns` (c,), in estimation coordinates."""
+    """G (lines, E + S, E) in one pose, and ∂G (lines, E + S, E, c) by the parameters numbered `columns` (c,), in estimation coordinates."""
 
     response: np.ndarray
     derivatives: np.ndarray
@@ -34,6 +42,7 @@ class PoseModel:
     half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` maps
     the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,)
     are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
+    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,).
     """
 
     frequencies_hz: np.ndarray
@@ -45,6 +54,17 @@ class PoseModel:
     hardening: dict[int, tuple[int, int]]
     torque: DriveTorque | None
     delays: np.ndarray
+    sensors: tuple[ArmSensor, ...]
+    sensitivities: np.ndarray
+    late: np.ndarray
+
+    def measured(self, natural: np.ndarray) -> np.ndarray:
+        """What G is multiplied by (L, E + S, E): the delays of torques and readings, the sensitivities of sensors."""
+        s = 2j * np.pi * self.frequencies_hz[:, None]
+        torque = np.array([natural[number] if number >= 0 else 0.0 for number in self.delays])
+        ones = np.ones((len(s), len(torque)))
+        rows = np.concatenate([ones, natural[self.sensitivities] * np.exp(-s * natural[self.late])], axis=1)
+        return rows[:, :, None] * np.exp(-s * torque)[:, None, :]
 
     def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
         """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
@@ -146,6 +166,7 @@ class ResponseModel:
                 names.pop("payload.mass", None)
             delays = [f"{joint.name}.delay" for joint in robot.driven]
             at = np.array([parameters.index(d) if d in parameters else -1 for d in delays])
+            sensors = tuple(robot.sensors[name] for name in response.sensors)
             poses.append(
                 PoseModel(
                     response.frequencies_hz,
@@ -157,6 +178,9 @@ class ResponseModel:
                     hardening,
                     None,
                     at,
+                    sensors,
+                    np.array([parameters.index(sensitivity_name(s.name)) for s in sensors], dtype=int),
+                    np.array([parameters.index(sensor_delay_name(s.name)) for s in sensors], dtype=int),
                 )
             )
         return cls(robot, parameters, tuple(poses))
@@ -179,7 +203,7 @@ class ResponseModel:
         return [self._pose(pose, values, slopes, derivatives=True) for pose in self.poses]
 
     def responses(self, x: np.ndarray) -> list[np.ndarray]:
-        """Responses (lines, E, E) of every pose, without derivatives."""
+        """Responses (lines, E + S, E) of every pose, without derivatives."""
         values, slopes = self.parameters.natural(x), self.parameters.natural_slope(x)
         return [self._pose(pose, values, slopes, derivatives=False).response for pose in self.poses]
 
@@ -190,16 +214,15 @@ class ResponseModel:
         robot = self.robot.with_values(known)
         softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
         names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
-        system = linearise(robot, pose.q, payload, derivatives=names)
+        system = linearise(robot, pose.q, payload, derivatives=names, sensors=pose.sensors)
         s = 2j * np.pi * pose.frequencies_hz
         moved = transfer_matrix(system, pose.frequencies_hz)
         response, change = moved.response, moved.derivatives
-        late = np.array([values[number] if number >= 0 else 0.0 for number in pose.delays])
-        phase = np.exp(-s[:, None] * late)[:, None, :]
-        response = response * phase
+        factor = pose.measured(values)
+        response = response * factor
         if not derivatives:
             return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
-        change = change * phase[..., None]
+        change = change * factor[..., None]
         drive_changes = {axis: np.zeros_like(response) for axis in pose.changing}
         blocks: dict[int, np.ndarray] = {}
         for k, name in enumerate(names):
@@ -216,6 +239,12 @@ class ResponseModel:
             number = int(pose.delays[axis])
             blocks[number] = np.zeros_like(response)
             blocks[number][:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[number]
+        for row, (sensitivity, late) in enumerate(
+            zip(pose.sensitivities, pose.late, strict=True), response.shape[2]
+        ):
+            blocks[int(sensitivity)], blocks[int(late)] = np.zeros_like(response), np.zeros_like(response)
+            blocks[int(sensitivity)][:, row] = response[:, row] * slopes[sensitivity] / values[sensitivity]
+            blocks[int(late)][:, row] = -s[:, None] * response[:, row] * slopes[late]
         return Prediction(response, np.stack(list(blocks.values()), axis=-1), np.array(list(blocks)))
 
 

@@ -20,11 +20,11 @@ CLUSTER_LINES = 4
 
 @dataclass(frozen=True, eq=False)
 class PoseResidual:
-    """Measured response of one pose (L lines, n axes), prepared.
+    """Measured response of one pose (L lines, m outputs: n axes, then sensors), prepared.
 
-    `logarithmic` (L, n, n) tells the elements whose error is log(Ĝ/G); the error of the others is (Ĝ - G)/`scale`, with scale
-    √|Ĝ_ii Ĝ_jj| so that a coupling near zero counts as what it is beside its axes. `factor` (L, n², n²) whitens vec of the errors.
-    `shift` (L, n, n) is added to every prediction.
+    `logarithmic` (L, m, n) tells the elements whose error is log(Ĝ/G); the error of the others is (Ĝ - G)/`scale`, with scale
+    √|Ĝ_ii Ĝ_jj| so that a coupling near zero counts as what it is beside its axes, and for a sensor the size of its row. `factor`
+    (L, m n, m n) whitens vec of the errors. `shift` (L, m, n) is added to every prediction.
     """
 
     measured: np.ndarray
@@ -36,31 +36,30 @@ class PoseResidual:
     @classmethod
     def of(cls, response: FrequencyResponse, weighting: Weighting) -> PoseResidual:
         """Choose logarithmic or linear errors by their standard deviation, and weigh them."""
-        measured = response.response
-        diagonal = np.abs(np.diagonal(measured, axis1=1, axis2=2))
-        scale = np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
-        logarithmic = response.std < LOGARITHM_LIMIT * np.abs(measured)
+        measured = response.stacked
+        scale = element_scale(measured)
+        logarithmic = response.stacked_std < LOGARITHM_LIMIT * np.abs(measured)
         unit = _vec(np.where(logarithmic, measured, scale))
-        covariance = response.covariance / (unit[:, :, None] * unit[:, None, :].conj())
+        covariance = response.stacked_covariance / (unit[:, :, None] * unit[:, None, :].conj())
         return cls(measured, logarithmic, scale, weighting.factor(response, covariance))
 
     def errors(self, predicted: np.ndarray) -> np.ndarray:
-        """Complex errors Δ (L, n, n): the phase of a logarithm is in (-π, π] because it is that of the ratio."""
+        """Complex errors Δ (L, m, n): the phase of a logarithm is in (-π, π] because it is that of the ratio."""
         with np.errstate(divide="ignore", invalid="ignore"):
             ratio = np.log(np.where(self.logarithmic, self.measured / predicted, 1.0))
         return np.where(self.logarithmic, ratio, (self.measured - predicted) / self.scale)
 
     def residual(self, predicted: np.ndarray) -> np.ndarray:
-        """Whitened rows (2 L n²,), line by line: real parts, then imaginary parts."""
+        """Whitened rows (2 L m n,), line by line: real parts, then imaginary parts."""
         white = self.factor @ _vec(self.errors(predicted + self.shift))[:, :, None]
         return _real(white)[:, 0]
 
     def jacobian(self, prediction: Prediction) -> np.ndarray:
-        """∂(residual)/∂x (2 L n², c) by the parameters of `prediction.columns`."""
+        """∂(residual)/∂x (2 L m n, c) by the parameters of `prediction.columns`."""
         unit = np.where(self.logarithmic, prediction.response + self.shift, self.scale)
         change = prediction.derivatives / -unit[..., None]
-        lines, n, _, columns = change.shape
-        return _real(self.factor @ np.swapaxes(change, 1, 2).reshape(lines, n * n, columns))
+        lines, m, n, columns = change.shape
+        return _real(self.factor @ np.swapaxes(change, 1, 2).reshape(lines, m * n, columns))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +77,7 @@ class StageOneResidual:
         return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
 
     def shifted(self, model: ResponseModel, shifts: Sequence[np.ndarray]) -> StageOneResidual:
-        """The same measurements against `model`, with known changes (L, n, n) added to what it predicts in every pose."""
+        """The same measurements against `model`, with known changes (L, m, n) added to what it predicts in every pose."""
         poses = [replace(pose, shift=shift) for pose, shift in zip(self.poses, shifts, strict=True)]
         return StageOneResidual(model, tuple(poses))
 
@@ -107,6 +106,15 @@ class StageOneResidual:
             labels.append(first + np.repeat(number, 2 * pose.measured[0].size))
             first += int(number[-1]) + 1
         return np.concatenate(labels)
+
+
+def element_scale(stacked: np.ndarray) -> np.ndarray:
+    """Size (L, m, n) to which an element of a response (L, m, n) compares: √|G_ii G_jj| of the n axes, that of its row of a sensor."""
+    axes = stacked.shape[2]
+    diagonal = np.abs(np.diagonal(stacked[:, :axes], axis1=1, axis2=2))
+    scale = np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
+    rows = np.linalg.norm(stacked[:, axes:], axis=2, keepdims=True)
+    return np.concatenate([scale, np.repeat(rows, axes, axis=2)], axis=1)
 
 
 def _vec(matrix: np.ndarray) -> np.ndarray:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from flexcal.elasticity.prediction import ResponseModel
-from flexcal.elasticity.residual import StageOneResidual
+from flexcal.elasticity.residual import StageOneResidual, element_scale
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameters, Problem, solve
 from flexcal.frequency import FrequencyResponse
@@ -128,7 +128,7 @@ class PopulationSearch:
         model = ResponseModel.of(robot, thinned, parameters)
         springs = [parameters.index(name) for name in spring_names(robot)]
         start = parameters.coordinates()
-        scales = [_element_scale(response.response) for response in thinned]
+        scales = [element_scale(response.stacked) for response in thinned]
         done = 0
         progress("searching", 0.0)
 
@@ -140,7 +140,7 @@ class PopulationSearch:
             except FlexcalError:
                 return 2.0
             pairs = zip(thinned, predicted, scales, strict=True)
-            return float(np.mean([relative_difference(r.response, g, scale).mean() for r, g, scale in pairs]))
+            return float(np.mean([relative_difference(r.stacked, g, scale).mean() for r, g, scale in pairs]))
 
         def tell(_: np.ndarray, convergence: float = 0.0) -> None:
             nonlocal done
@@ -172,19 +172,5 @@ def thin(responses: Sequence[FrequencyResponse], lines: int) -> list[FrequencyRe
     result = []
     for response in responses:
         step = max(1, round(len(response.frequencies_hz) / lines))
-        result.append(
-            replace(
-                response,
-                frequencies_hz=response.frequencies_hz[::step],
-                response=response.response[::step],
-                covariance=response.covariance[::step],
-                noise_covariance=response.noise_covariance[::step],
-                realisations=response.realisations[:, ::step],
-            )
-        )
+        result.append(response.at_lines(slice(None, None, step)))
     return result
-
-
-def _element_scale(response: np.ndarray) -> np.ndarray:
-    diagonal = np.abs(np.diagonal(response, axis1=1, axis2=2))
-    return np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])

@@ -14,7 +14,8 @@ class Weighting(Protocol):
     """Turns the covariance of the errors of one pose into a factor of the weight."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
-        """F (L, n², n²) with the cost Σ ‖F Δ‖² over complex errors Δ of vec G (column-major) of `covariance` (L, n², n²)."""
+        """F (L, m n, m n) with the cost Σ ‖F Δ‖² over complex errors Δ of vec G (column-major) of `covariance` (L, m n, m n), for the m
+        outputs and n axes of `response`."""
         ...
 
 
@@ -34,10 +35,10 @@ class UniformWeighting:
     """Equal weights of all elements and lines; the common variance is the median of those of the diagonal elements."""
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
-        n = response.response.shape[-1]
+        n, m = response.response.shape[-1], len(response.outputs)
         variance = np.real(np.diagonal(covariance, axis1=1, axis2=2))
-        size = np.sqrt(np.median(variance[:, :: n + 1]))
-        return np.broadcast_to(np.eye(n * n) / size, covariance.shape)
+        size = np.sqrt(np.median(variance[:, :: m + 1]))
+        return np.broadcast_to(np.eye(m * n) / size, covariance.shape)
 
 
 @dataclass(frozen=True)
@@ -55,7 +56,7 @@ class PaperWeighting:
 
     def factor(self, response: FrequencyResponse, covariance: np.ndarray) -> np.ndarray:
         n = response.response.shape[-1]
-        weight = np.full((*response.response.shape,), self.coupling)
+        weight = np.full(response.stacked.shape, self.coupling)
         logarithm = np.log(response.frequencies_hz)
         for i in range(n):
             weight[:, i, i] = 1.0

@@ -32,11 +32,11 @@ def average_response(spectra: ExperimentSpectra, realisations: np.ndarray, avera
         case "harmonic":
             return harmonic(realisations)
         case "h1":
-            return h1(spectra.acceleration, spectra.torque)
+            return h1(spectra.outputs, spectra.torque)
         case "joint_input_output":
-            return joint_input_output(spectra.acceleration, spectra.torque, spectra.excitation)
+            return joint_input_output(spectra.outputs, spectra.torque, spectra.excitation)
         case "errors_in_variables":
-            return errors_in_variables(spectra.acceleration, spectra.torque, spectra.noise)
+            return errors_in_variables(spectra.outputs, spectra.torque, spectra.noise)
     raise FlexcalError(f"there is no average {average!r}; choose one of {', '.join(get_args(Average))}.")
 
 

@@ -34,9 +34,9 @@ def column_noise(empty: np.ndarray, bins: np.ndarray, lines: np.ndarray, count: 
 
 
 def output_noise(response: np.ndarray, column: np.ndarray) -> np.ndarray:
-    """Covariance (L, n, n) of the equation error N_y - G N_u of one experiment, from that of [N_y; N_u], (L, 2n, 2n)."""
-    n = response.shape[-1]
-    left = np.concatenate([np.broadcast_to(np.eye(n), response.shape), -response], -1)
+    """Covariance (L, m, m) of the equation error N_y - G N_u of one experiment, from that of [N_y; N_u], (L, m + n, m + n)."""
+    lines, m, _ = response.shape
+    left = np.concatenate([np.broadcast_to(np.eye(m), (lines, m, m)), -response], -1)
     return left @ column @ _dagger(left)
 
 
@@ -53,7 +53,7 @@ def input_gain(torque: np.ndarray) -> np.ndarray:
 
 
 def kronecker(right: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Batched Kronecker product right ⊗ left of (L, n, n) matrices, (L, n², n²)."""
+    """Batched Kronecker product right ⊗ left of (L, n, n) and (L, m, m) matrices, (L, n m, n m)."""
     lines, n, m = right.shape[0], right.shape[-1], left.shape[-1]
     product = right[:, :, None, :, None] * left[:, None, :, None, :]
     return product.reshape(lines, n * m, n * m)
@@ -62,9 +62,10 @@ def kronecker(right: np.ndarray, left: np.ndarray) -> np.ndarray:
 def total_covariance(
     realisations: np.ndarray, response: np.ndarray, noise: np.ndarray, gain: np.ndarray, count: int
 ) -> tuple[np.ndarray, float]:
-    """Covariance (L, n², n²) of vec G of ONE realisation, noise and nonlinear distortion, and its degrees of freedom.
+    """Covariance (L, m n, m n) of vec G of ONE realisation, noise and nonlinear distortion, and its degrees of freedom.
 
-    The scatter G^[r] - mean (R, L, n, n) has no structure over frequency but the gain of the plant itself, so it is
+    The first n of the m rows of G are those of the n driven axes.
+    The scatter G^[r] - mean (R, L, m, n) has no structure over frequency but the gain of the plant itself, so it is
     pooled over `count` neighbouring lines after whitening by that gain: from the left by L with
     L Lᴴ = G Θ Gᴴ + `noise`, where Θ is the (diagonal) input-referred disturbance found in the window, friction above
     all, and `noise` (L, n, n) the equation error of output_noise; from the right by P with P Pᴴ = `gain`. Poles and
@@ -72,30 +73,33 @@ def total_covariance(
     (Ledoit and Wolf; intensity of Schäfer and Strimmer 2005 for complex normal scatter), then carried back.
     Degrees of freedom: (R - 1) · count, before shrinkage.
     """
-    members, lines, n, _ = realisations.shape
+    members, lines, m, n = realisations.shape
     count = min(count, lines)
     at = np.arange(lines)
     scatter = (realisations - realisations.mean(0)) * np.sqrt(members / (members - 1.0))
     right = np.linalg.cholesky(gain)
     balanced = np.swapaxes(np.linalg.solve(right, np.swapaxes(scatter, -1, -2)), -1, -2)
 
-    input_scatter = np.linalg.solve(response, balanced)
-    input_noise = np.linalg.solve(response, np.swapaxes(np.linalg.solve(response, noise).conj(), -1, -2))
+    driven = response[:, :n]
+    input_scatter = np.linalg.solve(driven, balanced[:, :, :n])
+    input_noise = np.linalg.solve(driven, noise[:, :n, :n])
+    input_noise = np.linalg.solve(driven, np.swapaxes(input_noise.conj(), -1, -2))
     significant = 1.0 + 2.0 / np.sqrt((members - 1) * count)  # what the noise may well explain shapes nothing
     disturbance = (np.abs(input_scatter) ** 2).mean((0, -1)) - significant * _diagonal(input_noise)
     disturbance = np.maximum(pool(disturbance, at, at, count), 0.0)
 
-    floor = (_SMALLEST_RELATIVE_STD * np.linalg.norm(response, axis=(1, 2))) ** 2
+    size = np.linalg.norm(response, axis=2)
+    size[:, :n] = np.linalg.norm(driven, axis=(1, 2))[:, None]  # axes have one unit, sensors their own
     shape = (response * disturbance[:, None, :]) @ _dagger(response) + noise
-    shape = shape + floor[:, None, None] * np.eye(n)
+    shape = shape + (_SMALLEST_RELATIVE_STD * size)[:, :, None] ** 2 * np.eye(m)
     left = np.linalg.cholesky(0.5 * (shape + _dagger(shape)))
 
     white = np.linalg.solve(left, balanced)
-    vectors = np.swapaxes(white, -1, -2).reshape(members, lines, n * n).transpose(1, 2, 0)
+    vectors = np.swapaxes(white, -1, -2).reshape(members, lines, n * m).transpose(1, 2, 0)
     squares = vectors @ _dagger(vectors) / members
     freedom = float((members - 1) * count)
     pooled = shrink_to_diagonal(pool(squares, at, at, count), freedom)
-    pooled = pooled + 1e-12 * np.eye(n * n)  # keeps it definite where a scatter is exactly nil
+    pooled = pooled + 1e-12 * np.eye(n * m)  # keeps it definite where a scatter is exactly nil
     return transform(pooled, right, left), freedom
 
 
@@ -118,7 +122,7 @@ def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
 
 
 def transform(covariance: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
-    """Covariance of vec(L Y Pᵀ) from that of vec(Y), (L, n², n²), for batched L = `left` and P = `right`."""
+    """Covariance of vec(L Y Pᵀ) from that of vec(Y), (L, m n, m n), for batched L = `left` and P = `right`."""
     half = _from_left(covariance, right, left)
     result = _dagger(_from_left(_dagger(half), right, left))
     return 0.5 * (result + _dagger(result))
@@ -126,8 +130,8 @@ def transform(covariance: np.ndarray, right: np.ndarray, left: np.ndarray) -> np
 
 def _from_left(matrix: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
     """(right ⊗ left) · matrix without the Kronecker product."""
-    lines, n = right.shape[:2]
-    columns = (right @ matrix.reshape(lines, n, -1)).reshape(lines, n, n, -1)
+    lines, n, m = *right.shape[:2], left.shape[-1]
+    columns = (right @ matrix.reshape(lines, n, -1)).reshape(lines, n, m, -1)
     return (left[:, None] @ columns).reshape(matrix.shape)
 
 

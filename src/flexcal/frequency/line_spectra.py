@@ -13,12 +13,12 @@ from flexcal.frequency.multisine import samples_per_period
 class ExperimentSpectra:
     """Everything the averages need of one pose, in phasors (cosine amplitudes); E experiments, n excited axes.
 
-    `acceleration` (R, L, n, E) rad/s² and `torque` (R, L, n, E) N m are measured, hold corrected and averaged over
-    periods; `excitation` (R, L, n, E) N m is what the plan asked for; `noise` (L, 2n, 2n) is the covariance of one
-    measured column [acceleration; torque].
+    `outputs` (R, L, m, E), accelerations of the axes in rad/s² and the readings of m - n sensors, and `torque` (R, L, n, E)
+    N m are measured, hold corrected and averaged over periods; `excitation` (R, L, n, E) N m is what the plan asked for;
+    `noise` (L, m + n, m + n) is the covariance of one measured column [outputs; torque].
     """
 
-    acceleration: np.ndarray
+    outputs: np.ndarray
     torque: np.ndarray
     excitation: np.ndarray
     noise: np.ndarray

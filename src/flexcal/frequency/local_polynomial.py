@@ -17,7 +17,7 @@ from flexcal.frequency import covariance as cov
 from flexcal.frequency.line_spectra import has_reference, kept_samples
 from flexcal.frequency.periods import column_factor
 from flexcal.frequency.records import PoseRecords, by_pose
-from flexcal.frequency.response import SMALLEST_FREEDOM, FrequencyResponse, axis_names
+from flexcal.frequency.response import SMALLEST_FREEDOM, FrequencyResponse, axis_names, sensed
 
 ORDER = 2
 LEAST_LINES, MOST_LINES = 3, 7
@@ -127,34 +127,37 @@ def local_polynomial_responses(
 
 
 def keep_whole(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray, ...]:
-    """Mean position, and the spectrum (K, 2n) of position and torque over the whole record, at all bins from the first line to the last."""
+    """Mean position, and the spectrum (K, m + n) of position, sensors and torque over the whole record, at all bins from the first line to
+    the last."""
     rows, axes = slice(0, kept_samples(plan, recording).stop), np.asarray(plan.joints)
     position = recording.q[rows]
-    mean = position.mean(0)
-    signal = np.hstack([position[:, axes] - mean[axes], recording.torque[rows][:, axes]])
+    mean, readings = position.mean(0), recording.sensor_readings[rows]
+    signal = np.hstack(
+        [position[:, axes] - mean[axes], readings - readings.mean(0), recording.torque[rows][:, axes]]
+    )
     band = np.asarray(plan.lines) * plan.periods
     return mean, np.fft.rfft(signal, axis=0)[band[0] : band[-1] + 1] * (2.0 / len(signal))
 
 
 def _response(records: PoseRecords, names: tuple[str, ...]) -> FrequencyResponse:
     plan, n = records.plan, len(records.plan.joints)
+    m = n + len(records.sensors)
     lines = np.asarray(plan.lines) * plan.periods
-    columns = records.difference(1).reshape(-1, lines[-1] - lines[0] + 1, 2 * n)
+    columns = records.difference(1).reshape(-1, lines[-1] - lines[0] + 1, m + n)
     columns, noise = without_transient(columns, lines - lines[0], _quiet_bins(plan) - lines[0])
     factor = column_factor(records, np.asarray(plan.lines))
     columns = columns * factor
     noise = noise * factor[:, :, None] * factor[:, None, :].conj()
     needed = -(-(SMALLEST_FREEDOM + (ORDER + 1) * n) // len(columns))
     fit = local_polynomial(
-        columns[:, :, n:], columns[:, :, :n], int(np.clip(needed + 1 - needed % 2, LEAST_LINES, MOST_LINES))
+        columns[:, :, m:], columns[:, :, :m], int(np.clip(needed + 1 - needed % 2, LEAST_LINES, MOST_LINES))
     )
     return FrequencyResponse(
         frequencies_hz=plan.frequencies_hz,
-        response=fit.response,
-        covariance=cov.kronecker(fit.gain, fit.scatter),
-        noise_covariance=cov.kronecker(fit.gain, cov.output_noise(fit.response, noise)),
+        **sensed(records.sensors, n, fit.response, cov.kronecker(fit.gain, fit.scatter)),
+        noise_covariance=cov.kronecker(fit.gain, cov.output_noise(fit.response, noise)[:, :n, :n]),
         degrees_of_freedom=fit.degrees_of_freedom,
-        realisations=fit.response[None],
+        realisations=fit.response[None, :, :n],
         joints=names,
         q_mean=records.q_mean,
         payload=plan.payload,

@@ -17,48 +17,51 @@ from flexcal.frequency.records import PoseRecords
 
 
 def keep_periods(plan: MultisinePlan, recording: Recording) -> tuple[np.ndarray, ...]:
-    """Mean position, and spectra (bins, 2n) of position and torque after the settle periods: at lines, detection lines, empty bins.
+    """Mean position, and spectra (bins, m + n) of position, sensors and torque after the settle periods: at lines, detection lines, empty
+    bins.
 
     The last only where the noise is not read from the half sum of both signs. Raises `FlexcalError` as `kept_samples` does.
     """
     rows, axes = kept_samples(plan, recording), np.asarray(plan.joints)
     periods = plan.periods - plan.settle_periods
-    position, torque = recording.q[rows], recording.torque[rows]
+    position, torque, sensed = recording.q[rows], recording.torque[rows], recording.sensor_readings[rows]
     whole_lines = noise_in_half_sum(plan)
     if whole_lines:  # average the periods before anything is copied
-        position, torque = _average(position, periods), _average(torque, periods)
+        position, torque, sensed = (_average(signal, periods) for signal in (position, torque, sensed))
         periods = 1
     mean = position.mean(0)
-    signal = np.hstack([position[:, axes] - mean[axes], torque[:, axes]])
+    signal = np.hstack([position[:, axes] - mean[axes], sensed - sensed.mean(0), torque[:, axes]])
     kept = (mean, *(spectrum(signal, periods, lines) for lines in (plan.lines, plan.detection_lines)))
     return kept if whole_lines else (*kept, spectrum(signal, periods, noise_lines(plan)))
 
 
 def experiment_spectra(records: PoseRecords, pooled_lines: int) -> ExperimentSpectra:
     """The spectra of all realisations: signs subtracted, hold corrected, noise pooled over neighbouring bins."""
-    plan, n = records.plan, len(records.plan.joints)
+    plan = records.plan
+    m = len(plan.joints) + len(records.sensors)
     lines, empty_lines = np.asarray(plan.lines), noise_lines(plan)
     columns = records.difference(1)
     half = noise_in_half_sum(plan)
     empty = records.half_sum(1)[:, :, np.isin(lines, empty_lines)] if half else records.difference(3)
     factor = column_factor(records, lines)
-    columns = np.moveaxis(columns * factor, 1, -1)  # (R, L, 2n, E)
-    empty = empty.transpose(2, 0, 1, 3).reshape(empty.shape[2], -1, 2 * n)
+    columns = np.moveaxis(columns * factor, 1, -1)  # (R, L, m + n, E)
+    empty = empty.transpose(2, 0, 1, 3).reshape(empty.shape[2], -1, columns.shape[2])
     noise = cov.column_noise(empty, empty_lines, lines, pooled_lines)
     return ExperimentSpectra(
-        acceleration=columns[..., :n, :],
-        torque=columns[..., n:, :],
+        outputs=columns[..., :m, :],
+        torque=columns[..., m:, :],
         excitation=np.stack([multisine.spectra(plan, member) for member in range(plan.realisations)]),
         noise=noise * factor[:, :, None] * factor[:, None, :].conj(),
     )
 
 
 def column_factor(records: PoseRecords, lines: np.ndarray) -> np.ndarray:
-    """What makes phasors of position and logged torque those of acceleration and acting torque, (L, 2n)."""
+    """What makes phasors of position and logged torque those of acceleration and acting torque, (L, m + n); sensors stay as they are."""
     n = len(records.plan.joints)
     omega = 2.0 * np.pi * records.plan.base_frequency_hz * lines
     hold = torque_hold(records.plan, omega, records.time_step)
-    return np.concatenate([np.repeat(-(omega**2)[:, None], n, 1), np.repeat(hold[:, None], n, 1)], 1)
+    sensed = np.ones((len(lines), len(records.sensors)))
+    return np.concatenate([np.repeat(-(omega**2)[:, None], n, 1), sensed, np.repeat(hold[:, None], n, 1)], 1)
 
 
 def odd_distortion(records: PoseRecords, response: np.ndarray, noise: np.ndarray) -> np.ndarray | None:
@@ -71,9 +74,9 @@ def odd_distortion(records: PoseRecords, response: np.ndarray, noise: np.ndarray
     lines, left_out = np.asarray(plan.lines), np.asarray(plan.detection_lines)
     if not left_out.size:
         return None
-    seen = records.difference(2) * column_factor(records, left_out)  # (R, E, K, 2n)
+    seen = records.difference(2) * column_factor(records, left_out)  # (R, E, K, m + n)
     between = np.array([[np.interp(left_out, lines, g) for g in row] for row in np.moveaxis(response, 0, -1)])
-    error = seen[..., :n] - np.einsum("ijk,rekj->reki", between, seen[..., n:])
+    error = seen[..., :n] - np.einsum("ijk,rekj->reki", between, seen[..., -n:])
     power = (np.abs(error) ** 2).mean((0, 1, 2))
     quiet = np.array([np.interp(left_out, lines, np.real(noise[:, i, i])).mean() for i in range(n)])
     excited = np.abs(records.difference(1)[..., :n] * column_factor(records, lines)[:, :n]) ** 2
@@ -81,4 +84,4 @@ def odd_distortion(records: PoseRecords, response: np.ndarray, noise: np.ndarray
 
 
 def _average(signal: np.ndarray, periods: int) -> np.ndarray:
-    return signal.reshape(periods, -1, signal.shape[1]).mean(0)
+    return signal.reshape(periods, len(signal) // periods, signal.shape[1]).mean(0)

@@ -26,6 +26,12 @@ class PoseRecords:
         self._expected = [(r, e, s) for r in range(plan.realisations) for e in experiments for s in signs]
         self._kept: dict[tuple[int, int, int], tuple[np.ndarray, ...]] = {}
         self._time_step: float | None = None
+        self._sensors: tuple[str, ...] | None = None
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors on the arm that recorded too."""
+        return self._sensors or ()
 
     @property
     def time_step(self) -> float:
@@ -70,6 +76,13 @@ class PoseRecords:
             raise FlexcalError(
                 f"{recording.name}: its sample time is {recording.time_step:g} s, but that of recordings before it is "
                 f"{self._time_step:g} s; record them all at one rate."
+            )
+        if self._sensors is None:
+            self._sensors = recording.sensors
+        elif recording.sensors != self._sensors:
+            own, others = (" and ".join(names) or "none" for names in (recording.sensors, self._sensors))
+            raise FlexcalError(
+                f"{recording.name}: the sensors on the arm are {own}, but in recordings before it {others}; record the same in all."
             )
         kept = self._keep(self.plan, recording)
         if not all(np.isfinite(part).all() for part in kept):

@@ -1,8 +1,9 @@
 """The frequency response matrix of a robot in one pose, from motor torque to motor acceleration (eqs. (19)-(21))."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from flexcal.publication import current
 
 POOLED_LINES = 15  # neighbouring lines that share one covariance: 45 degrees of freedom with 4 realisations
 SMALLEST_FREEDOM = 20
-
 _MATRICES = ArrayForm("complex", ("lines", "axes", "axes"))
 _COVARIANCES = ArrayForm("complex", ("lines", "elements", "elements"))
 _FORMS = {
@@ -36,6 +36,11 @@ _FORMS = {
     "average": ArrayForm("text"),
     "odd_distortion": ArrayForm("real", ("axes or none",)),
 }
+_SENSED = {
+    "sensors": ArrayForm("text", ("sensors",)),
+    "sensor_response": ArrayForm("complex", ("lines", "sensors", "axes")),
+    "joint_covariance": ArrayForm("complex", ("lines", "all elements", "all elements")),
+}
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +54,9 @@ class FrequencyResponse:
     q_mean (all joints,) rad, the mean motor position to linearise at; payload kg or None; pose: its number in the
     plan; sample_time s; average: how the realisations were averaged; odd_distortion (n,) of each axis, relative to its
     excited acceleration, where the plan left lines out to see it.
+
+    sensors: names of the S sensors on the arm that recorded too; sensor_response (L, S, n), from motor torque to their readings
+    (m/s², m/s or m per N m); joint_covariance (L, (n + S) n, (n + S) n) of vec of all rows, axes first. None without sensors.
     """
 
     frequencies_hz: np.ndarray
@@ -64,6 +72,43 @@ class FrequencyResponse:
     sample_time: float
     average: str = "arithmetic"
     odd_distortion: np.ndarray | None = None
+    sensors: tuple[str, ...] = ()
+    sensor_response: np.ndarray | None = None
+    joint_covariance: np.ndarray | None = None
+
+    @property
+    def stacked(self) -> np.ndarray:
+        """(L, n + S, n): `response`, and below it the rows of the sensors where there are any."""
+        if self.sensor_response is None:
+            return self.response
+        return np.concatenate([self.response, self.sensor_response], axis=1)
+
+    @property
+    def stacked_covariance(self) -> np.ndarray:
+        """Covariance (L, (n + S) n, (n + S) n) of vec `stacked`."""
+        return self.covariance if self.joint_covariance is None else self.joint_covariance
+
+    @property
+    def outputs(self) -> tuple[str, ...]:
+        """Names of the rows of `stacked`: axes, then sensors."""
+        return (*self.joints, *self.sensors)
+
+    @property
+    def stacked_std(self) -> np.ndarray:
+        """Standard deviation (L, n + S, n) of every element of `stacked`."""
+        return _elements(self.stacked_covariance, self.response.shape[-1])
+
+    def at_lines(self, rows: slice) -> "FrequencyResponse":
+        """The response at some of its lines."""
+        own = (
+            "frequencies_hz",
+            "response",
+            "covariance",
+            "noise_covariance",
+            *(("sensor_response", "joint_covariance") if self.sensors else ()),
+        )
+        kept = {name: getattr(self, name)[rows] for name in own}
+        return replace(self, **kept, realisations=self.realisations[:, rows])
 
     @property
     def omega(self) -> np.ndarray:
@@ -78,12 +123,12 @@ class FrequencyResponse:
     @property
     def std(self) -> np.ndarray:
         """Standard deviation (L, n, n) of every element, the root of E|δ|²."""
-        return self._elements(self.covariance)
+        return _elements(self.covariance, self.response.shape[-1])
 
     @property
     def noise_std(self) -> np.ndarray:
         """The part of `std` that the noise alone explains, (L, n, n)."""
-        return self._elements(self.noise_covariance)
+        return _elements(self.noise_covariance, self.response.shape[-1])
 
     @property
     def distortion_std(self) -> np.ndarray:
@@ -101,6 +146,9 @@ class FrequencyResponse:
         values["joints"] = np.array(self.joints)
         values["payload"] = np.nan if self.payload is None else self.payload
         values["odd_distortion"] = np.zeros(0) if self.odd_distortion is None else self.odd_distortion
+        values["sensors"] = np.array(self.sensors, dtype=str)
+        if not self.sensors:
+            values = {name: value for name, value in values.items() if name not in _SENSED}
         with atomic_path(path) as temporary, temporary.open("wb") as stream:
             np.savez_compressed(stream, **values)
 
@@ -118,6 +166,14 @@ class FrequencyResponse:
             raise file.error("holds no response at positive frequencies")
         if values["covariance"].shape[1:] != (axes**2, axes**2):
             raise file.error(f"holds a covariance of another size than the response's ({axes}, {axes})")
+        more: dict[str, Any] = {}
+        if "sensors" in file:
+            sensed = file.read(_SENSED)
+            if sensed["joint_covariance"].shape[1:] != (axes * (axes + len(sensed["sensors"])),) * 2:
+                raise file.error(
+                    "holds a joint_covariance of another size than the responses of axes and sensors"
+                )
+            more = {**sensed, "sensors": tuple(sensed["sensors"].tolist())}
         payload = float(values["payload"])
         return cls(
             frequencies_hz=values["frequencies_hz"],
@@ -133,12 +189,8 @@ class FrequencyResponse:
             sample_time=float(values["sample_time"]),
             average=str(values["average"]),
             odd_distortion=values["odd_distortion"] if values["odd_distortion"].size else None,
+            **more,
         )
-
-    def _elements(self, covariance: np.ndarray) -> np.ndarray:
-        n = self.response.shape[-1]
-        variance = np.real(np.diagonal(covariance, axis1=-2, axis2=-1)).reshape(-1, n, n)
-        return np.sqrt(np.swapaxes(variance, -1, -2))
 
 
 def frequency_response(
@@ -195,8 +247,13 @@ def response_of(
             "the local polynomial method (--method local-polynomial)."
         )
     spectra = experiment_spectra(records, pooled_lines)
+    if records.sensors and average not in ("arithmetic", "h1", "joint_input_output"):
+        raise FlexcalError(
+            f"the average '{average}' is of square matrices, but the sensors {', '.join(records.sensors)} recorded too; use "
+            "arithmetic, h1 or joint_input_output."
+        )
     try:
-        realisations = right_divide(spectra.acceleration, spectra.torque)
+        realisations = right_divide(spectra.outputs, spectra.torque)
         gain = cov.input_gain(spectra.torque)
     except np.linalg.LinAlgError as problem:
         raise FlexcalError(
@@ -205,21 +262,40 @@ def response_of(
     mean = realisations.mean(0)
     noise = cov.output_noise(mean, spectra.noise)
     total, freedom = cov.total_covariance(realisations, mean, noise, gain, pooled_lines)
+    n = len(joints)
     return FrequencyResponse(
         frequencies_hz=lines * plan.base_frequency_hz,
-        response=average_response(spectra, realisations, average),
-        covariance=total / members,
-        noise_covariance=cov.kronecker(gain, noise) / members,
+        **sensed(records.sensors, n, average_response(spectra, realisations, average), total / members),
+        noise_covariance=cov.kronecker(gain, noise[:, :n, :n]) / members,
         degrees_of_freedom=freedom,
-        realisations=realisations,
+        realisations=realisations[:, :, :n],
         joints=joints,
         q_mean=records.q_mean,
         payload=plan.payload,
         pose=records.pose,
         sample_time=records.time_step,
         average=average,
-        odd_distortion=odd_distortion(records, mean, noise),
+        odd_distortion=odd_distortion(records, mean[:, :n], noise[:, :n, :n]),
     )
+
+
+def sensed(
+    sensors: tuple[str, ...], axes: int, stacked: np.ndarray, covariance: np.ndarray
+) -> dict[str, Any]:
+    """The fields of a response whose rows `stacked` (L, n + S, n), of this `covariance` of their vec, are axes and then sensors."""
+    own = (
+        np.arange(axes)[:, None] * stacked.shape[1] + np.arange(axes)
+    ).ravel()  # columns, of each the axes' rows
+    found: dict[str, Any] = {"response": stacked[:, :axes], "covariance": covariance[:, own[:, None], own]}
+    if sensors:
+        found |= {"sensors": sensors, "sensor_response": stacked[:, axes:], "joint_covariance": covariance}
+    return found
+
+
+def _elements(covariance: np.ndarray, axes: int) -> np.ndarray:
+    """Standard deviations (L, m, n) from a covariance (L, m n, m n) of vec, for `axes` columns."""
+    variance = np.real(np.diagonal(covariance, axis1=-2, axis2=-1))
+    return np.sqrt(np.swapaxes(variance.reshape(len(variance), axes, -1), -1, -2))
 
 
 def axis_names(plan: MultisinePlan, given: Sequence[str] | None) -> tuple[str, ...]:

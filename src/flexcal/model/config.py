@@ -36,6 +36,33 @@ class PointConfig:
 
 
 @dataclass(frozen=True)
+class ArmSensorConfig:
+    """An accelerometer or a vibrometer that records in frequency experiments: the point `xyz` (m) in the URDF frame `frame`.
+
+    `direction` in which it measures: of an accelerometer in the axes of `frame`, with which it moves; of a vibrometer, which stands still,
+    in the robot's base frame. `quantity` is what the log holds, in m/s², m/s or m: without it the acceleration of an accelerometer and the
+    velocity of a vibrometer. 1σ: `sensitivity_std` relative, `position_std` m, `direction_std` rad.
+    """
+
+    frame: str
+    xyz: Triple
+    direction: Triple
+    kind: Literal["accelerometer", "vibrometer"] = "accelerometer"
+    quantity: Literal["acceleration", "velocity", "displacement"] | None = None
+    sensitivity_std: float = 0.02
+    position_std: float = 0.003
+    direction_std: float = 0.02
+
+    def __post_init__(self) -> None:
+        if not any(self.direction):
+            raise FlexcalError("a sensor's direction has three numbers, not all zero.")
+        if not self.sensitivity_std > 0 or min(self.position_std, self.direction_std) < 0:
+            raise FlexcalError(
+                "a sensor's sensitivity_std must be positive, its position_std and direction_std not negative."
+            )
+
+
+@dataclass(frozen=True)
 class PayloadConfig:
     """A body held by the robot: kg, m, kg m² about its centre of mass, in the axes of `frame`."""
 
@@ -308,6 +335,7 @@ class RobotConfig:
     robot: str
     points: dict[str, PointConfig] = field(default_factory=dict)
     locked: dict[str, float] = field(default_factory=dict)
+    sensors: dict[str, ArmSensorConfig] = field(default_factory=dict)
     payload: PayloadConfig | None = None
     gravity: Triple = (0.0, 0.0, -9.81)
     prior: PriorConfig = PriorConfig()

@@ -127,6 +127,29 @@ class ElasticArm:
         near, middle, far = np.sort(np.indices((d, d, d)), axis=0)
         return chained[near, middle, far]
 
+    def place(self, configuration: np.ndarray, joint: int, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the point `xyz` (3,) m of the link of a joint is in the base frame, and the link's orientation (3, 3) there."""
+        import pinocchio as pin
+
+        pin.forwardKinematics(self.model, self.data, configuration)
+        placement = self.data.oMi[self.bodies[joint]]
+        turn = placement.rotation @ self.turns[joint].T
+        return placement.translation + turn @ xyz, turn
+
+    def elastic_axes_at(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Origins (d, 3) m and axes (d, 3) of the elastic coordinates after `place`, base frame, and which carry a joint's link (d,)."""
+        ids = [self._joint_of(at) for at in self.elastic]
+        placements = [self.data.oMi[i] for i in ids]
+        units = [{"Z": 2, "Y": 1, "X": 0}[self.model.joints[i].shortname()[-1]] for i in ids]
+        axes = np.array([p.rotation[:, unit] for p, unit in zip(placements, units, strict=True)])
+        carrying = set(self.model.supports[self.bodies[joint]])
+        return np.array([p.translation for p in placements]), axes, np.array([i in carrying for i in ids])
+
+    def nearer(self) -> np.ndarray:
+        """Whether elastic coordinate k is nearer to the base than l, or the same, (d, d), for coordinates of one branch."""
+        ids = np.array([self._joint_of(at) for at in self.elastic])
+        return ids[:, None] <= ids[None, :]
+
     def _joint_of(self, velocity: int) -> int:
         return next(i for i in range(1, self.model.njoints) if self.model.joints[i].idx_v == velocity)
 

@@ -8,11 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.elastic_arm import ElasticArm, moved_inertia
 from flexcal.model.equilibrium import Equilibrium, elastic_axes, static_equilibrium
 from flexcal.model.hardening import tangent_ratio, twist_of
 from flexcal.model.names import INERTIALS, SPRINGS
 from flexcal.model.robot_model import RobotModel
+from flexcal.model.sensed_rows import SensedRows, sensed_rows
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +24,7 @@ class Linearisation:
     Joints that are not `driven` are held: rigidly, or by their drive spring where the motor is braked.
 
     `mass`, `damping`, `stiffness` are (E + d, E + d). `derivatives` maps a parameter name to (∂M, ∂D, ∂K), the motion of the rest
-    position with the parameter included.
+    position with the parameter included. `sensed` is what sensors on the arm measure, where there are any.
     """
 
     joints: tuple[str, ...]
@@ -30,6 +32,7 @@ class Linearisation:
     damping: np.ndarray
     stiffness: np.ndarray
     derivatives: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
+    sensed: SensedRows | None = None
 
     @property
     def inputs(self) -> int:
@@ -38,9 +41,14 @@ class Linearisation:
 
 
 def linearise(
-    robot: RobotModel, q: np.ndarray, payload: float | None = None, *, derivatives: Sequence[str] = ()
+    robot: RobotModel,
+    q: np.ndarray,
+    payload: float | None = None,
+    *,
+    derivatives: Sequence[str] = (),
+    sensors: Sequence[ArmSensor] = (),
 ) -> Linearisation:
-    """Linearise about the rest position of motors held at `q` (n,) with `payload` kg (None: the declared mass).
+    """Linearise about the rest position of motors held at `q` (n,) with `payload` kg (None: the declared mass), and what `sensors` see.
 
     `derivatives` names parameters: `<joint>.<spring>.stiffness|damping`, `<joint>.rotor_inertia|viscous|held_inertia`,
     `<link>.mass|com_x…`, `payload.mass|com_x…`. Setting a mass carries the inertia along as `RobotModel.with_values` does. Raises
@@ -73,9 +81,12 @@ def linearise(
         stiffness += k * pattern
         damping += c * pattern
     result: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+    motions: dict[str, np.ndarray] = {}
     if derivatives:
+        motions = {name: _rest_motion(robot, arm, rest, axes, name) for name in derivatives}
         result = _derivatives(robot, arm, at, rest, axes, springs, derivatives)
-    return Linearisation(tuple(e.name for e in robot.driven), mass, damping, stiffness, result)
+    sensed = sensed_rows(arm, at, sensors, count, motions) if sensors else None
+    return Linearisation(tuple(e.name for e in robot.driven), mass, damping, stiffness, result, sensed)
 
 
 def _springs(
@@ -137,9 +148,7 @@ def _derivatives(
             if key == "damping":
                 result[name] = (zero, pattern, zero)
                 continue
-            k = axes.index(axis)
-            stretch = _stretch(robot, rest, axis)
-            mass, stiffness = moved(-rest.compliance[0][:, k] * stretch)
+            mass, stiffness = moved(_rest_motion(robot, arm, rest, axes, name))
             result[name] = (widened(mass), zero, pattern + widened(stiffness))
         elif key == "held_inertia":
             k = count + axes.index((robot.joint_index(owner), 2))
@@ -153,12 +162,25 @@ def _derivatives(
             result[name] = (unit, zero, zero) if key == "rotor_inertia" else (zero, unit, zero)
         elif key in INERTIALS:
             mass, stiffness = _by_inertia(robot, arm, at, owner, key)
-            load = _load_by_inertia(robot, arm, rest, owner, key)
-            more_mass, more_stiffness = moved(-rest.compliance[0] @ load)
+            more_mass, more_stiffness = moved(_rest_motion(robot, arm, rest, axes, name))
             result[name] = (widened(mass + more_mass), zero, widened(stiffness + more_stiffness))
         else:
             raise FlexcalError(f"the linearised robot has no derivative with respect to '{name}'.")
     return result
+
+
+def _rest_motion(
+    robot: RobotModel, arm: ElasticArm, rest: Equilibrium, axes: list[tuple[int, int]], name: str
+) -> np.ndarray:
+    """How the elastic coordinates of the rest position (d,) move with a parameter."""
+    owner, _, key = name.rpartition(".")
+    joint_name, _, spring = owner.rpartition(".")
+    if key == "stiffness" and spring in SPRINGS:
+        axis = (robot.joint_index(joint_name), SPRINGS.index(spring))
+        return -rest.compliance[0][:, axes.index(axis)] * _stretch(robot, rest, axis)
+    if key in INERTIALS:
+        return -rest.compliance[0] @ _load_by_inertia(robot, arm, rest, owner, key)
+    return np.zeros(len(axes))
 
 
 def _twists(robot: RobotModel, rest: Equilibrium) -> np.ndarray:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from flexcal.kernels import Tree
+from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.config import Bearings, ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
 from flexcal.model.names import COUPLED, FRICTION, PARALLEL, SCATTER
@@ -123,6 +125,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
         payload_mass=np.array([payload.mass if payload else 0.0]),
         payload_com=np.array(payload.com if payload else np.zeros(3)),
         payload_inertia=payload.moments if payload else np.zeros(6),
+        sensors={name: _sensor(file, description, name, config) for name in config.sensors},
     )
 
 
@@ -149,6 +152,30 @@ def _point(file: YamlFile, description: Description, name: str, config: RobotCon
     entry = config.points[name]
     frame = _frame(file, ("points", name, "frame"), description, entry.frame)
     return Point(name, entry.frame, frame.joint, frame.rotation, frame.translation, np.array(entry.xyz))
+
+
+_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+
+
+def _sensor(file: YamlFile, description: Description, name: str, config: RobotConfig) -> ArmSensor:
+    entry = config.sensors[name]
+    frame = _frame(file, ("sensors", name, "frame"), description, entry.frame)
+    if not re.fullmatch(r"\w+", name):
+        raise file.error(
+            ("sensors", name), f"the sensor's name '{name}' may have letters, digits and _ only."
+        )
+    moves = entry.kind == "accelerometer"
+    direction = np.array(entry.direction) / np.linalg.norm(entry.direction)
+    quantity = entry.quantity or ("acceleration" if moves else "velocity")
+    return ArmSensor(
+        name,
+        frame.joint,
+        frame.translation + frame.rotation @ np.array(entry.xyz),
+        frame.rotation @ direction if moves else direction,
+        moves,
+        _ORDERS[quantity],
+        entry,
+    )
 
 
 def _payload(file: YamlFile, description: Description, config: RobotConfig) -> Payload | None:

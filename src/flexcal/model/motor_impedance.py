@@ -11,9 +11,12 @@ KNOT_OCTAVES = 0.5
 def friction_shifts(
     response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float
 ) -> np.ndarray:
-    """∂G (L, E, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω."""
+    """∂G (L, m, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω.
+
+    The first E of the m outputs are the motors' accelerations.
+    """
     s = 2j * np.pi * frequencies_hz[:, None, None, None]
-    change = -np.einsum("lia,laj->lija", response, response) * size / s
+    change = -np.einsum("lia,laj->lija", response, response[:, : response.shape[2]]) * size / s
     return over_frequency(change, frequencies_hz, octave)
 
 

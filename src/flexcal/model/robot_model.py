@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
@@ -15,6 +15,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.kernels import Tree
+from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.config import Bearings, ControllerConfig, PriorConfig, RobotConfig
 from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis
@@ -78,6 +79,7 @@ class RobotModel:
     payload_inertia: np.ndarray
     posterior: Posterior = NOTHING_ESTIMATED
     braked: frozenset[int] = frozenset()
+    sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
 
     @classmethod
     def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:

@@ -10,11 +10,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.model.linearisation import Linearisation
+from flexcal.model.sensed_rows import SensedRows
 
 
 @dataclass(frozen=True, eq=False)
 class TransferMatrix:
-    """`response` (lines, E, E) in rad/s² per N m, and `derivatives` (lines, E, E, c) by the parameters `names` (c,)."""
+    """`response` (lines, E + S, E) and `derivatives` (lines, E + S, E, c) by the parameters `names` (c,).
+
+    Rows are the motors' accelerations in rad/s² per N m, then the readings of the S sensors of the linearised robot, where it has any.
+    """
 
     response: np.ndarray
     names: tuple[str, ...]
@@ -33,7 +37,14 @@ def transfer_matrix(system: Linearisation, frequencies_hz: np.ndarray) -> Transf
     forces = np.broadcast_to(np.eye(size, count), (len(s), size, count))
     moved = np.linalg.solve(at**2 * system.mass + at * system.damping + system.stiffness, forces)
     names = tuple(system.derivatives)
-    return TransferMatrix(at**2 * moved[:, :count], names, _derivatives(system, names, s, moved))
+    response, change = at**2 * moved[:, :count], _derivatives(system, names, s, moved)
+    if system.sensed is not None:
+        rows = system.sensed.at(s)
+        response = np.concatenate([response, rows @ moved], axis=1)
+        change = np.concatenate(
+            [change, _sensed_derivatives(system, system.sensed, names, s, moved, rows)], axis=1
+        )
+    return TransferMatrix(response, names, change)
 
 
 def _derivatives(
@@ -60,4 +71,28 @@ def _derivatives(
         upper[:, :, some] -= s[:, None, None] ** power * product
     change[:, i, j] = upper
     change[:, j, i] = upper
+    return change
+
+
+def _sensed_derivatives(
+    system: Linearisation,
+    sensed: SensedRows,
+    names: tuple[str, ...],
+    s: np.ndarray,
+    moved: np.ndarray,
+    rows: np.ndarray,
+) -> np.ndarray:
+    """∂(o X) = ∂o X − Y (s² ∂M + s ∂D + ∂K) X (lines, S, E, c), with Y = o A⁻¹, A being symmetric."""
+    if not names:
+        return np.zeros((len(s), len(sensed), system.inputs, 0), dtype=complex)
+    at = s[:, None, None]
+    dynamics = at**2 * system.mass + at * system.damping + system.stiffness
+    pulled = np.linalg.solve(dynamics, np.swapaxes(rows, 1, 2))  # A⁻¹ oᵀ (lines, E + d, S)
+    parts = [np.array(kind) for kind in zip(*system.derivatives.values(), strict=True)]
+    a, b = np.nonzero(np.logical_or.reduce([np.any(part != 0, axis=0) for part in parts]))
+    table = (pulled[:, a][:, :, :, None] * moved[:, b][:, :, None, :]).transpose(0, 2, 3, 1)
+    change = np.einsum("lsan,laj->lsjn", sensed.changes(s, names), moved, optimize=True)
+    for power, part in zip((2, 1, 0), parts, strict=True):
+        some = np.flatnonzero(np.any(part != 0, axis=(1, 2)))
+        change[..., some] -= s[:, None, None, None] ** power * (table @ part[some][:, a, b].T)
     return change

@@ -31,7 +31,7 @@ def check_misfit(misfit: Misfit | None) -> Check:
 def misfit_sentences(misfit: Misfit) -> str:
     """Pose, band and motor of a misfit, possible causes, and its effect on the intervals."""
     where = (
-        f"Not in pose {misfit.pose} from {misfit.low_hz:.0f} to {misfit.high_hz:.0f} Hz, most at the motor of {misfit.axis}: the residual "
+        f"Not in pose {misfit.pose} from {misfit.low_hz:.0f} to {misfit.high_hz:.0f} Hz, most at {_place(misfit.axis)}: the residual "
         f"is {misfit.peak**0.5:.1f} times its standard deviation there (χ² per degree of freedom is {misfit.reduced_chi2:.2f} "
         "overall). "
     )
@@ -62,3 +62,7 @@ def misfit_document(misfit: Misfit | None) -> dict[str, Any] | None:
 def read_misfit(document: Mapping[str, Any] | None) -> Misfit | None:
     """The inverse of `misfit_document`."""
     return None if document is None else Misfit(**{**document, "far": tuple(document["far"])})
+
+
+def _place(output: str) -> str:
+    return f"the {output}" if output.startswith("sensor ") else f"the motor of {output}"

@@ -22,6 +22,7 @@ from flexcal.frequency import (
     reciprocity,
 )
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import sensor_column
 from flexcal.progress import Progress, silent
 from flexcal.report.measured_response import relative_to_diagonal
 from flexcal.report.response_checks import response_checks
@@ -33,7 +34,8 @@ from flexcal.workflow.results import write_results
 class IdentifiedResponses:
     """Measured frequency responses by pose, and the files that hold them.
 
-    `provenance` has all files that they come from, with their hashes, `command` the command line, where there was one.
+    `provenance` has all files that they come from, with their hashes, `command` the command line, where there was one. `declared` names the
+    sensors on the arm of robot.yaml.
     """
 
     responses: tuple[FrequencyResponse, ...]
@@ -41,6 +43,7 @@ class IdentifiedResponses:
     robot: str
     provenance: Mapping[str, str]
     command: str = ""
+    declared: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; the relative numbers are medians over lines and diagonal elements."""
@@ -58,6 +61,22 @@ class IdentifiedResponses:
         """The verdict, from the same checks as on the page."""
         results = {"responses": self._entries, "reciprocity": self._pairs}
         return Trust(response_checks(results, self.responses))
+
+    @property
+    def sensor_remarks(self) -> tuple[str, ...]:
+        """What the sensors on the arm recorded, and which of those declared did not."""
+        recorded = dict.fromkeys(name for response in self.responses for name in response.sensors)
+        remarks = [
+            f"sensor {name} on the arm: 1σ {100 * worst:.2g} % of its response, in the worst pose"
+            for name in recorded
+            for worst in (max(entry["sensors"].get(name, 0.0) for entry in self._entries),)
+        ]
+        remarks += [
+            f"robot.yaml declares the sensor {name}, but the logs have no column {sensor_column(name)}: it is not used"
+            for name in self.declared
+            if name not in recorded
+        ]
+        return tuple(remarks)
 
     @cached_property
     def _entries(self) -> list[dict[str, Any]]:
@@ -103,7 +122,7 @@ def identify_response(
     write_plan(out / PLAN, plan)
     logs = [existing_file(folder, label.name) for label in labels(plan)]
     origin = provenance([robot, model.urdf, folder / PLAN, *logs], {"method": method})
-    result = IdentifiedResponses(responses, files, model.name, origin, command)
+    result = IdentifiedResponses(responses, files, model.name, origin, command, tuple(model.sensors))
     from flexcal.workflow.report_folder import report_folder
 
     write_results(out, result.document())
@@ -134,4 +153,12 @@ def _summary(response: FrequencyResponse, file: Path) -> dict[str, Any]:
         "relative_std": relative(response.std),
         "relative_noise_std": relative(response.noise_std),
         "odd_distortion": response.odd_distortion,
+        "sensors": {name: _sensor_std(response, row) for row, name in enumerate(response.sensors)},
     }
+
+
+def _sensor_std(response: FrequencyResponse, row: int) -> float:
+    """Standard deviation of a sensor's row of the response over its size, at the median line."""
+    at = len(response.joints) + row
+    sizes = np.linalg.norm(response.stacked[:, at], axis=1)
+    return float(np.median(np.linalg.norm(response.stacked_std[:, at], axis=1) / sizes))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.elasticity import StiffnessResult
+from flexcal.elasticity.naming import sensitivity_name
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.report.responses_check import misfit_sentences
@@ -14,6 +15,8 @@ from flexcal.report.sections.springs import hardening_sentence
 from flexcal.workflow.bearing_remarks import response_bearings_remarks
 
 _ONE_SIDED = 1.645
+_ODD = 3.0
+"""Standard deviations of a sensor's sensitivity from which it is remarked."""
 
 
 def further_joints(estimate: Estimate, model: RobotModel) -> tuple[str, ...]:
@@ -46,11 +49,30 @@ def stiffness_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, 
             f"the motor of {_listed(moving)} seems to have moved with the arm, held by its controller and not by a brake; the identified "
             "spring then contains the stiffness of the controller; apply the brakes and repeat, or use this spring with care"
         )
+    remarks += sensor_remarks(result, model)
     if hardening := hardening_sentence(estimate):
         remarks.append(hardening[0].lower() + hardening.rstrip(".")[1:])
     if estimate.misfit is not None:
         remarks.append(f"unexplained responses: {misfit_sentences(estimate.misfit).rstrip('.')}")
     return (*remarks, *response_bearings_remarks(result.bearings))
+
+
+def sensor_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...]:
+    """What was found of every sensor on the arm."""
+    remarks = []
+    for name in result.sensors:
+        found = result.quantity(sensitivity_name(name))
+        std = "" if found["std"] is None else f" ± {found['std']:.2g}"
+        remarks.append(
+            f"the sensor {name} on the arm reads {found['estimate']:.4g}{std} times what robot.yaml says of it; with that its readings are "
+            f"{100 * result.sensor_difference(name):.2g} % off the model's at the median line"
+        )
+        stated = model.sensors[name].config.sensitivity_std
+        if abs(np.log(float(found["estimate"] or np.nan))) > _ODD * stated:
+            remarks.append(
+                f"that is more than {_ODD:g} times its sensitivity_std of {stated:g}: check the sensitivity, xyz and direction of {name}"
+            )
+    return tuple(remarks)
 
 
 def _listed(names: Sequence[str]) -> str:

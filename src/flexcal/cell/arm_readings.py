@@ -1,0 +1,87 @@
+"""Readings of sensors on the arm of the virtual robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.cell.config import SensorConfig
+from flexcal.cell.plant import Plant, sensor_site
+from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
+
+_FIRST = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
+_SECOND = np.array([2, -27, 270, -490, 270, -27, 2]) / 180
+"""Central differences of sixth order over seven samples."""
+_REACH = 3
+
+
+def mounted(truth: RobotModel, seed: int) -> tuple[ArmSensor, ...]:
+    """The sensors of a true robot where they really are: position and direction as far off as robot.yaml says of them, 1σ."""
+    rng = np.random.default_rng([seed, 9])
+    placed = []
+    for sensor in truth.sensors.values():
+        config = sensor.config
+        turned = sensor.direction + config.direction_std * rng.standard_normal(3)
+        placed.append(
+            replace(
+                sensor,
+                xyz=sensor.xyz + config.position_std * rng.standard_normal(3),
+                direction=turned / np.linalg.norm(turned),
+            )
+        )
+    return tuple(placed)
+
+
+def sensitivities(sensors: Sequence[ArmSensor], seed: int) -> np.ndarray:
+    """What readings (S,) are true ones times."""
+    rng = np.random.default_rng([seed, 10])
+    stds = np.array([sensor.config.sensitivity_std for sensor in sensors])
+    return np.exp(stds * rng.standard_normal(len(sensors)))
+
+
+def arm_readings(
+    truth: RobotModel, plant: Plant, sensors: Sequence[ArmSensor], states: np.ndarray, time_step: float
+) -> np.ndarray:
+    """True readings (N, S) in m/s², m/s or m for positions (N, d) of the plant, whose sites are where the sensors are.
+
+    Paths and directions of the sites are MuJoCo's, derivatives in time central differences of sixth order: nothing is linearised.
+    """
+    import mujoco
+
+    data = mujoco.MjData(plant.mjmodel)
+    sites = [plant.mjmodel.site(sensor_site(sensor)).id for sensor in sensors]
+    place, turn = np.empty((len(states), len(sites), 3)), np.empty((len(states), len(sites), 9))
+    for row, position in enumerate(states):
+        data.qpos[:] = position
+        mujoco.mj_kinematics(plant.mjmodel, data)
+        place[row], turn[row] = data.site_xpos[sites], data.site_xmat[sites]
+    readings = []
+    for k, sensor in enumerate(sensors):
+        path = place[:, k] - place[0, k]
+        direction = (
+            turn[:, k].reshape(-1, 3, 3) @ sensor.direction
+            if sensor.moves
+            else np.broadcast_to(sensor.direction, path.shape)
+        )
+        moved = path if sensor.order == 0 else _derivative(path, sensor.order, time_step)
+        if sensor.feels_gravity:
+            moved = moved - truth.gravity
+        readings.append(np.sum(moved * direction, axis=1))
+    return np.stack(readings, axis=1)
+
+
+def reading_noise(sensors: Sequence[ArmSensor], config: SensorConfig) -> np.ndarray:
+    """1σ (S,) of a sample, in the unit of the reading."""
+    by_order = (config.displacement_noise, config.velocity_noise, config.acceleration_noise)
+    return np.array([by_order[sensor.order] for sensor in sensors])
+
+
+def _derivative(path: np.ndarray, order: int, time_step: float) -> np.ndarray:
+    """Derivative in time of a path (N, 3); the ends keep their neighbours' values."""
+    weights = _FIRST if order == 1 else _SECOND
+    windows = np.lib.stride_tricks.sliding_window_view(path, len(weights), axis=0)
+    inner = windows @ weights / time_step**order
+    return np.pad(inner, ((_REACH, _REACH), (0, 0)), mode="edge")

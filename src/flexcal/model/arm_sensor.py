@@ -1,0 +1,52 @@
+"""Sensors on the arm side of the springs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.model.config import ArmSensorConfig
+
+
+@dataclass(frozen=True, eq=False)
+class ArmSensor:
+    """What sees one point of a link move in one direction: an accelerometer on it, or a vibrometer that stands still.
+
+    `xyz` (3,) m is the point in the frame of the link that moves with joint number `joint`. `direction` (3,), of unit length, is in the
+    link's frame where the sensor `moves` with the link, else in the robot's base frame. `order` is the time derivative that is measured: 0
+    for a displacement, 1 for a velocity, 2 for an acceleration. An accelerometer measures n · (p̈ − g), so that its tilt counts.
+    """
+
+    name: str
+    joint: int
+    xyz: np.ndarray
+    direction: np.ndarray
+    moves: bool
+    order: int
+    config: ArmSensorConfig
+
+    @property
+    def feels_gravity(self) -> bool:
+        """Whether its tilt changes the reading: an accelerometer that turns with the link."""
+        return self.moves and self.order == 2
+
+    def misplaced(self) -> tuple[ArmSensor, ...]:
+        """This sensor one standard deviation off in each of its five ways: three of its position, two of its direction."""
+        off = [replace(self, xyz=self.xyz + self.config.position_std * unit) for unit in np.eye(3)]
+        first = np.cross(self.direction, np.eye(3)[np.argmin(np.abs(self.direction))])
+        first /= np.linalg.norm(first)
+        for normal in (first, np.cross(self.direction, first)):
+            turned = self.direction + np.tan(self.config.direction_std) * normal
+            off.append(replace(self, direction=turned / np.linalg.norm(turned)))
+        return tuple(off)
+
+    @property
+    def column(self) -> str:
+        """The column of its readings in a log."""
+        return sensor_column(self.name)
+
+
+def sensor_column(name: str) -> str:
+    """The column of a log that holds the readings of the sensor of this name."""
+    return f"sensor_{name}"
