@@ -99,7 +99,7 @@ def run_loop(
         position_log=log.position,
         torque_log=log.torque,
         arm_log=log.arm,
-        state_log=log.states,
+        **({} if log.states is None else {"state_log": log.states}),
     )
     if done < shape[0]:
         raise FlexcalError(
