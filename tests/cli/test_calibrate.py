@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from cli_files import FLEXCAL, read_csv, snapshot, write_csv
 
+from flexcal.calibration import EvenSample
 from flexcal.data import PoseSet, write_poses
 from flexcal.estimates_file import read_estimates, write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
@@ -336,3 +337,24 @@ def test_the_next_step_follows_the_verdict(run, ur5_folder: Path, some: Path) ->
     moved = run("verify", robot, write_csv(ur5_folder / "moved.csv", header, rows))
     assert "Trusted: no" in moved.out
     assert "next: mend what the verdict names" in moved.out
+
+
+def test_of_very_many_points_an_even_sample_is_fitted_and_all_are_judged(
+    run, ur5_folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The errors at all points are those that a verification of every point finds."""
+    robot, grid = ur5_folder / "robot.yaml", ur5_folder / "grid.csv"
+    rows = len(grid.read_text().splitlines()) - 1
+    taken = EvenSample.of
+    monkeypatch.setattr(EvenSample, "of", lambda poses: taken(poses, 200))
+    outcome = run("calibrate", robot, grid, "--terms", "kinematic", "--json")
+    found = outcome.document
+    assert found["sample"]["points"] == found["sample"]["all"]["poses"] == rows
+    assert found["sample"]["taken"] == found["calibration"]["selected"]["poses"] == 200
+    assert f"of {rows} points 200 were fitted" in " ".join(found["remarks"])
+    sampled = run("verify", robot, grid, "--json").document
+    monkeypatch.setattr(EvenSample, "of", lambda poses: None)
+    every = run("verify", robot, grid, "--json").document
+    for errors in (found["sample"]["all"], sampled["verification"]["measured"]):
+        assert errors == pytest.approx(every["verification"]["measured"], rel=1e-9)
+    assert every["sample"] is None and sampled["sample"]["taken"] == 200

@@ -42,16 +42,18 @@ class Certificate(ParticularsOptions):
 
         require_robot(self.robot, self.targets, self.before, self.after)
         console = Console(self.json)
-        found = certify_robot(
-            self.robot,
-            self.targets,
-            self.before,
-            self.after,
-            self.out,
-            estimates=self.estimates,
-            particulars=self.particulars,
-            command=command_line(),
-        )
+        with console.progress() as progress:
+            found = certify_robot(
+                self.robot,
+                self.targets,
+                self.before,
+                self.after,
+                self.out,
+                estimates=self.estimates,
+                particulars=self.particulars,
+                command=command_line(),
+                progress=progress,
+            )
         document = found.document()
         labels = {
             "after": "after, in the calibrated frame",

@@ -35,9 +35,15 @@ class Repeatability:
         require_robot(self.robot, *self.poses)
         require_files(self.poses, "POSES")
         console = Console(self.json)
-        document = repeat_robot(
-            self.robot, self.poses, estimates=self.estimates, out=self.out, command=command_line()
-        ).document()
+        with console.progress() as progress:
+            document = repeat_robot(
+                self.robot,
+                self.poses,
+                estimates=self.estimates,
+                out=self.out,
+                command=command_line(),
+                progress=progress,
+            ).document()
         console.show(repeatability_table(document))
         noise = document["instrument_rp_mm"]
         if noise is not None:

@@ -34,6 +34,7 @@ from flexcal.estimates_file import sha256_of
 from flexcal.model import RobotModel, carried_mass
 from flexcal.model.resting_tool import points_kinematics
 from flexcal.model.rotations import vector_rotation
+from flexcal.progress import Progress, silent
 from flexcal.report.certificate import CertificateStudy, write_certificate
 from flexcal.report.particulars import NOT_GIVEN, Particulars
 from flexcal.report.prediction_checks import prediction_checks
@@ -187,6 +188,7 @@ def certify_robot(
     estimates: Path | None = None,
     particulars: Particulars = NOT_GIVEN,
     command: str = "",
+    progress: Progress = silent,
 ) -> RobotCertificate:
     """Compare measurements at nominal and at compensated commands with the targets of both, and write the certificate to `out`.
 
@@ -202,12 +204,15 @@ def certify_robot(
         )
     calibrated = calibrated_robot(robot, estimates, "certify")
     model = calibrated.probable
+    progress("reading", 0.0)
     wanted = read_targets(targets, model)
     base, as_declared = (
         wanted_pose(model, nominal, wanted).position for nominal in (calibrated.found, calibrated.nominal)
     )
     sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
     rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
+    progress("reading", 1.0)
+    progress("comparing", 0.0)
     if wanted.q is not None:
         off = {file: np.abs(poses.q - wanted.q[rows[file]]).max(axis=1) for file, poses in sets.items()}
         if np.median(off[before]) > np.median(off[after]):
@@ -250,6 +255,7 @@ def certify_robot(
         fitted_among(calibrated, [after], visited[after][0]),
         command,
     )
+    progress("comparing", 1.0)
     write_certificate(
         out, CertificateStudy(result.document(), result.before.centres, result.after.centres, particulars)
     )

@@ -60,7 +60,8 @@ class RobotMap:
 
     `scale` is what they say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that the
     calibration did not measure. `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the
-    `worst` rows. `provenance` has all files with their hashes, `command` the command line, where there was one.
+    `worst` rows. `provenance` has all files with their hashes, `command` the command line, where there was one. `sample` says which of very
+    many verification points were taken.
     """
 
     reach: Propagation
@@ -76,6 +77,7 @@ class RobotMap:
     outside: str
     provenance: Mapping[str, str]
     command: str = ""
+    sample: EvenSample | None = None
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -90,6 +92,10 @@ class RobotMap:
             remarks.append(
                 "the verification files state no sigma, so the instrument's noise is counted as an error of the robot; 'flexcal "
                 "import --sigma' states it"
+            )
+        if self.sample is not None:
+            remarks.append(
+                f"of {self.sample.total} verification points {len(self.sample.rows)} test the map, drawn evenly over positions and stations"
             )
         if self.outside:
             remarks.append(self.outside)
@@ -171,7 +177,7 @@ def map_accuracy(
     model = calibrated.model
     stations = [s for s in model.stations if found_station(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
-    scale, before, study, fitted = _verified(calibrated, verification)
+    scale, before, study, fitted, sample = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
     found = accuracy_map(reach, q, progress=progress).scaled(applied_factor(scale))
@@ -200,6 +206,7 @@ def map_accuracy(
         outside_ranges(calibrated, q),
         origin,
         command,
+        sample,
     )
     page = MapStudy(model, found, box, result.document(), scale, study)
     if out != page_beside(out):
@@ -232,10 +239,11 @@ def _poses(
 
 def _verified(
     calibrated: CalibratedRobot, files: Sequence[Path]
-) -> tuple[ErrorScale | None, ErrorsBefore | None, Verification | None, tuple[str, ...]]:
-    """How large errors at the poses of the `files` are against their prediction, those before, the verification, and what was fitted."""
+) -> tuple[ErrorScale | None, ErrorsBefore | None, Verification | None, tuple[str, ...], EvenSample | None]:
+    """How large errors at the poses of the `files` are against their prediction, those before, the verification, what was fitted, and which
+    of very many poses were taken."""
     if not files:
-        return None, None, None, ()
+        return None, None, None, (), None
     poses = verification_poses(calibrated, files)
     sample = EvenSample.of(poses)
     poses = poses if sample is None else poses.subset(sample.rows)
@@ -245,7 +253,7 @@ def _verified(
         named = " and ".join(str(file) for file in files)
         raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
     before = robot_before(calibrated.nominal, poses).errors(poses)
-    return error_scale(found, covariance), before, found, fitted_among(calibrated, files, poses)
+    return error_scale(found, covariance), before, found, fitted_among(calibrated, files, poses), sample
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:

@@ -24,6 +24,7 @@ from flexcal.calibration import (
 from flexcal.data import PoseSet, read_poses
 from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
+from flexcal.progress import Progress, silent
 from flexcal.report.repeatability import RepeatabilityStudy, write_repeatability_report
 from flexcal.units import MILLIMETRE
 from flexcal.workflow.calibrated_robot import (
@@ -158,6 +159,7 @@ def repeat_robot(
     estimates: Path | None = None,
     out: Path | None = None,
     command: str = "",
+    progress: Progress = silent,
 ) -> RobotRepeatability:
     """Pose accuracy and repeatability from the repeated visits in `files`; with `out`, results.json and report.html are left there.
 
@@ -166,8 +168,12 @@ def repeat_robot(
     """
     require_distinct(files)
     nominal = RobotModel.from_yaml(robot, estimates=False)
+    progress("reading", 0.0)
     poses = read_poses(list(files), nominal, require_motion=False)
+    progress("reading", 1.0)
+    progress("visits", 0.0)
     visited = repeatability(poses)
+    progress("visits", 0.5)
     calibrated = _calibrated(robot, estimates, nominal)
     errors: dict[str, np.ndarray] = {}
     before = robot_before(nominal, poses).errors(poses).robots_own
@@ -175,6 +181,7 @@ def repeat_robot(
         errors["nominal"] = before
     if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
         errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
+    progress("visits", 1.0)
     stored = None if calibrated is None else calibrated.stored
     blocks = () if calibrated is None else tuple(calibrated.blocks)
     origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
