@@ -115,6 +115,13 @@ SUBJECTS = (
         (by_bytes, lambda content: by_cells(content, ";")),
         ("import robot.yaml foreign.txt --out new.csv",),
     ),
+    *(
+        Subject(name, (by_bytes,), (f"import robot.yaml {name} --out new.csv",))
+        for name in (
+            *("measured.parquet", "measured.mat", "measured_hdf5.mat", "measured.xlsx"),
+            *("recorded.mcap", "recorded.db3"),
+        )
+    ),
     Subject("cell.yaml", _YAML, (f"measure plan.yaml {VIRTUAL}",)),
     Subject("plan.yaml", _YAML, (f"measure plan.yaml {VIRTUAL}",)),
     Subject("frequency/plan.yaml", _YAML, ("identify response robot.yaml frequency --out new",)),

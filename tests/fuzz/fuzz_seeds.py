@@ -7,6 +7,8 @@ import io
 from pathlib import Path
 
 import numpy as np
+import numpy.lib.recfunctions
+from fuzz_foreign import write_foreign
 
 URDF = """<?xml version="1.0" encoding="UTF-8"?>
 <robot name="arm">
@@ -185,6 +187,16 @@ def _write_foreign(path: Path, model, rng: np.random.Generator) -> None:
 def run_verbs(folder: Path) -> None:
     """What other verbs made of these files: estimates, results, plans, recordings and frequency responses."""
     robot = str(folder / "robot.yaml")
+    poses, log = (
+        np.genfromtxt(folder / name, delimiter=",", names=True) for name in ("poses.csv", "log.csv")
+    )
+    assert poses.dtype.names is not None
+    rows = np.lib.recfunctions.structured_to_unstructured(log)[:100]
+    write_foreign(
+        folder,
+        {name: poses[name] for name in poses.dtype.names},
+        {"t": rows[:, 0], "q": rows[:, 1:4], "tau": rows[:, 4:7]},
+    )
     _flexcal("calibrate", robot, folder / "poses.csv", "--out", folder / "results")
     _flexcal("verify", robot, folder / "others.csv", "--out", folder / "verification")
     _flexcal("compensate", robot, folder / "targets.csv", "--out", folder / "commands.csv")

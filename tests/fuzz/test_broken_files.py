@@ -1,7 +1,7 @@
 """Broken files: every one ends in success or in one sentence that names a file; never in a traceback, a crash, a hang, or an escape
 sequence on the terminal.
 
-`make test-all` runs `STORED` and every `STRIDE`-th of all generated cases, `make test` a few of both.
+`make test-all` runs every case that ever failed and every `STRIDE`-th of all generated ones, `make test` a few of both.
 """
 
 from __future__ import annotations
@@ -13,10 +13,11 @@ from pathlib import Path
 import pytest
 from fuzz_cases import Case, cases, names_of
 from fuzz_process import FlexcalProcesses
+from fuzz_regressions import REGRESSIONS, regressions
 from fuzz_seeds import run_verbs, write_files
 
 STRIDE = 14
-QUICK = 700
+QUICK = 1000
 BATCHES = 12
 
 
@@ -68,9 +69,19 @@ def test_the_arm_is_valid(flexcal: FlexcalProcesses, files: Path, tmp_path: Path
 
 
 def test_a_few_broken_files(flexcal: FlexcalProcesses, files: Path, tmp_path: Path) -> None:
-    chosen = list(cases(files))[::QUICK]
-    assert len(chosen) >= 10
+    generated, kept = list(cases(files)), list(regressions(files))
+    chosen = (
+        generated[::QUICK] + [case for case in kept if case.arguments[0] in ("export", "init", "import")][::3]
+    )
+    assert len(chosen) >= 15
     assert not faults(flexcal, chosen, files, tmp_path)
+
+
+@pytest.mark.slow
+def test_every_file_that_ever_failed(flexcal: FlexcalProcesses, all_files: Path, tmp_path: Path) -> None:
+    chosen = list(regressions(all_files))
+    assert len(chosen) == len(REGRESSIONS)
+    assert not faults(flexcal, chosen, all_files, tmp_path)
 
 
 @pytest.mark.slow

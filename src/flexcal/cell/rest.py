@@ -64,5 +64,6 @@ def _balance(
         if np.abs(move).max() < TOLERANCE:
             return position, gravity_force(plant, data, position)
     raise FlexcalError(
-        "the virtual robot has no stable equilibrium: its springs are too soft for gravity; check the stiffnesses."
+        "the virtual robot has no stable equilibrium: its springs are too soft for gravity; check the stiffnesses in robot.yaml and in "
+        "cell.yaml or the truth."
     )

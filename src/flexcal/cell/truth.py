@@ -14,10 +14,11 @@ from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY, SPRINGS, STATION, unit_of
 from flexcal.model.stored import NUISANCE
 from flexcal.structuring import Keys, suggestion
-from flexcal.units import LARGEST
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import write_yaml
 
+_LARGEST = 1e12
+"""In SI units: the stiffest spring lies far below."""
 _POSITIVE = (".mass", ".rotor_inertia", ".stiffness")
 _NOT_NEGATIVE = (".damping", ".backlash", ".viscous", ".coulomb")
 
@@ -142,7 +143,7 @@ def _is_block(item: object) -> bool:
 
 def _value(file: YamlFile, keys: Keys, entry: object) -> float:
     value = entry.get("estimate") if isinstance(entry, Mapping) else entry
-    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= LARGEST:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not abs(value) <= _LARGEST:
         raise file.error(
             keys, f"the true value of '{keys[-1]}' is not a number; write one, or `{{estimate: 1.0}}`."
         )

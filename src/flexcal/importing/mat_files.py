@@ -43,7 +43,6 @@ def read_mat(path: Path) -> ForeignTable:
 def _variables(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
     """Variables (N,) or (N, M) of numbers by name, and the names of all others."""
     from scipy.io import loadmat
-    from scipy.io.matlab import MatReadError
 
     try:
         content = loadmat(path, squeeze_me=True, struct_as_record=False, mat_dtype=True)
@@ -51,7 +50,7 @@ def _variables(path: Path) -> tuple[dict[str, np.ndarray], list[str]]:
         from flexcal.importing.hdf5_mat_files import read_hdf5_mat
 
         return read_hdf5_mat(path)
-    except (MatReadError, ValueError, TypeError, OSError) as problem:
+    except Exception as problem:  # a reader of a broken file may raise anything
         reason = " ".join(str(problem).split()) or type(problem).__name__
         raise InputError(
             f"{path}: not a readable MAT-file ({reason}); save it again with '-v7'."

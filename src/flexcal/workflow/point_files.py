@@ -14,6 +14,7 @@ from flexcal.npz_reader import ArrayForm, NpzFile
 from flexcal.publication import current
 from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, ArmPoses, MeasuredPoints
+from flexcal.units import LARGEST
 
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
@@ -54,17 +55,17 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
     path = folder / POINTS
     try:
         table = pl.read_csv(current(path).read_bytes(), schema_overrides=dict.fromkeys(_TEXTS, pl.String))
-        joints = [name for name in table.columns if name[0] == "q" and name[1:].isdigit()]
+        joints = [name for name in table.columns if name.startswith("q") and name[1:].isdigit()]
 
         def vectors(prefix: str) -> np.ndarray:
-            return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()
+            return _numbers(path, table.select([f"{prefix}{axis}" for axis in "xyz"]))
 
         def column(name: str) -> np.ndarray | None:
-            return table[name].cast(pl.Float64).to_numpy() if name in table.columns else None
+            return _numbers(path, table.select(name))[:, 0] if name in table.columns else None
 
         given = "sigma_x" in table.columns
         poses = PoseSet(
-            q=table.select(joints).cast(pl.Float64).to_numpy(),
+            q=_numbers(path, table.select(joints)),
             position=vectors(""),
             sigma=vectors("sigma_") if given else np.full((len(table), 3), sigma),
             torque=None,
@@ -83,6 +84,15 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"), column("scatter_rms"))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise _unreadable(path, problem) from problem
+
+
+def _numbers(path: Path, columns: pl.DataFrame) -> np.ndarray:
+    values = columns.cast(pl.Float64).to_numpy()
+    if (np.abs(values) > LARGEST).any():
+        raise InputError(
+            f"{path} holds {values[np.abs(values) > LARGEST][0]:g}, which is no measurement; {_AGAIN}."
+        )
+    return values
 
 
 def write_arm(folder: Path, arms: ArmPoses) -> None:
