@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import factorial
 
 import numpy as np
 
@@ -12,10 +13,8 @@ from flexcal.cell.plant import Plant, sensor_site
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
 
-_FIRST = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60
-_SECOND = np.array([2, -27, 270, -490, 270, -27, 2]) / 180
-"""Central differences of sixth order over seven samples."""
-_REACH = 3
+_WINDOW = 7
+"""Samples in a row that a derivative is taken from: of sixth order in the middle."""
 
 
 def mounted(truth: RobotModel, seed: int) -> tuple[ArmSensor, ...]:
@@ -47,7 +46,7 @@ def arm_readings(
 ) -> np.ndarray:
     """True readings (N, S) in m/s², m/s or m for positions (N, d) of the plant, whose sites are where the sensors are.
 
-    Paths and directions of the sites are MuJoCo's, derivatives in time central differences of sixth order: nothing is linearised.
+    Paths and directions of the sites are MuJoCo's, derivatives in time those of polynomials through seven samples: nothing is linearised.
     """
     import mujoco
 
@@ -80,8 +79,16 @@ def reading_noise(sensors: Sequence[ArmSensor], config: SensorConfig) -> np.ndar
 
 
 def _derivative(path: np.ndarray, order: int, time_step: float) -> np.ndarray:
-    """Derivative in time of a path (N, 3); the ends keep their neighbours' values."""
-    weights = _FIRST if order == 1 else _SECOND
-    windows = np.lib.stride_tricks.sliding_window_view(path, len(weights), axis=0)
-    inner = windows @ weights / time_step**order
-    return np.pad(inner, ((_REACH, _REACH), (0, 0)), mode="edge")
+    """Derivative in time of a path (N, 3), of the polynomial through seven samples around each; N ≥ 7."""
+    middle = _WINDOW // 2
+    windows = np.lib.stride_tricks.sliding_window_view(path, _WINDOW, axis=0)
+    parts = [windows[:1] @ _weights(at, order) for at in range(middle)]
+    parts.append(windows @ _weights(middle, order))
+    parts += [windows[-1:] @ _weights(at, order) for at in range(middle + 1, _WINDOW)]
+    return np.concatenate(parts) / time_step**order
+
+
+def _weights(at: int, order: int) -> np.ndarray:
+    """Weights (7,) of samples one apart for the derivative of their polynomial at sample number `at`."""
+    powers = np.vander(np.arange(_WINDOW) - at, increasing=True).T
+    return np.linalg.solve(powers, factorial(order) * np.eye(_WINDOW)[order])

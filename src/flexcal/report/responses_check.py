@@ -49,6 +49,11 @@ def misfit_sentences(misfit: Misfit) -> str:
         "The model lacks a mode or has wrong parameters. Possible causes: elasticity of base, tool or payload, wrong bearing axes, "
         "or a plan.yaml that does not belong to the recordings. "
     )
+    if misfit.axis.startswith("sensor "):
+        cause = (
+            f"Possible causes: a wrong direction, xyz or frame of the {misfit.axis} under `sensors:`, a loose mount, or a mode that the "
+            "model lacks; a fit without its column tells which. "
+        )
     if misfit.severe:
         return f"{where}{far}{cause}{moved}Do not use these springs; their intervals are at least as wide as robot.yaml's tolerance."
     return f"{where}{far}{cause}{moved}The intervals of all springs were widened accordingly."
