@@ -155,9 +155,16 @@ STEPS = (
                 ("identify", "response"),
                 "identify_response",
                 "IdentifyResponse",
-                "frequency responses with their covariance from recordings",
+                "frequency responses with their covariance from recordings, planned or not; resonances, and masses of an axis",
                 "flexcal identify response robot.yaml frequency --out responses",
-                ("plan.yaml", "response_pose_*.npz", "results.json", "report.html"),
+                (
+                    "plan.yaml",
+                    "response_pose_*.npz",
+                    "response.npz",
+                    "response.csv",
+                    "results.json",
+                    "report.html",
+                ),
             ),
             Verb(
                 ("identify", "stiffness"),

@@ -108,6 +108,11 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
 
 
 def torque_hold(plan: MultisinePlan | TrajectoryPlan, omega: np.ndarray, time_step: float) -> np.ndarray:
+    """`hold_factor` of the torque that a plan declares."""
+    return hold_factor(plan.torque, omega, time_step)
+
+
+def hold_factor(kind: str, omega: np.ndarray, time_step: float) -> np.ndarray:
     """Factor (L,) from the spectrum of the logged torque samples to that of the torque that acted; T = time_step.
 
     "held": the sample acts until the next one, sinc(ωT/2) exp(-jωT/2), exact for a staircase. "instantaneous": 1, the
@@ -115,9 +120,9 @@ def torque_hold(plan: MultisinePlan | TrajectoryPlan, omega: np.ndarray, time_st
     a torque that varies smoothly within it, so exp(-jωT/2) / sinc(ωT/2).
     """
     half = 0.5 * np.asarray(omega) * time_step
-    if plan.torque == "instantaneous":
+    if kind == "instantaneous":
         return np.ones(half.shape, complex)
-    if plan.torque == "mean":
+    if kind == "mean":
         return np.exp(-1j * half) / np.sinc(half / np.pi)
     return np.sinc(half / np.pi) * np.exp(-1j * half)
 

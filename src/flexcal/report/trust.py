@@ -202,6 +202,25 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "the covariance is well estimated",
         "else": "the covariance has few degrees of freedom",
     },
+    "half_responses": {
+        "good": "both halves of the records give the same response",
+        "unknown": "there is one record only",
+        "else": "the two halves of the records give different responses",
+    },
+    "coherence": {
+        "good": "the input explains the output",
+        "else": "the coherence is low",
+    },
+    "resonances": {
+        "good": "all resonances are determined",
+        "unknown": "there is no resonance in the band",
+        "else": "a resonance or its damping is not determined",
+    },
+    "masses": {
+        "good": "an axis of a few masses explains the response",
+        "unknown": "no masses were fitted",
+        "else": "the axis of masses describes the response badly, or is not determined",
+    },
     "half_gains": {
         "good": "the first and the second half of the recordings give the same gains",
         "unknown": "the recordings are too short to compare their halves",

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
+
+import numpy as np
 
 from flexcal.data import MultisinePlan, read_plan_of
 from flexcal.data.pose_set import DEFAULT_SIGMA
@@ -15,6 +18,7 @@ from flexcal.frequency import FrequencyResponse
 from flexcal.publication import current
 from flexcal.report.calibration import CalibrationStudy, write_calibration_report
 from flexcal.report.dynamics import DynamicsStudy, write_dynamics_report
+from flexcal.report.excitation import ExcitationStudy, write_excitation_report
 from flexcal.report.gains import write_gains_report
 from flexcal.report.inertials import InertialsStudy, write_inertials_report
 from flexcal.report.payload import PayloadStudy, write_payload_report
@@ -35,7 +39,7 @@ from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
 
 REPORT = "report.html"
 _DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"
-_PAYLOAD, _RESPONSES = "declaration", "responses"
+_PAYLOAD, _RESPONSES, _EXCITATION = "declaration", "responses", "excitation"
 OF_CALIBRATION, OF_VERIFICATION, OF_DEMO = "term_selection", "rms_mm", "calibration_fit"
 """What results.json of `identify dynamics`, `inertials`, `gains`, `stiffness`, `payload` and `response`, of `calibrate`, of `verify` and of
 `demo` holds, and no other; the demo has a `stage1` too."""
@@ -72,6 +76,8 @@ def report_folder(folder: Path) -> Path:
         elif _STIFFNESS in results:
             stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted(folder))
             write_stiffness_report(path, stiffness)
+        elif _EXCITATION in results:
+            write_excitation_report(path, ExcitationStudy(results, _arrays(folder / "response.npz")))
         elif _RESPONSES in results:
             write_response_report(path, ResponseStudy(results, _responses(folder, results)))
         else:
@@ -118,6 +124,14 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
 
 def _responses(folder: Path, results: Mapping[str, Any]) -> tuple[FrequencyResponse, ...]:
     return tuple(FrequencyResponse.load(folder / Path(entry["file"]).name) for entry in results[_RESPONSES])
+
+
+def _arrays(path: Path) -> dict[str, np.ndarray]:
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            return dict(stored)
+    except (OSError, ValueError, BadZipFile) as problem:
+        raise InputError(f"{path} cannot be read; run 'flexcal identify response' again.") from problem
 
 
 def _block(folder: Path, block: Block) -> Estimate:

@@ -1,0 +1,154 @@
+"""Records of an excited axis from files of other programs, on a uniform time base, divided at gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.time_base import fit_time_base, gaps, resample
+from flexcal.errors import InputError
+from flexcal.frequency.excitation import SHORTEST, Channel, ExcitationRecord
+from flexcal.importing.column_names import parse_name
+from flexcal.importing.foreign_files import read_foreign
+from flexcal.importing.foreign_table import ForeignTable
+from flexcal.importing.response_columns import ResponseColumns, response_columns
+from flexcal.importing.unit_guess import time_unit
+
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseRecords:
+    """Records with the channels of their columns, and what was done to read them, a sentence each."""
+
+    records: tuple[ExcitationRecord, ...]
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    references: tuple[Channel, ...]
+    remarks: tuple[str, ...]
+
+
+def read_response_records(
+    files: Sequence[Path],
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    references: Sequence[str] = (),
+    rate_hz: float | None = None,
+) -> ResponseRecords:
+    """Read files of one experiment; the columns are those of the first file.
+
+    `rate_hz` is the sampling rate of files without a column of time. Raises `InputError` where a file lacks a column, holds a cell that is
+    no number, or a time that does not grow.
+    """
+    tables = [read_foreign(file, ()) for file in files]
+    columns = response_columns(tables[0], inputs=inputs, outputs=outputs, references=references)
+    records: list[ExcitationRecord] = []
+    remarks = list(columns.remarks)
+    for file, table in zip(files, tables, strict=True):
+        found, notes = _records(file, table, columns, rate_hz)
+        records += found
+        remarks += notes
+    step = float(np.median([record.time_step for record in records]))
+    near = [abs(record.time_step / step - 1) < 1e-3 for record in records]
+    if all(near):
+        records = [replace(record, time_step=step) for record in records]
+    return ResponseRecords(
+        tuple(records),
+        tuple(c.channel for c in columns.inputs),
+        tuple(c.channel for c in columns.outputs),
+        tuple(c.channel for c in columns.references),
+        _merged(remarks, len(files)),
+    )
+
+
+def _merged(remarks: Sequence[str], files: int) -> tuple[str, ...]:
+    """Each once, however many files it is said of."""
+    counted: dict[str, int] = {}
+    for remark in remarks:
+        counted[remark] = counted.get(remark, 0) + 1
+    return tuple(
+        f"{text} (in {n} of {files} files)" if n > 1 and n != files else text for text, n in counted.items()
+    )
+
+
+def _records(
+    file: Path, table: ForeignTable, columns: ResponseColumns, rate_hz: float | None
+) -> tuple[list[ExcitationRecord], list[str]]:
+    notes: list[str] = []
+    of = (*columns.inputs, *columns.outputs, *columns.references)
+    for column in of:
+        _check(file, table, column.channel.name)
+    values = np.stack([column.values(table) for column in of], -1)
+    t, note = _times(file, table, columns.time, rate_hz)
+    notes += [note] if note else []
+    edges = [0, *(gaps(t) + 1), t.size]
+    if len(edges) > 2:
+        missing = np.diff(t).sum() - np.median(np.diff(t)) * (t.size - 1)
+        notes.append(
+            f"{file.name}: {len(edges) - 2} gaps, {missing:.3g} s in all; the parts are records of their own"
+        )
+    found = []
+    for first, end in pairwise(edges):
+        if end - first < SHORTEST:
+            continue
+        base = fit_time_base(t[first:end])
+        if base.resampled:
+            notes.append(
+                f"{file.name}: time stamps jitter by {1e3 * base.jitter:.2g} ms (1σ) about {1 / base.time_step:.6g} Hz"
+                + (f", {base.lost} samples are lost" if base.lost else "")
+                + "; interpolated onto that base"
+            )
+        uniform = resample(t[first:end], values[first:end], base)
+        found.append(_record(file.name, base.time_step, uniform, columns))
+    if not found:
+        raise InputError(f"{file}: no stretch without a gap has {SHORTEST} samples; record longer.")
+    return found, notes
+
+
+def _record(name: str, step: float, values: np.ndarray, columns: ResponseColumns) -> ExcitationRecord:
+    n_u, n_y = len(columns.inputs), len(columns.outputs)
+    return ExcitationRecord(name, step, values[:, :n_u], values[:, n_u : n_u + n_y], values[:, n_u + n_y :])
+
+
+def _check(file: Path, table: ForeignTable, column: str) -> None:
+    if column not in table.numbers:
+        raise InputError(
+            f"{file}: there is no column of numbers '{column}', which the first file has; give files of one experiment."
+        )
+    wrong = np.flatnonzero(~np.isfinite(table.numbers[column]))
+    if wrong.size:
+        raise table.table.error(
+            int(wrong[0]), column, "there is no number; complete the cell or remove the row."
+        )
+
+
+def _times(
+    file: Path, table: ForeignTable, column: str | None, rate_hz: float | None
+) -> tuple[np.ndarray, str]:
+    if column is None or rate_hz is not None:
+        if rate_hz is None:
+            raise InputError(
+                f"{file}: no column of time was recognised; name it 't', or give the sampling rate with --rate HZ."
+            )
+        return np.arange(len(table)) / rate_hz, ""
+    _check(file, table, column)
+    raw = table.numbers[column]
+    unit = parse_name(column, table.units.get(column)).unit
+    known = column in table.times or unit in _SECONDS
+    unit = "s" if column in table.times else unit if unit in _SECONDS else time_unit(raw)
+    back = np.flatnonzero(np.diff(raw) <= 0)
+    if back.size:
+        again = "stands still" if raw[back[0] + 1] == raw[back[0]] else "runs backwards"
+        raise table.table.error(
+            int(back[0]) + 1,
+            column,
+            f"the time {again}; remove the row, or give the rate of uniform samples with --rate HZ.",
+        )
+    return (raw - raw[0]) * _SECONDS[
+        unit
+    ], "" if known or unit == "s" else f"{column} is taken to be in {unit}"
