@@ -50,7 +50,9 @@ def test_springs_and_cables_are_found(tmp_path: Path, motion: Pushed, other: Pus
     """Of a lift and of a joint that turns, in their units; a constant is what the offset absorbs, and is written beside it."""
     robot = pushed_yaml(tmp_path, dynamics=SPRINGS)
     logs = [motion.write(tmp_path / "a.csv", noise=_NOISE), other.write(tmp_path / "b.csv", seed=1)]
-    found = identify_robot_dynamics(robot, logs[:1], validate=logs[1:])
+    found = identify_robot_dynamics(robot, logs[:1], validate=logs[1:], out=tmp_path / "out")
+    page = (tmp_path / "out" / "report.html").read_text("utf-8")
+    assert "lift (N)" in page and "torque / N m, force / N" in page
     document = found.document()
     for name, truth in (("lift", LIFT_STIFFNESS), ("elbow", ELBOW_STIFFNESS)):
         item = document["parameters"][f"{name}.spring_stiffness"]

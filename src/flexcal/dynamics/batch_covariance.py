@@ -133,7 +133,9 @@ def covariance_of_scores(
 
 
 def _correlation(covariance: np.ndarray) -> np.ndarray:
+    """Correlations; zero of a parameter without variance, which a prior alone tells."""
     std = np.sqrt(np.diag(covariance))
+    std = np.where(std > 0, std, 1.0)
     return covariance / np.outer(std, std)
 
 

@@ -50,6 +50,11 @@ def unit_in(model: RobotModel, name: str) -> str:
     return _SLIDING.get(unit, unit) if all(slides) else unit
 
 
+def torque_units(model: RobotModel) -> dict[str, str]:
+    """SI unit of the torque, or force, of every joint."""
+    return {joint.name: "N" if joint.kind == "prismatic" else "N m" for joint in model.joints}
+
+
 def unit_of(name: str) -> str:
     """SI unit of a parameter name, of joints that turn."""
     last = name.rpartition(".")[2].partition("_at_")[0]

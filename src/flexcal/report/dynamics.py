@@ -77,7 +77,9 @@ def dynamics_page(study: DynamicsStudy) -> Page:
                 "Torques: predicted against measured",
                 "The torque error on motions outside the fit measures the quality of the model.",
                 (
-                    *torque_blocks(results["error_percent"], held_out(results), logs),
+                    *torque_blocks(
+                        results["error_percent"], held_out(results), logs, results.get("torque_units")
+                    ),
                     signals_table(results["signals"]),
                 ),
             ),

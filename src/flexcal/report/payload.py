@@ -65,7 +65,7 @@ def payload_page(study: PayloadStudy) -> Page:
                 "Torques: predicted against measured",
                 "Predicted with payload, friction and the robot's own parameters as this fit has them.",
                 (
-                    *torque_blocks(results["error_percent"], "", _logs(study)),
+                    *torque_blocks(results["error_percent"], "", _logs(study), results.get("torque_units")),
                     signals_table(results["signals"]),
                 ),
             ),

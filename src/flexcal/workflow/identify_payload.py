@@ -24,6 +24,7 @@ from flexcal.estimates_file import Block, provenance, read_estimates, sha256_of
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.model.held_payload import holding, last_frame
+from flexcal.model.names import torque_units
 from flexcal.model.stored import PAYLOAD_FRAME, with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.payload_checks import payload_checks
@@ -95,6 +96,7 @@ class RobotPayload:
                 "best": 100 * fit.own_error,
                 "per_joint": dict(zip(joints, 100 * fit.joint_errors, strict=True)),
             },
+            "torque_units": torque_units(self.declared),
             "robot_mass_kg": float(self.declared.mass.sum()),
             "body_rise": fit.rise,
             "other_payloads": other_payloads(fit.estimate, self.blocks),

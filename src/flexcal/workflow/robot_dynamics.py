@@ -10,6 +10,7 @@ from typing import Any
 
 from flexcal.dynamics import EssentialParameters, ExternalShare, FrictionSelection, RegressionData
 from flexcal.estimation import Estimate
+from flexcal.model.names import torque_units
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.report.dynamics import dynamics_checks
 from flexcal.report.trust import Trust
@@ -90,6 +91,7 @@ class RobotDynamics:
             "masked_rows": self.train.masked,
             "error_percent": percent,
             "hold_out": {"share": self.hold_out, "logs": [str(log) for log in self.validated]},
+            "torque_units": torque_units(self.train.observation.model),
             "bodiless_links": list(self.bodiless),
             "signals": dict(self.signals),
             "friction_terms": list(self.friction.names),

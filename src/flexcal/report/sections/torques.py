@@ -19,11 +19,14 @@ def recording_labels(predictions: Sequence[TorquePrediction]) -> tuple[str, ...]
 
 
 def torque_blocks(
-    error: Mapping[str, Any], held_out: str, logs: Mapping[str, TorquePrediction]
+    error: Mapping[str, Any],
+    held_out: str,
+    logs: Mapping[str, TorquePrediction],
+    units: Mapping[str, str] | None = None,
 ) -> tuple[Block, ...]:
     """Errors by joint (results.json: error_percent) and, where there are `logs`, the torques themselves, by label.
 
-    `held_out` says what the fit never saw, if anything.
+    `held_out` says what the fit never saw, if anything; `units` are those of the joints (results.json: torque_units), N m without.
     """
     where = held_out or "the recordings of the fit"
     rows = [(joint, significant(value, 3)) for joint, value in error["per_joint"].items()]
@@ -39,14 +42,14 @@ def torque_blocks(
         )
     ]
     if logs:
-        joints = tuple(error["per_joint"])
+        joints = {joint: (units or {}).get(joint, "N m") for joint in error["per_joint"]}
         choice = (Selector("recording", "log", tuple(logs)),) if len(logs) > 1 else ()
         blocks += [_traces(joints, logs, choice), _spectra(joints, logs, choice)]
     return tuple(blocks)
 
 
 def _traces(
-    joints: tuple[str, ...], logs: Mapping[str, TorquePrediction], choice: tuple[Selector, ...]
+    joints: Mapping[str, str], logs: Mapping[str, TorquePrediction], choice: tuple[Selector, ...]
 ) -> FigureBlock:
     stride = max(log.stride for log in logs.values())
     thinned = f" Of a long recording only one row in up to {stride} is drawn." if stride > 1 else ""
@@ -64,7 +67,7 @@ def _traces(
 
 
 def _spectra(
-    joints: tuple[str, ...], logs: Mapping[str, TorquePrediction], choice: tuple[Selector, ...]
+    joints: Mapping[str, str], logs: Mapping[str, TorquePrediction], choice: tuple[Selector, ...]
 ) -> FigureBlock:
     return FigureBlock(
         "figure-spectra",
