@@ -11,6 +11,7 @@ from tilting_robot import BEARING, BEARING_DAMPING, DRIVE, ROBOT, URDF, write_ti
 
 from flexcal.cli.main import main
 from flexcal.errors import InputError
+from flexcal.model import RobotModel
 from flexcal.workflow.estimators import EstimatorName
 from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
@@ -56,7 +57,13 @@ def test_without_the_tilts_the_arm_fits_worse(log: Path, tmp_path: Path) -> None
 
 @pytest.mark.parametrize("estimator", ["ols", "irls", "sdp"])
 def test_estimators_of_the_flexible_model(estimator: EstimatorName, log: Path, tmp_path: Path) -> None:
-    found = identify_robot_dynamics(robot_of(tmp_path), [log], flexible=True, estimator=estimator).estimate
+    robot = robot_of(tmp_path)
+    found = identify_robot_dynamics(robot, [log], flexible=True, estimator=estimator).estimate
+    if estimator == "sdp":
+        assert (
+            RobotModel.from_yaml(robot).value("turn.bearing_x.stiffness")
+            == found.values["turn.bearing_x.stiffness"]
+        )
     for name, value in BEARING.items():
         assert found.values[f"{name}.stiffness"] == pytest.approx(value, rel=0.02)
 

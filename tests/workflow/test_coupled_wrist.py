@@ -9,6 +9,7 @@ from coupled_wrist import BEFORE, COULOMB, RATIO, ROTOR, write_coupled
 from pushed_robot import SPRINGS, pushed_yaml
 
 from flexcal.errors import InputError
+from flexcal.model import RobotModel
 from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
 ELASTIC = """elastic:
@@ -30,7 +31,10 @@ def test_springs_before_and_behind_the_coupling(behind: bool, tmp_path: Path) ->
     """Before it the roll motor's spring twists both joints; behind it nothing of one is felt at the other."""
     robot = wrist(tmp_path, ELASTIC + COUPLED)
     log = write_coupled(tmp_path / "log.parquet", 3, behind=behind, noise=0.002)
-    parameters = identify_robot_dynamics(robot, [log], flexible=True).document()["parameters"]
+    found = identify_robot_dynamics(robot, [log], flexible=True, estimator="sdp")
+    parameters = found.document()["parameters"]
+    stored = RobotModel.from_yaml(robot)
+    assert stored.value("roll.drive.stiffness") == found.estimate.values["roll.drive.stiffness"]
     shared = 0.0 if behind else BEFORE["roll"]
     expected = {
         "elbow.drive.stiffness": BEFORE["elbow"] + RATIO**2 * shared,

@@ -25,7 +25,8 @@ PAYLOAD_FRAME = "frame"
 BEARINGS = "option.bearings"
 """Of the provenance of the blocks `stiffness` and `calibration`: the bearings that they were estimated with."""
 NUISANCE = re.compile(
-    r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|drive\.torque_offset|drive\.gap_torque)"
+    r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|(drive|bearing_x|bearing_y)\.torque_offset"
+    r"|drive\.gap_torque|drive\.(stiffness|damping)_at_.+)|force_sensor\.[fm][xyz]_offset"
 )
 """Names of what was estimated for an experiment, and of what the flexible model tells apart: not the robot's own here."""
 

@@ -100,6 +100,12 @@ def _phrase(check: Check) -> str:
 
 
 PHRASES: dict[str, dict[str, str]] = {
+    "external_torques": {
+        "good": "motors and force sensor agree",
+        "care": "the external torques are too small to check the force sensor",
+        "else": "the motors do not feel what the force sensor reads: check the sign (`wrench:`), frame and unit of `force_sensor:`",
+    },
+    "weight": {"else": "the torques do not hold the links' weight, which was accepted"},
     "left_out": {
         "good": "poses left out of the fit are predicted as accurately as expected",
         "unknown": "no poses outside the fit were predicted",
