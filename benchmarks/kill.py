@@ -1,8 +1,9 @@
 """Verbs that are killed at random moments: the files are of the run before or of the new one, and the next run works.
 
-`python -m benchmarks.kill [--count 40] [--cases calibrate identify demo] [--signals KILL TERM INT HUP] [--seed 0]`; of the moments, half
-uniform over the run and half in its last part, where the files are written. Before and after a kill, every file is compared by SHA-256 with
-the runs that it can be of; then the folder is opened as any verb does, and compared again.
+`python -m benchmarks.kill [--count 40] [--cases calibrate identify demo] [--signals KILL TERM INT HUP] [--seed 0]`
+
+Half of the moments are uniform over the run, half in its last part, where the files are written. Before and after a kill, every file is
+compared by SHA-256 with the runs that it can be of; then the folder is opened as any verb does, and compared again.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ from pathlib import Path
 
 import numpy as np
 
-EXAMPLES = Path(__file__).parent.parent / "examples"
+HERE = Path(__file__).parent
+EXAMPLES = HERE.parent / "examples"
 LEDGER, STAGES = ".flexcal", ".flexcal-run-*"
 _RERUNS = {"demo": 8}
 """Of so many kills of a verb one is followed by a run to its end; of the others, by the one that is killed next."""
@@ -31,10 +33,10 @@ _RERUNS = {"demo": 8}
 
 @dataclass(frozen=True)
 class Case:
-    """A verb, in a copy of an example: the command lines of the run before and of the one that is killed, which write into `out`."""
+    """A verb, in a copy of a robot's folder: the command lines of the run before and of the one that is killed, which write into `out`."""
 
     name: str
-    example: str
+    robot: Path
     before: tuple[str, ...]
     killed: tuple[str, ...]
     out: str
@@ -45,7 +47,7 @@ class Case:
 CASES = (
     Case(
         "calibrate",
-        "ur5_tracker",
+        EXAMPLES / "ur5_tracker",
         ("calibrate", "robot.yaml", "random.csv", "--terms", "kinematic", "--out", "out"),
         ("calibrate", "robot.yaml", "random.csv", "--terms", "kinematic", "--loss", "cauchy", "--out", "out"),
         "out",
@@ -53,7 +55,7 @@ CASES = (
     ),
     Case(
         "identify",
-        "tx40",
+        EXAMPLES / "tx40",
         ("identify", "dynamics", "robot.yaml", "exciting.parquet", "--estimator", "ols", "--out", "out"),
         ("identify", "dynamics", "robot.yaml", "exciting.parquet", "--estimator", "wls", "--out", "out"),
         "out",
@@ -61,9 +63,9 @@ CASES = (
     ),
     Case(
         "demo",
-        "tx90l",
-        ("demo", "--plan", "quick", "--seed", "1", "--out", "out"),
-        ("demo", "--plan", "quick", "--seed", "2", "--out", "out"),
+        HERE / "small_robot",
+        ("demo", "--robot", "robot.yaml", "--seed", "1", "--out", "out"),
+        ("demo", "--robot", "robot.yaml", "--seed", "2", "--out", "out"),
         "out",
         ("truth.yaml", "estimates.npz", "points.csv", "verification.csv", "calibrated.urdf"),
     ),
@@ -85,7 +87,7 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
     """How often each of these was found: old, new, finished (of both, and new once opened), torn, no rerun."""
     found: Counter[str] = Counter()
     with tempfile.TemporaryDirectory(prefix="kill_") as place:
-        folder = Path(shutil.copytree(EXAMPLES / case.example, Path(place) / "robot"))
+        folder = Path(shutil.copytree(case.robot, Path(place) / "robot"))
         out = folder / case.out
         references = {}
         for kind, command in (("new", case.killed), ("old", case.before)):

@@ -6,7 +6,6 @@ import time
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 from flexcal.dynamics import (
     CLASSIC,
@@ -35,6 +34,7 @@ from flexcal.workflow.log_torques import weight_faults
 from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.results import write_results
 from flexcal.workflow.robot_dynamics import RobotDynamics
+from flexcal.workflow.scratch import scratch_folder
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import treatment_of
 from flexcal.workflow.used_signals import used_signals
@@ -81,14 +81,14 @@ def identify_robot_dynamics(
     bearings = bearing_springs(model, [*logs, *validate]) if flexible else ()
     treatment = treatment_of(model, logs, flexible=flexible)
 
-    with TemporaryDirectory(prefix="flexcal_") as folder:
+    with scratch_folder() as folder:
         divided = DividedLogs.read(
             logs,
             validate,
             hold_out,
             model,
             treatment,
-            Path(folder),
+            folder,
             accept_weight=accept_weight,
             jobs=jobs,
             progress=progress,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -33,6 +32,7 @@ from flexcal.workflow.log_payloads import log_payloads
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
 from flexcal.workflow.log_wrenches import require_no_wrenches
 from flexcal.workflow.results import quantities, write_results
+from flexcal.workflow.scratch import scratch_folder
 from flexcal.workflow.treatment import treatment_of
 from flexcal.workflow.used_signals import used_signals
 
@@ -107,8 +107,8 @@ def identify_gains(
     declared = _declared(model)
     treatment = treatment_of(model, logs)
     observation = Observation(model, CLASSIC)
-    with TemporaryDirectory(prefix="flexcal_") as folder:
-        read = read_logs(logs, model, treatment, Path(folder), jobs=jobs)
+    with scratch_folder() as folder:
+        read = read_logs(logs, model, treatment, folder, jobs=jobs)
         payloads = log_payloads(read, model)
         require_no_wrenches(read)
         parts = [LogPart(log, Window()) for log in read]

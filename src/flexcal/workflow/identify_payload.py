@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
@@ -39,6 +38,7 @@ from flexcal.workflow.payload_system import PayloadSystem
 from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.recorded_logs import RecordedLogs, recorded_with
 from flexcal.workflow.results import quantities, write_results
+from flexcal.workflow.scratch import scratch_folder
 from flexcal.workflow.stored_block import ESTIMATES, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
 from flexcal.workflow.used_signals import used_signals
@@ -170,8 +170,8 @@ def identify_robot_payload(
             blocks["dynamics"]
         )  # later blocks keep no covariance of links with drives
     treatment = _slow(treatment_of(model, every, flexible=bool(model.elastic)), model, every)
-    with TemporaryDirectory(prefix="flexcal_") as folder:
-        read = read_logs(every, model, treatment, Path(folder), jobs=jobs)
+    with scratch_folder() as folder:
+        read = read_logs(every, model, treatment, folder, jobs=jobs)
         carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
         _require_payloads(read, carries)
         require_no_wrenches(read)

@@ -14,6 +14,7 @@ from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Wi
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.workflow.treatment import Treatment
+from flexcal.workflow.workers import WorkerTask
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,7 @@ def read_logs(
     from joblib import Parallel, delayed
 
     read: Any = Parallel(n_jobs=jobs)(
-        delayed(JointLog.read)(path, model, treatment.cutoff_hz, scratch) for path in paths
+        delayed(WorkerTask(JointLog.read))(path, model, treatment.cutoff_hz, scratch) for path in paths
     )
     return read
 
@@ -62,7 +63,7 @@ def log_systems(
     from joblib import Parallel, delayed
 
     systems = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(_log_system)(part, observation, treatment, batches, silent) for part in parts
+        delayed(WorkerTask(_log_system))(part, observation, treatment, batches, silent) for part in parts
     )
     progress("reading", 0.0)
     found = []
