@@ -133,6 +133,7 @@ def _killed(command: Sequence[str], folder: Path, seconds: float, number: int) -
         stderr=subprocess.PIPE,
         text=True,
         start_new_session=True,
+        preexec_fn=_heed_signals,
     )
     try:
         process.wait(seconds)
@@ -146,6 +147,12 @@ def _killed(command: Sequence[str], folder: Path, seconds: float, number: int) -
             return sum(not line.endswith("…") for line in said)
         time.sleep(0.05)
     raise AssertionError(f"a process of '{' '.join(command)}' lives on")
+
+
+def _heed_signals() -> None:
+    """A shell lets what it runs in the background ignore Ctrl-C."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
 
 
 def _complete(command: Sequence[str], folder: Path) -> None:

@@ -62,10 +62,21 @@ def planned(folder: Path, count: int, out: str = "plan.yaml") -> None:
     assert done.returncode == 0, done.stderr
 
 
+def heed_signals() -> None:
+    """A shell lets what it runs in the background ignore Ctrl-C."""
+    for number in (signal.SIGINT, signal.SIGHUP):
+        signal.signal(number, signal.SIG_DFL)
+
+
 def at_work(folder: Path) -> subprocess.Popen[str]:
     """The verb at work, its files waiting."""
     process = subprocess.Popen(
-        [sys.executable, "-c", AT_WORK], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=folder
+        [sys.executable, "-c", AT_WORK],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+        cwd=folder,
+        preexec_fn=heed_signals,
     )
     for _ in range(600):
         if (folder / "at_work").exists():

@@ -14,7 +14,7 @@ from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Wi
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.workflow.treatment import Treatment
-from flexcal.workflow.workers import WorkerTask
+from flexcal.workflow.workers import WorkerTask, start_workers
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,6 +36,7 @@ def read_logs(
         return [JointLog.read(path, model, treatment.cutoff_hz, scratch) for path in paths]
     from joblib import Parallel, delayed
 
+    start_workers(jobs)
     read: Any = Parallel(n_jobs=jobs)(
         delayed(WorkerTask(JointLog.read))(path, model, treatment.cutoff_hz, scratch) for path in paths
     )

@@ -1,8 +1,9 @@
-"""Work of other processes, which ends with the process that asked for it."""
+"""Worker processes, which end with the process that asked for them, and are quiet at Ctrl-C."""
 
 from __future__ import annotations
 
 import os
+import signal
 import threading
 import time
 from collections.abc import Callable
@@ -28,6 +29,22 @@ class WorkerTask(Generic[P, T]):
         if os.getpid() != self._asked_by and _watched.acquire(blocking=False):  # once in a process
             threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
         return self.function(*arguments, **options)
+
+
+def start_workers(jobs: int) -> None:
+    """Start so many worker processes of joblib, which leave Ctrl-C to this process: it comes to all processes of a terminal at once."""
+    from multiprocessing import resource_tracker
+
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.backend import resource_tracker as loky_tracker
+
+    for tracker in (resource_tracker, loky_tracker):  # their start would let signals through again
+        tracker.ensure_running()
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # which is handed down
+    try:
+        Parallel(n_jobs=jobs)(delayed(WorkerTask(int))() for _ in range(jobs))
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _end_with(parent: int) -> None:
