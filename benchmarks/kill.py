@@ -118,6 +118,8 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
                     print(problem.stderr, file=sys.stderr)
                     found["no rerun"] += 1
             before = _files(out)
+            print(f"\r{case.name}, kill {attempt + 1}: {_told(found)} ", end="", file=sys.stderr, flush=True)
+    print(file=sys.stderr)
     return found
 
 
