@@ -13,6 +13,8 @@ from flexcal.design.response_noise import COMMON_SENSORS, FrictionDisturbance, e
 from flexcal.design.response_sensitivity import friction_in, pose_response, response_parameters, thinned
 from flexcal.design.spring_criterion import largest_stiffness_std
 from flexcal.errors import FlexcalError
+from flexcal.model.arm_sensor import ArmSensor
+from flexcal.model.config import ArmSensorConfig
 from flexcal.model.declared import FRICTION_LOG_STD
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
@@ -183,3 +185,35 @@ def test_a_schedule_of_the_robots_without_effort_is_refused(tx90l):
             seed=0,
             schedule=Schedule(),
         )
+
+
+def test_a_sensor_on_the_arm_counts(tx90l, plan):
+    """Its rows are derived as finite differences of the reading have it, and a forearm that motors do not see becomes known."""
+    config = ArmSensorConfig(frame="flange", xyz=(0.0, 0.0, 0.0), direction=(1.0, 0.0, 0.0))
+    place, along = np.array([0.03, 0.12, 0.05]), np.array([1.0, 0.0, 0.0])
+    sensor = ArmSensor("forearm", 3, place, along, True, 2, config)
+    sensing = replace(tx90l, sensors={"forearm": sensor})
+    empty = replace(plan, payload=0.0, poses=POSES[:2])
+    name = "joint_3.bearing_y.stiffness"
+    assert PlannedResponses.of(tx90l, empty).std()[name] > 0.5
+    planned = PlannedResponses.of(sensing, empty)
+    assert planned.std()[name] < 0.05
+    found, names = planned.responses[0], planned.parameters.names
+    assert found.response.shape[1:] == (4, 3)
+    rubbing = {f"joint_{k + 1}.viscous": v for k, v in enumerate(tx90l.viscous[:3] + found.friction.viscous)}
+
+    def reading(xyz, direction):
+        moved = replace(sensor, xyz=xyz, direction=direction)
+        system = linearise(tx90l.with_values(rubbing), POSES[0], 0.0, sensors=[moved])
+        return transfer_matrix(system, plan.frequencies_hz).response[:, 3]
+
+    step = np.array([0.0, 1e-4, 0.0])
+    expected = (reading(place + step, along) - reading(place - step, along)) / 2e-4
+    column = found.derivatives[:, 3, :, names.index("sensor.forearm.position_y")]
+    np.testing.assert_allclose(column, expected, rtol=1e-3, atol=1e-3 * np.abs(expected).max())
+    own = found.derivatives[:, 3, :, names.index("sensor.forearm.sensitivity")]
+    np.testing.assert_allclose(own, reading(place, along), rtol=1e-9)
+    noise = found.error(empty)[:, 3, 3].real
+    kept = 2 * (empty.periods - empty.settle_periods) * empty.realisations
+    samples = kept * empty.rate_hz / empty.base_frequency_hz
+    assert noise.min() >= 4 / samples * 0.02**2

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,10 +25,14 @@ _SAMPLES_PER_LINE = 8
 
 @dataclass(frozen=True)
 class ResponseSensors:
-    """Encoder `resolution` at the joint (rad) and noise of a torque reading (N m, 1σ), white over the samples of the controller."""
+    """Encoder `resolution` at the joint (rad) and noise of a torque reading (N m, 1σ), white over the samples of the controller.
+
+    `readings` are those of sensors on the arm, 1σ of a displacement, velocity and acceleration, SI.
+    """
 
     resolution: float = 2 * np.pi / 2**18
     torque_noise: float = 1.0
+    readings: tuple[float, float, float] = (1e-6, 5e-5, 0.02)
 
 
 COMMON_SENSORS = ResponseSensors()
@@ -84,10 +89,16 @@ class FrictionDisturbance:
 
 
 def equation_error(
-    plan: MultisinePlan, response: np.ndarray, friction: FrictionDisturbance, sensors: ResponseSensors
+    plan: MultisinePlan,
+    response: np.ndarray,
+    friction: FrictionDisturbance,
+    sensors: ResponseSensors,
+    orders: Sequence[int] = (),
 ) -> np.ndarray:
-    """Covariance (L, E, E) of the error N_y - G N_u of one experiment, (rad/s²)², averaged over periods, signs and realisations.
+    """Covariance (L, m, m) of the error N_y - G N_u of one experiment, averaged over periods, signs and realisations.
 
+    The m outputs of `response` (L, m, E) are the motors' accelerations, rad/s², and sensors on the arm, which measure derivatives of the
+    `orders`.
     Encoder and torque noise average over all samples kept; of the distortion by friction a share is common to all realisations.
     A phasor of white noise of the variance σ² in N samples has the variance 4 σ² / N.
     """
@@ -98,5 +109,10 @@ def equation_error(
     torque = noise * sensors.torque_noise**2 + own * friction.power
     position = noise * sensors.resolution**2 / 12
     axes = response.shape[-1]
-    acceleration = (position * omega**4)[:, None, None] * np.eye(axes)
-    return acceleration + (response * torque[:, None, :]) @ np.swapaxes(response, 1, 2).conj()
+    output = np.zeros((len(omega), axes + len(orders)))
+    output[:, :axes] = (position * omega**4)[:, None]
+    output[:, axes:] = noise * np.array([sensors.readings[order] ** 2 for order in orders])
+    return (
+        output[:, :, None] * np.eye(output.shape[1])
+        + (response * torque[:, None, :]) @ np.swapaxes(response, 1, 2).conj()
+    )

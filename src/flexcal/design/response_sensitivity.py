@@ -16,6 +16,7 @@ from flexcal.design.response_noise import (
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
 from flexcal.model.declared import (
     FRICTION_LOG_STD,
     FRICTION_TOLERANCE,
@@ -32,10 +33,11 @@ from flexcal.progress import Progress, silent
 
 @dataclass(frozen=True, eq=False)
 class PoseResponse:
-    """The response of one pose as the design needs it, E axes on L lines.
+    """The response of one pose as the design needs it: E axes on L lines, and S sensors on the arm.
 
-    `response` (L, E, E); `derivatives` (L, E, E, p) by the parameters that all poses share, `nuisance` (L, E, E, m) by the pose's own,
-    each in units of its prior; `friction` and `sensors` make the noise.
+    `response` (L, E + S, E); `derivatives` (L, E + S, E, p) by the parameters that all poses share, `nuisance` (L, E + S, E, k) by the
+    pose's own, each in units of its prior; `friction` and `sensors` make the noise, of sensors on the arm by the `orders` (S) of the
+    derivative that they measure.
     """
 
     response: np.ndarray
@@ -43,6 +45,7 @@ class PoseResponse:
     nuisance: np.ndarray
     friction: FrictionDisturbance
     sensors: ResponseSensors
+    orders: tuple[int, ...] = ()
 
     def rows(self, plan: MultisinePlan) -> np.ndarray:
         """R (p, p), upper triangular: RᵀR is the information about the shared parameters, that about the nuisances taken off.
@@ -56,14 +59,14 @@ class PoseResponse:
         return np.asarray(np.linalg.qr(stacked, mode="r"))[own:, own:]
 
     def whitened(self, plan: MultisinePlan) -> np.ndarray:
-        """Rows (2 L E², m + p): √2 times real and imaginary part of C⁻¹ ∂G diag(amplitude), nuisances first.
+        """Rows (2 L (E + S) E, k + p): √2 times real and imaginary part of C⁻¹ ∂G diag(amplitude), nuisances first.
 
         cov(vec G) = (Γ Γᴴ)⁻¹ ⊗ C Cᴴ with Γ Γᴴ = diag(amplitude²) and C Cᴴ the covariance of `equation_error`.
         """
         change = np.concatenate([self.nuisance, self.derivatives], axis=-1)
-        lines, axes = change.shape[:2]
+        lines, outputs = change.shape[:2]
         root = np.linalg.cholesky(self.error(plan))
-        white = np.linalg.solve(root, change.reshape(lines, axes, -1)).reshape(change.shape)
+        white = np.linalg.solve(root, change.reshape(lines, outputs, -1)).reshape(change.shape)
         white = (white * plan.amplitude.T[:, None, :, None]).reshape(-1, change.shape[-1])
         return np.sqrt(2.0) * np.vstack([np.real(white), np.imag(white)])
 
@@ -74,21 +77,22 @@ class PoseResponse:
         inner = np.eye(own) + white[:, :own].T @ white[:, :own]
         left = white[:, own:] - white[:, :own] @ np.linalg.solve(inner, white[:, :own].T @ white[:, own:])
         gain = np.einsum("rp,pq,rq->r", left, gradient, left, optimize=True)
-        lines, axes, _ = self.response.shape
-        return gain.reshape(2, lines, axes, axes).sum(axis=(0, 2)).T / plan.amplitude**2
+        return gain.reshape(2, *self.response.shape).sum(axis=(0, 2)).T / plan.amplitude**2
 
     def error(self, plan: MultisinePlan) -> np.ndarray:
-        """The covariance (L, E, E) of `equation_error`."""
-        return equation_error(plan, self.response, self.friction, self.sensors)
+        """The covariance (L, E + S, E + S) of `equation_error`."""
+        return equation_error(plan, self.response, self.friction, self.sensors, self.orders)
 
     def relative_error(self, plan: MultisinePlan) -> np.ndarray:
         """Standard deviation (L, E) of every motor's own response, relative to it."""
-        variance = np.real(np.diagonal(self.error(plan), axis1=1, axis2=2)) / plan.amplitude.T**2
+        own = self.error(plan)[:, : self.response.shape[2], : self.response.shape[2]]
+        variance = np.real(np.diagonal(own, axis1=1, axis2=2)) / plan.amplitude.T**2
         return np.sqrt(variance) / np.abs(np.diagonal(self.response, axis1=1, axis2=2))
 
 
 def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
-    """What the responses of all poses share: springs, rotors, inertials of links and payload, a delay an axis, geometric errors.
+    """What the responses of all poses share: springs, rotors, inertials of links and payload, a delay an axis, geometric errors, and of
+    every sensor on the arm its sensitivity, delay and errors of mounting.
 
     Priors are those that robot.yaml declares; `known_before` takes what was estimated before instead.
     """
@@ -97,7 +101,23 @@ def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
     )
     inertials = elastic_inertials(model, loaded=plan.payload != 0)
     errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
-    return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors))
+    sensors = (item for sensor in model.sensors.values() for item in _sensor_parameters(sensor, plan))
+    return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors, *sensors))
+
+
+def _sensor_parameters(sensor: ArmSensor, plan: MultisinePlan) -> list[Parameter]:
+    name, config = sensor.name, sensor.config
+    mounting = zip(
+        mounting_names(name),
+        ("m",) * 3 + ("rad",) * 2,
+        (config.position_std,) * 3 + (config.direction_std,) * 2,
+        strict=True,
+    )
+    return [
+        Parameter(sensitivity_name(name), "1", 1.0, prior_std=config.sensitivity_std, scale="log"),
+        Parameter(sensor_delay_name(name), "s", 0.0, prior_std=1 / plan.rate_hz),
+        *(Parameter(key, unit, 0.0, prior_std=std) for key, unit, std in mounting if std > 0),
+    ]
 
 
 def response_sensitivity(
@@ -161,14 +181,15 @@ def pose_response(
     viscous = np.nan_to_num(model.viscous[list(plan.joints)]) + friction.viscous
     robot = model.with_values(dict(zip(rubbing, viscous, strict=True)))
     own = [name for name in parameters.names if _in_linearisation(name)]
-    system = linearise(robot, q, plan.payload, derivatives=(*own, *rubbing))
+    arm_sensors = tuple(model.sensors.values())
+    system = linearise(robot, q, plan.payload, derivatives=(*own, *rubbing), sensors=arm_sensors)
     moved = transfer_matrix(system, frequencies)
     response, by = moved.response, dict(zip(moved.names, np.moveaxis(moved.derivatives, -1, 0), strict=True))
-    geometric = _geometric(robot, q, plan, parameters, response)
+    known = _geometric(robot, q, plan, parameters, response) | _of_sensors(robot, q, plan, response)
     columns = []
     for item in parameters:
-        if item.name in geometric:
-            columns.append(geometric[item.name])
+        if item.name in known:
+            columns.append(known[item.name])
         elif item.name.endswith(".delay"):
             axis = [joint.name for joint in model.driven].index(item.name.removesuffix(".delay"))
             columns.append(_late(response, frequencies, axis))
@@ -182,6 +203,7 @@ def pose_response(
         np.concatenate([np.stack(loss, axis=-1), strange], axis=-1),
         friction,
         sensors,
+        tuple(sensor.order for sensor in arm_sensors),
     )
 
 
@@ -197,7 +219,11 @@ def thinned(plan: MultisinePlan, step: int) -> MultisinePlan:
 
 
 def _in_linearisation(name: str) -> bool:
-    return not name.endswith(".delay") and name.rpartition(".")[2] not in GEOMETRY
+    return (
+        not name.startswith("sensor.")
+        and not name.endswith(".delay")
+        and name.rpartition(".")[2] not in GEOMETRY
+    )
 
 
 def _late(response: np.ndarray, frequencies: np.ndarray, axis: int) -> np.ndarray:
@@ -214,6 +240,28 @@ def _geometric(
     for item in parameters:
         if item.name.rpartition(".")[2] in GEOMETRY:
             other = robot.with_values({item.name: item.value + item.prior_std})
-            moved = transfer_matrix(linearise(other, q, plan.payload), plan.frequencies_hz).response
-            changes[item.name] = (moved - response) / item.prior_std
+            system = linearise(other, q, plan.payload, sensors=tuple(robot.sensors.values()))
+            changes[item.name] = (
+                transfer_matrix(system, plan.frequencies_hz).response - response
+            ) / item.prior_std
+    return changes
+
+
+def _of_sensors(
+    robot: RobotModel, q: np.ndarray, plan: MultisinePlan, response: np.ndarray
+) -> dict[str, np.ndarray]:
+    """∂G (L, E + S, E) by sensitivity, delay and mounting of every sensor on the arm, the last by forward differences."""
+    changes: dict[str, np.ndarray] = {}
+    sensors, axes = tuple(robot.sensors.values()), response.shape[2]
+    for row, sensor in enumerate(sensors, start=axes):
+        by_gain, by_delay = np.zeros_like(response), np.zeros_like(response)
+        by_gain[:, row] = response[:, row]
+        by_delay[:, row] = -2j * np.pi * plan.frequencies_hz[:, None] * response[:, row]
+        changes |= {sensitivity_name(sensor.name): by_gain, sensor_delay_name(sensor.name): by_delay}
+        stds = (sensor.config.position_std,) * 3 + (sensor.config.direction_std,) * 2
+        for name, misplaced, std in zip(mounting_names(sensor.name), sensor.misplaced(), stds, strict=True):
+            if std > 0:
+                moved = tuple(misplaced if s is sensor else s for s in sensors)
+                system = linearise(robot, q, plan.payload, sensors=moved)
+                changes[name] = (transfer_matrix(system, plan.frequencies_hz).response - response) / std
     return changes

@@ -33,13 +33,3 @@ def hardening_name(joint: str) -> str:
 def held_inertia_name(joint: str) -> str:
     """Name of the inertia that moves with the arm of a joint whose motor is held."""
     return f"{joint}.held_inertia"
-
-
-def sensitivity_name(sensor: str) -> str:
-    """Name of what the readings of a sensor on the arm are multiplied by."""
-    return f"sensor.{sensor}.sensitivity"
-
-
-def sensor_delay_name(sensor: str) -> str:
-    """Name of the delay of the readings of a sensor on the arm."""
-    return f"sensor.{sensor}.delay"

@@ -11,14 +11,13 @@ from flexcal.elasticity.naming import (
     hardening_name,
     held_inertia_name,
     pose_labels,
-    sensitivity_name,
-    sensor_delay_name,
     viscous_name,
 )
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import sensitivity_name, sensor_delay_name
 from flexcal.model.declared import FRICTION_LOG_STD, elastic_inertials, springs_and_rotors
 from flexcal.model.linearisation import linearise
 from flexcal.model.names import unit_of

@@ -13,14 +13,12 @@ from flexcal.elasticity.naming import (
     half_gap_name,
     hardening_name,
     pose_labels,
-    sensitivity_name,
-    sensor_delay_name,
     viscous_name,
 )
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.arm_sensor import ArmSensor
+from flexcal.model.arm_sensor import ArmSensor, sensitivity_name, sensor_delay_name
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
 

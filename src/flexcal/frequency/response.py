@@ -207,9 +207,10 @@ def frequency_response(
     The recordings are streamed, those of other poses passed over: of each only the spectra at the lines are kept. Settle
     periods are dropped, periods averaged, the two signs subtracted, (plus - minus)/2, and then
     Ĝ^[r] = (-ω² Q) Γ⁻¹ for each realisation (20), with the torque spectrum corrected for the hold.
-    `pooled_lines` neighbouring lines share one covariance. `joint_names`: of the excited axes.
-    Raises `FlexcalError` where a recording is missing, double, too short or does not fit the plan, where there are
-    fewer than two realisations (then see `local_polynomial_responses`), or the excitation does not reach every axis.
+    `pooled_lines` neighbouring lines share one covariance, more in the proportion of outputs to axes where sensors on the
+    arm recorded too. `joint_names`: of the excited axes. Raises `FlexcalError` where a recording is missing, double, too
+    short or does not fit the plan, where there are fewer than two realisations (then see `local_polynomial_responses`),
+    or the excitation does not reach every axis.
     """
     (records,) = by_pose(plan, recordings, keep_periods, [pose])
     return response_of(records, average, joint_names=joint_names, pooled_lines=pooled_lines)
@@ -246,6 +247,8 @@ def response_of(
             f"{SMALLEST_FREEDOM} degrees of freedom; measure more realisations, pool more lines, or use "
             "the local polynomial method (--method local-polynomial)."
         )
+    # sensors add elements to the covariance: as many degrees of freedom for each as without
+    pooled_lines = -(-pooled_lines * (len(joints) + len(records.sensors)) // len(joints))
     spectra = experiment_spectra(records, pooled_lines)
     if records.sensors and average not in ("arithmetic", "h1", "joint_input_output"):
         raise FlexcalError(

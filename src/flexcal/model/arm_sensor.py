@@ -50,3 +50,19 @@ class ArmSensor:
 def sensor_column(name: str) -> str:
     """The column of a log that holds the readings of the sensor of this name."""
     return f"sensor_{name}"
+
+
+def sensitivity_name(sensor: str) -> str:
+    """Name of what the readings of a sensor on the arm are multiplied by."""
+    return f"sensor.{sensor}.sensitivity"
+
+
+def sensor_delay_name(sensor: str) -> str:
+    """Name of the delay of the readings of a sensor on the arm."""
+    return f"sensor.{sensor}.delay"
+
+
+def mounting_names(sensor: str) -> tuple[str, ...]:
+    """Names of the five errors of mounting of a sensor on the arm, in the order of `ArmSensor.misplaced`."""
+    keys = ("position_x", "position_y", "position_z", "direction_1", "direction_2")
+    return tuple(f"sensor.{sensor}.{key}" for key in keys)

@@ -93,4 +93,5 @@ def response_sensors(robot: Path) -> ResponseSensors:
     if file is None:
         return COMMON_SENSORS
     sensors = read_yaml(file, CellConfig).sensors
-    return ResponseSensors(encoder_resolution(sensors), sensors.torque_noise)
+    readings = (sensors.displacement_noise, sensors.velocity_noise, sensors.acceleration_noise)
+    return ResponseSensors(encoder_resolution(sensors), sensors.torque_noise, readings)

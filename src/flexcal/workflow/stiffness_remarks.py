@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.elasticity import StiffnessResult
-from flexcal.elasticity.naming import sensitivity_name
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import sensitivity_name
 from flexcal.report.responses_check import misfit_sentences
 from flexcal.report.sections.springs import hardening_sentence
 from flexcal.workflow.bearing_remarks import response_bearings_remarks
