@@ -57,6 +57,9 @@ _MJCF = f"""<mujoco><compiler angle="radian" inertiafromgeom="false"/><option gr
 </body></body></body></body></worldbody></mujoco>"""
 
 _FLANGE = Rotation.from_euler("Y", np.pi / 2)
+_PLACE = np.array([0.1, 0, 0]) + _FLANGE.apply(SENSOR_XYZ)
+_AXES = (_FLANGE * Rotation.from_euler("xyz", SENSOR_RPY)).as_matrix()
+"""Where the sensor is in the hand, and its axes there."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +91,15 @@ def pushed_model() -> mujoco.MjModel:
     return mujoco.MjModel.from_xml_string(_MJCF)
 
 
+def pushed_torque(model: mujoco.MjModel, data: mujoco.MjData, wrench: np.ndarray) -> np.ndarray:
+    """Joint torques (4,) of a wrench (6,) on the hand, in the sensor's axes, at the state of `data`."""
+    body, found = model.body("hand").id, np.zeros(4)
+    turn, force, moment = data.xmat[body].reshape(3, 3), wrench[:3], wrench[3:]
+    place, axes = data.xpos[body] + turn @ _PLACE, turn @ _AXES
+    mujoco.mj_applyFT(model, data, axes @ force, axes @ moment, place, body, found)
+    return found
+
+
 def pushed(seed: int, duration: float, *, push: float = 1.0, cable: float = CABLE) -> Pushed:
     """A sum of sines, with a wrench of other sines and a contact now and then."""
     rng = np.random.default_rng(seed)
@@ -105,20 +117,11 @@ def pushed(seed: int, duration: float, *, push: float = 1.0, cable: float = CABL
     wrench = push * (force + contact)
     model = pushed_model()
     data = mujoco.MjData(model)
-    body = model.body("hand").id
     torque = np.empty_like(q)
     for k in range(len(time)):
         data.qpos[:], data.qvel[:], data.qacc[:] = q[k], dq[k], ddq[k]
         mujoco.mj_inverse(model, data)
-        hand = data.body("hand")
-        turn = Rotation.from_matrix(hand.xmat.reshape(3, 3)) * _FLANGE
-        place = hand.xpos + hand.xmat.reshape(3, 3) @ [0.1, 0, 0] + turn.apply(SENSOR_XYZ)
-        axes = turn * Rotation.from_euler("xyz", SENSOR_RPY)
-        outside = np.zeros(4)
-        mujoco.mj_applyFT(
-            model, data, axes.apply(wrench[k, :3]), axes.apply(wrench[k, 3:]), place, body, outside
-        )
-        torque[k] = data.qfrc_inverse - outside
+        torque[k] = data.qfrc_inverse - pushed_torque(model, data, wrench[k])
     torque += COULOMB * np.sign(dq)
     torque[:, 3] += cable
     return Pushed(time, q, torque, wrench)

@@ -19,8 +19,8 @@ ELASTIC = """elastic:
 COUPLED = f"drives: {{coupling: [{{motor: roll, joint: elbow, ratio: {RATIO}}}]}}\n"
 
 
-def wrist(folder: Path, extra: str) -> Path:
-    robot = pushed_yaml(folder, extra=extra, wrench="", dynamics=SPRINGS)
+def wrist(folder: Path, extra: str, wrench: str = "") -> Path:
+    robot = pushed_yaml(folder, extra=extra, wrench=wrench, dynamics=SPRINGS)
     text = robot.read_text().replace("cutoff_hz: 20, decimation: 5", "cutoff_hz: 100, decimation: 50")
     robot.write_text(text)
     return robot
@@ -48,6 +48,19 @@ def test_springs_before_and_behind_the_coupling(behind: bool, tmp_path: Path) ->
         item = parameters[name]
         assert abs(item["estimate"] - truth) < 4 * item["std"] + 1e-4 * abs(truth), name
     assert parameters["roll.drive.stiffness_at_elbow"]["std"] < 1e-3 * BEFORE["roll"]
+
+
+def test_a_wrench_acts_on_the_arm(tmp_path: Path) -> None:
+    """Eq. 2.21: it stands beside the arm's torques, and the motors feel it through their springs alone."""
+    robot = wrist(tmp_path, ELASTIC + COUPLED, "on_robot")
+    log = write_coupled(tmp_path / "log.parquet", 3, noise=0.002, push=40.0)
+    document = identify_robot_dynamics(robot, [log], flexible=True).document()
+    for name in ("roll.drive.stiffness", "roll.drive.stiffness_at_elbow"):
+        item = document["parameters"][name]
+        assert abs(item["estimate"] - BEFORE["roll"]) < 4 * item["std"] + 1e-4 * BEFORE["roll"]
+    share = document["external_share"]
+    assert share["low"] - 1e-3 < 1.0 < share["high"] + 1e-3 and document["error_percent"]["train"] < 0.5
+    assert max(document["error_percent"]["per_motor"].values()) < 0.5
 
 
 def test_without_the_coupling_the_springs_are_wrong(tmp_path: Path) -> None:
