@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 
-from flexcal.data.time_base import fit_time_base, gaps, resample
+from flexcal.data.sample_times import LATE
+from flexcal.data.time_base import uniform_blocks
+from flexcal.data.time_summary import TimeSummary
 from flexcal.errors import InputError
 from flexcal.frequency.excitation import SHORTEST, Channel, ExcitationRecord
 from flexcal.importing.column_names import parse_name
@@ -86,27 +87,22 @@ def _records(
     values = np.stack([column.values(table) for column in of], -1)
     t, note = _times(file, table, columns.time, rate_hz)
     notes += [note] if note else []
-    edges = [0, *(gaps(t) + 1), t.size]
-    if len(edges) > 2:
-        missing = np.diff(t).sum() - np.median(np.diff(t)) * (t.size - 1)
-        notes.append(
-            f"{file.name}: {len(edges) - 2} gaps, {missing:.3g} s in all; the parts are records of their own"
-        )
-    found = []
-    for first, end in pairwise(edges):
-        if end - first < SHORTEST:
+    number = np.arange(len(of)) - len(columns.inputs)
+    is_position = np.array(
+        [0 <= k < len(columns.outputs) and columns.outputs[k].channel.derivative == 0 for k in number]
+    )
+    order = np.argsort(~is_position, kind="stable")
+    summary, found = TimeSummary(), []
+    for base, ordered in uniform_blocks([(t, values[:, order])], positions=int(is_position.sum())):
+        if len(ordered) < SHORTEST:
+            summary.short += len(ordered) * base.time_step
             continue
-        base = fit_time_base(t[first:end])
-        if base.resampled:
-            notes.append(
-                f"{file.name}: time stamps jitter by {1e3 * base.jitter:.2g} ms (1σ) about {1 / base.time_step:.6g} Hz"
-                + (f", {base.lost} samples are lost" if base.lost else "")
-                + "; interpolated onto that base"
-            )
-        uniform = resample(t[first:end], values[first:end], base)
-        found.append(_record(file.name, base.time_step, uniform, columns))
+        summary.add(base)
+        found.append(_record(file.name, base.time_step, ordered[:, np.argsort(order)], columns))
     if not found:
         raise InputError(f"{file}: no stretch without a gap has {SHORTEST} samples; record longer.")
+    if summary.sentence:
+        notes.append(f"{file.name}: {summary.sentence}")
     return found, notes
 
 
@@ -141,14 +137,16 @@ def _times(
     unit = parse_name(column, table.units.get(column)).unit
     known = column in table.times or unit in _SECONDS
     unit = "s" if column in table.times else unit if unit in _SECONDS else time_unit(raw)
-    back = np.flatnonzero(np.diff(raw) <= 0)
+    seconds = (raw - raw[0]) * _SECONDS[unit]
+    back = np.flatnonzero(np.diff(seconds) < -LATE)
     if back.size:
-        again = "stands still" if raw[back[0] + 1] == raw[back[0]] else "runs backwards"
         raise table.table.error(
             int(back[0]) + 1,
             column,
-            f"the time {again}; remove the row, or give the rate of uniform samples with --rate HZ.",
+            "the time runs backwards; remove the row, or give the rate of uniform samples with --rate HZ.",
         )
-    return (raw - raw[0]) * _SECONDS[
-        unit
-    ], "" if known or unit == "s" else f"{column} is taken to be in {unit}"
+    if not seconds[-1] > 0:
+        raise table.table.error(
+            0, column, "the time stands still; give the rate of uniform samples with --rate HZ."
+        )
+    return seconds, "" if known or unit == "s" else f"{column} is taken to be in {unit}"

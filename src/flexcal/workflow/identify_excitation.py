@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.atomic import atomic_path, write_text
+from flexcal.atomic import write_text
 from flexcal.elasticity.axis_masses import AxisMasses, identify_masses, misfit
 from flexcal.elasticity.modal_fit import IdentifiedModes, about_at, identify_modes
 from flexcal.elasticity.resonances import Peak, Resonance, antiresonances, peaks, resonances
@@ -27,9 +27,10 @@ from flexcal.importing.response_records import ResponseRecords, read_response_re
 from flexcal.progress import Progress, silent
 from flexcal.report.excitation_checks import excitation_checks
 from flexcal.report.trust import Trust
+from flexcal.workflow.excitation_files import write_response_arrays
 from flexcal.workflow.results import write_results
 
-RESPONSE, RESPONSE_TABLE = "response.npz", "response.csv"
+RESPONSE_TABLE = "response.csv"
 
 
 @dataclass(frozen=True)
@@ -290,18 +291,8 @@ def _write(out: Path, result: IdentifiedExcitation) -> None:
 
     response, model = result.response, result.identified.fit.model
     chosen = result.masses.chosen
-    frequencies = response.frequencies_hz
-    with atomic_path(out / RESPONSE) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(
-            stream,
-            frequencies_hz=frequencies,
-            response=response.response,
-            covariance=response.covariance,
-            coherence=response.coherence,
-            std=response.std,
-            modal=model.response(frequencies),
-            masses=np.zeros(0) if chosen is None else chosen.chain.response(frequencies),
-        )
+    masses = np.zeros(0) if chosen is None else chosen.chain.response(response.frequencies_hz)
+    write_response_arrays(out, response, model.response(response.frequencies_hz), masses)
     write_text(out / RESPONSE_TABLE, _table(result))
     write_results(out, result.document())
     report_folder(out)

@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
-from zipfile import BadZipFile
-
-import numpy as np
 
 from flexcal.data import MultisinePlan, read_plan_of
 from flexcal.data.pose_set import DEFAULT_SIGMA
@@ -29,6 +26,7 @@ from flexcal.report.study import TwoStageStudy
 from flexcal.report.two_stage import write_two_stage_report
 from flexcal.report.verification import VerificationStudy, write_verification_report
 from flexcal.units import MILLIMETRE
+from flexcal.workflow.excitation_files import read_response_arrays
 from flexcal.workflow.experiment_files import FREQUENCY_PLAN
 from flexcal.workflow.fitted_files import read_fitted
 from flexcal.workflow.point_files import read_arm, read_loads, read_points
@@ -77,7 +75,7 @@ def report_folder(folder: Path) -> Path:
             stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted(folder))
             write_stiffness_report(path, stiffness)
         elif _EXCITATION in results:
-            write_excitation_report(path, ExcitationStudy(results, _arrays(folder / "response.npz")))
+            write_excitation_report(path, ExcitationStudy(results, read_response_arrays(folder)))
         elif _RESPONSES in results:
             write_response_report(path, ResponseStudy(results, _responses(folder, results)))
         else:
@@ -124,14 +122,6 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
 
 def _responses(folder: Path, results: Mapping[str, Any]) -> tuple[FrequencyResponse, ...]:
     return tuple(FrequencyResponse.load(folder / Path(entry["file"]).name) for entry in results[_RESPONSES])
-
-
-def _arrays(path: Path) -> dict[str, np.ndarray]:
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            return dict(stored)
-    except (OSError, ValueError, BadZipFile) as problem:
-        raise InputError(f"{path} cannot be read; run 'flexcal identify response' again.") from problem
 
 
 def _block(folder: Path, block: Block) -> Estimate:
