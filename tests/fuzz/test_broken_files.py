@@ -74,14 +74,16 @@ def test_a_few_broken_files(flexcal: FlexcalProcesses, files: Path, tmp_path: Pa
         generated[::QUICK] + [case for case in kept if case.arguments[0] in ("export", "init", "import")][::3]
     )
     assert len(chosen) >= 15
-    assert not faults(flexcal, chosen, files, tmp_path)
+    found = faults(flexcal, chosen, files, tmp_path)
+    assert not found, "\n\n".join(found)
 
 
 @pytest.mark.slow
 def test_every_file_that_ever_failed(flexcal: FlexcalProcesses, all_files: Path, tmp_path: Path) -> None:
     chosen = list(regressions(all_files))
     assert len(chosen) == len(REGRESSIONS)
-    assert not faults(flexcal, chosen, all_files, tmp_path)
+    found = faults(flexcal, chosen, all_files, tmp_path)
+    assert not found, "\n\n".join(found)
 
 
 @pytest.mark.slow
@@ -91,4 +93,5 @@ def test_broken_files(batch: int, flexcal: FlexcalProcesses, all_files: Path, tm
     assert len(everything) > 15_000
     chosen = everything[::STRIDE][batch::BATCHES]
     assert len(chosen) * BATCHES > 900
-    assert not faults(flexcal, chosen, all_files, tmp_path)
+    found = faults(flexcal, chosen, all_files, tmp_path)
+    assert not found, "\n\n".join(found)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Collection, Sequence
 from dataclasses import replace
 
@@ -40,11 +41,12 @@ def resolved_plant(
             substeps = config.controller.substeps * refinement
             step = 1 / (rate_hz * substeps)
             try:
-                plant = build_plant(
-                    truth, tried, q=q, free=free, payload=payload, time_step=step, sensors=sensors
-                )
-                missed = unresolved(plant)
-            except ValueError as problem:  # of MuJoCo's compiler, and of a mass matrix that is singular
+                with warnings.catch_warnings(action="error", category=UserWarning):
+                    plant = build_plant(
+                        truth, tried, q=q, free=free, payload=payload, time_step=step, sensors=sensors
+                    )
+                    missed = unresolved(plant)
+            except (ValueError, UserWarning) as problem:  # MuJoCo's, and of a mass matrix that is singular
                 raise FlexcalError(
                     f"the virtual robot of {truth.path} cannot be simulated ({' '.join(str(problem).split())}); correct its masses, "
                     "inertias and springs, there or in the truth."

@@ -60,12 +60,18 @@ def _same(one: Inertia, other: Inertia) -> bool:
 
 def _rigid_body(root: ET.Element, name: str, locked: Container[str]) -> Iterator[ET.Element]:
     """A link, and those that fixed and locked joints hang on it."""
-    yield next(link for link in root.findall("link") if link.get("name") == name)
+    links = {link.get("name"): link for link in root.findall("link")}
+    hung: dict[str | None, list[str]] = {}
     for joint in root.findall("joint"):
         parent, child = joint.find("parent"), joint.find("child")
         rigid = joint.get("type") == "fixed" or joint.get("name", "") in locked
-        if rigid and parent is not None and parent.get("link") == name:
-            yield from _rigid_body(root, "" if child is None else child.get("link", ""), locked)
+        if rigid and parent is not None and child is not None:
+            hung.setdefault(parent.get("link"), []).append(child.get("link", ""))
+    waiting = [name]
+    while waiting:
+        at = waiting.pop()
+        yield links[at]
+        waiting += hung.get(at, [])[::-1]
 
 
 def _add_inertial(link: ET.Element, inertia: Inertia) -> None:
