@@ -2,7 +2,7 @@
 
 `python -m benchmarks.kill [--count 40] [--cases calibrate identify demo] [--signals KILL TERM INT HUP] [--seed 0]`
 
-Half of the moments are uniform over the run, half in its last part, where the files are written. Before and after a kill, every file is
+Half of the moments are uniform over the run, half after its first file, while others are written. Before and after a kill, every file is
 compared by SHA-256 with the runs that it can be of; then the folder is opened as any verb does, and compared again.
 """
 
@@ -13,20 +13,26 @@ import hashlib
 import os
 import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 
+from flexcal.cli.main import main as flexcal
+from flexcal.publication import settle
+
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parent / "examples"
 LEDGER, STAGES = ".flexcal", ".flexcal-run-*"
+_SAID = "said.txt"
+_IMPORTED = ("calibrate_robot", "identify_dynamics", "two_stage")
+"""Modules of `flexcal.workflow`."""
 _RERUNS = {"demo": 8}
 """Of so many kills of a verb one is followed by a run to its end; of the others, by the one that is killed next."""
 
@@ -86,6 +92,8 @@ def run(count: int = 40) -> list[tuple[str, float, str]]:
 def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -> Counter[str]:
     """How often each of these was found: old, new, finished (of both, and new once opened), torn, no rerun."""
     found: Counter[str] = Counter()
+    for module in _IMPORTED:
+        import_module(f"flexcal.workflow.{module}")
     with tempfile.TemporaryDirectory(prefix="kill_") as place:
         folder = Path(shutil.copytree(case.robot, Path(place) / "robot"))
         out = folder / case.out
@@ -93,15 +101,23 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
         for kind, command in (("new", case.killed), ("old", case.before)):
             shutil.rmtree(out, ignore_errors=True)
             begun = time.perf_counter()
-            _complete(command, folder)
-            seconds = time.perf_counter() - begun
+            process = _started(command, folder)
+            _wait_for_files(out, process)
+            writing = time.perf_counter()
+            _end(process, folder)
+            seconds, last_part = time.perf_counter() - begun, time.perf_counter() - writing
             references[kind] = _files(out)
         before = references["old"]
         for attempt in range(count):
-            share = rng.uniform() if attempt % 2 else rng.uniform(0.8, 1.05)
-            told = _killed(case.killed, folder, share * seconds, number)
+            process = _started(case.killed, folder)
+            if attempt % 2:
+                time.sleep(rng.uniform(0.0, seconds))
+            else:
+                _wait_for_files(out, process)
+                time.sleep(rng.uniform(0.0, 1.2 * last_part))
+            told = _stopped(process, number, folder)
             raw = _kind(out, before, references["new"], case)
-            subprocess.run([sys.executable, "-c", _OPEN, str(out)], check=True)
+            settle(out)
             settled = _kind(out, before, references["new"], case)
             if settled is None or (raw is not None and raw != settled):
                 found["torn"] += 1
@@ -114,8 +130,8 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
                 try:
                     _complete(case.before, folder)
                     found["reruns"] += 1
-                except subprocess.CalledProcessError as problem:
-                    print(problem.stderr, file=sys.stderr)
+                except RuntimeError as problem:
+                    print(problem, file=sys.stderr)
                     found["no rerun"] += 1
             before = _files(out)
             print(f"\r{case.name}, kill {attempt + 1}: {_told(found)} ", end="", file=sys.stderr, flush=True)
@@ -123,48 +139,58 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
     return found
 
 
-_OPEN = "import sys; from flexcal.publication import settle; settle(sys.argv[1])"
-
-
-def _killed(command: Sequence[str], folder: Path, seconds: float, number: int) -> int:
-    """Run a command line, send it a signal after a time, and return the number of lines that are no progress."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "flexcal.cli.main", *command],
-        cwd=folder,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-        preexec_fn=_heed_signals,
-    )
+def _started(command: Sequence[str], folder: Path) -> int:
+    """The process of a command line, with its progress and messages in `said`; forked, so that what it imports is there already."""
+    child = os.fork()
+    if child:
+        return child
+    status = 1
     try:
-        process.wait(seconds)
-    except subprocess.TimeoutExpired:
-        process.send_signal(number)
-    said = process.communicate()[1].splitlines()
+        os.setsid()
+        os.chdir(folder)
+        for number in (
+            signal.SIGINT,
+            signal.SIGHUP,
+        ):  # a shell lets what it runs in the background ignore Ctrl-C
+            signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+        os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+        os.dup2(os.open(folder / _SAID, os.O_WRONLY | os.O_CREAT | os.O_TRUNC), 2)
+        status = flexcal(list(command))
+    finally:
+        os._exit(status)
+
+
+def _wait_for_files(out: Path, process: int) -> None:
+    """Until the first file of a run waits for its place, or the run has ended."""
+    while not any(out.glob(f"{STAGES}/[0-9]*")) and _lives(process):
+        time.sleep(0.002)
+
+
+def _lives(process: int) -> bool:
+    return os.waitid(os.P_PID, process, os.WEXITED | os.WNOHANG | os.WNOWAIT) is None
+
+
+def _stopped(process: int, number: int, folder: Path) -> int:
+    """Send a signal to a run, wait for its end, and return the number of lines that are no progress."""
+    os.kill(process, number)
+    os.waitpid(process, 0)
     for _ in range(100):  # workers end with it
         try:
-            os.killpg(process.pid, 0)
+            os.killpg(process, 0)
         except ProcessLookupError:
-            return sum(not line.endswith("…") for line in said)
+            return sum(not line.endswith("…") for line in (folder / _SAID).read_text().splitlines())
         time.sleep(0.05)
-    raise AssertionError(f"a process of '{' '.join(command)}' lives on")
-
-
-def _heed_signals() -> None:
-    """A shell lets what it runs in the background ignore Ctrl-C."""
-    for number in (signal.SIGINT, signal.SIGHUP):
-        signal.signal(number, signal.SIG_DFL)
+    raise AssertionError(f"a process of {process} lives on")
 
 
 def _complete(command: Sequence[str], folder: Path) -> None:
-    subprocess.run(
-        [sys.executable, "-m", "flexcal.cli.main", *command],
-        cwd=folder,
-        check=True,
-        capture_output=True,
-        text=True,
-    )
+    """Run a command line to its end; raises `RuntimeError` where it fails."""
+    _end(_started(command, folder), folder)
+
+
+def _end(process: int, folder: Path) -> None:
+    if os.waitpid(process, 0)[1]:
+        raise RuntimeError((folder / _SAID).read_text())
 
 
 def _files(out: Path) -> dict[str, str]:

@@ -2,6 +2,7 @@
 
 import os
 from pathlib import Path
+from threading import Thread
 
 import pytest
 
@@ -48,6 +49,17 @@ def test_files_that_belong_together_appear_together(tmp_path: Path) -> None:
     ):
         pass
     assert not (tmp_path / "c.npz").exists()
+
+
+def test_threads_do_not_wait_for_each_other(tmp_path: Path) -> None:
+    """A file that one thread has finished is there, whatever another has begun meanwhile."""
+    with atomic_path(tmp_path / "long") as temporary:
+        other = Thread(target=write_text, args=(tmp_path / "short", "1"))
+        other.start()
+        other.join()
+        assert os.listdir(tmp_path).count("short") == 1
+        temporary.write_text("2")
+    assert sorted(os.listdir(tmp_path)) == ["long", "short"]
 
 
 def test_permissions_are_those_of_a_plain_file(tmp_path: Path) -> None:

@@ -29,8 +29,13 @@ def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
         with _written(running, [Path(path) for path in paths]) as temporaries:
             yield temporaries
         return
-    with Publication() as alone, _written(alone, [Path(path) for path in paths]) as temporaries:
-        yield temporaries
+    alone = Publication()  # no other thread's files wait for these
+    try:
+        with _written(alone, [Path(path) for path in paths]) as temporaries:
+            yield temporaries
+        alone.publish()
+    finally:
+        alone.discard()
 
 
 @contextmanager

@@ -47,8 +47,7 @@ class Publication:
                 self.publish()
         finally:
             _open.remove(self)
-            if not self._done:
-                self._discard()
+            self.discard()
 
     @staticmethod
     def running() -> Publication | None:
@@ -166,7 +165,10 @@ class Publication:
                     "again."
                 )
 
-    def _discard(self) -> None:
+    def discard(self) -> None:
+        """Drop the files that wait, unless they have been published."""
+        if self._done:
+            return
         with undisturbed():
             for stage in self._stages.values():
                 stage.remove()
