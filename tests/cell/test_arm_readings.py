@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import polars as pl
 import pytest
 
 from flexcal.cell import CellConfig, FrictionConfig, LoopConfig, SensorConfig, VirtualCell
@@ -14,7 +15,7 @@ from flexcal.data import MultisinePlan, read_recording, write_recording
 from flexcal.frequency import multisine
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
-from flexcal.model.config import ArmSensorConfig
+from flexcal.model.config import ArmSensorConfig, SignalConfig
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
 from flexcal.units import DEGREE
@@ -119,3 +120,17 @@ def _upwards(model: RobotModel, plan: MultisinePlan) -> float:
     sensor = model.sensors["hand"]
     _, turn = arm.place(arm.configuration(plan.poses[0], np.zeros((model.n, 3))), sensor.joint, sensor.xyz)
     return float((turn @ sensor.direction)[2])
+
+
+def test_readings_in_g_under_another_name(sensing: RobotModel, plan: MultisinePlan, tmp_path: Path) -> None:
+    recording = next(
+        VirtualCell(sensing, CellConfig(), SEED).record(replace(plan, periods=1, settle_periods=0))
+    )
+    write_recording(tmp_path / "log.csv", recording)
+    table = pl.read_csv(tmp_path / "log.csv").with_columns((pl.col("sensor_hand") / 9.80665).alias("ai3"))
+    table.drop("sensor_hand", "sensor_beam").write_csv(tmp_path / "log.csv")
+    mapped = {"sensor_hand": SignalConfig(("ai3",), "g")}
+    model = replace(sensing, config=replace(sensing.config, signals=mapped))
+    back = read_recording(tmp_path / "log.csv", model)
+    assert back.sensors == ("hand", "forearm", "probe")
+    np.testing.assert_allclose(back.sensor_readings[:, 0], recording.sensor_readings[:, 0], rtol=1e-9)

@@ -91,6 +91,11 @@ class DesignFrequency:
                 progress=progress,
             ).document()
         console.show(predicted_table(document["predicted_std"]))
+        if document["sensors"]:
+            console.say(
+                f"this counts on the sensors on the arm that robot.yaml declares ({', '.join(document['sensors'])}): record their "
+                "readings in the columns sensor_NAME"
+            )
         places = document.get("payload_placements", ())
         if places:
             best = min(places, key=lambda place: place["largest_std"])

@@ -26,6 +26,9 @@ from flexcal.model.transfer import transfer_matrix
 HALF_GAP_STD = 1e-4
 """Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
 
+SENSOR_RANGE = 4.0
+"""Factor between readings of a sensor and those expected from which they are of another unit or place."""
+
 HARDENING_STD = 0.3
 """Prior of a drive's hardening, 1σ."""
 
@@ -164,41 +167,42 @@ def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -
 def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
     """Raises `FlexcalError` where the readings of a sensor on the arm are of another size or sign than those of robot.yaml's robot.
 
-    Over the lowest third of the lines, where the arm follows its motors nearly rigidly, whatever the springs are.
+    That is told from the lowest third of the lines, where the springs matter least, by the median line: modes that are elsewhere than in
+    robot.yaml are no reason.
     """
     for name in dict.fromkeys(name for response in responses for name in response.sensors):
-        sensor, cross, power = model.sensors[name], 0.0j, 0.0
-        for response in responses:
-            if name not in response.sensors:
-                continue
-            row = len(response.joints) + response.sensors.index(name)
-            low = slice(0, max(3, len(response.frequencies_hz) // 3))
-            system = linearise(model, response.q_mean, response.payload, sensors=[sensor])
-            expected = transfer_matrix(system, response.frequencies_hz[low]).response
-            # from motors' motion to readings: what friction and inertia do to the motors is in both
-            still = np.swapaxes(
-                np.linalg.solve(np.swapaxes(expected[:, :-1], 1, 2), expected[:, -1:].swapaxes(1, 2)), 1, 2
+        gains = [_line_gains(model, name, response) for response in responses if name in response.sensors]
+        found = np.concatenate(gains)
+        found = found[np.abs(found) > 0]
+        if not found.size:
+            raise FlexcalError(
+                f"the readings of the sensor {name} do not change with the torques; check its cable and its column, or leave that out."
             )
-            predicted = (still @ response.response[low])[:, 0]
-            cross += np.sum(predicted.conj() * response.stacked[low, row])
-            power += float(np.sum(np.abs(predicted) ** 2))
-        if power > 0:
-            _check_gain(model, name, complex(cross / power))
+        _check_gain(
+            model, name, float(np.median(np.abs(found))), float(np.median(found.real / np.abs(found)))
+        )
 
 
-def _check_gain(model: RobotModel, name: str, gain: complex) -> None:
-    size = abs(gain)
+def _line_gains(model: RobotModel, name: str, response: FrequencyResponse) -> np.ndarray:
+    """Complex factor (lines,) between the readings and those expected, at the lowest third of the lines of a pose."""
+    low = slice(0, max(3, len(response.frequencies_hz) // 3))
+    system = linearise(model, response.q_mean, response.payload, sensors=[model.sensors[name]])
+    expected = transfer_matrix(system, response.frequencies_hz[low]).response[:, -1]
+    measured = response.stacked[low, len(response.joints) + response.sensors.index(name)]
+    return np.sum(expected.conj() * measured, axis=1) / np.sum(np.abs(expected) ** 2, axis=1)
+
+
+def _check_gain(model: RobotModel, name: str, size: float, cosine: float) -> None:
     where = f"the readings of the sensor {name}"
-    if not 0.5 < size < 2.0:
+    if not 1 / SENSOR_RANGE < size < SENSOR_RANGE:
         ratio = f"{1 / size:.2g} times smaller" if size < 1 else f"{size:.2g} times larger"
-        unit = " (they seem to be in g)" if 8 < 1 / size < 12 and model.sensors[name].order == 2 else ""
+        unit = " (they seem to be in g)" if 6 < 1 / size < 16 and model.sensors[name].order == 2 else ""
         raise FlexcalError(
             f"{where} are {ratio} than those of the robot of {model.path}{unit}; give them in m/s², m/s or m, name their unit under "
             f"`signals:`, or correct its quantity, frame, xyz or direction under `sensors:`."
         )
-    if gain.real < 0.5 * size:
-        what = "are in the opposite direction to" if gain.real < -0.5 * size else "have another phase than"
+    if cosine < -0.5:
         raise FlexcalError(
-            f"{where} {what} those of the robot of {model.path}; correct its direction, frame or quantity under `sensors:`, and check that "
-            "they are of the same instants as the torques."
+            f"{where} are in the opposite direction to those of the robot of {model.path}; correct its direction or its frame under "
+            "`sensors:`."
         )

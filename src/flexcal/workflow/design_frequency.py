@@ -57,6 +57,12 @@ class DesignedFrequency:
         """What is written."""
         return self.planned.plan
 
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors on the arm that the prediction counts on."""
+        named = (name.split(".")[1] for name in self.planned.parameters.names if name.startswith("sensor."))
+        return tuple(dict.fromkeys(named))
+
     def document(self) -> dict[str, Any]:
         """The JSON document."""
         plan = self.plan
@@ -76,6 +82,7 @@ class DesignedFrequency:
             "recordings": recordings,
             "seconds_on_the_robot": recordings * plan.duration,
             "seed": plan.seed,
+            "sensors": list(self.sensors),
             "predicted_std": self.planned.std(),
             "predicted_std_flat": self.flat.std(),
             "largest_stiffness_std": {"name": name, "std": largest},
