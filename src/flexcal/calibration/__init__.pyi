@@ -12,7 +12,7 @@ from .placement import Placement, best_placement, enough_for_points, registrable
 from .plausibility import Moved, hardly_fits, moved_far, scattered
 from .pose_drift import VISITS_A_SET, PoseDrift, common_way, drift_of_poses
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
-from .prediction import Prediction, predict
+from .prediction import Prediction, predict, predicted_positions
 from .propagated_covariance import Propagation, propagation
 from .refit import Refit, Refitted, refitted
 from .registration import register, rigid_motion
@@ -70,6 +70,7 @@ __all__ = [
     "noise_repeatability",
     "point_uncertainty",
     "predict",
+    "predicted_positions",
     "prediction_document",
     "probable_robot",
     "probable_robots",

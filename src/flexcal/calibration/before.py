@@ -15,10 +15,11 @@ import numpy as np
 
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.placement import best_placement, enough_for_points, registrable, rigid_placement
-from flexcal.calibration.prediction import predict
+from flexcal.calibration.prediction import predict, predicted_positions
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 
+_BLOCK = 20_000
 DECLARED_WITHIN = 0.05
 """Of the reach: with a larger median distance between nominal and measured points the instrument's frame is not the declared one."""
 
@@ -39,7 +40,7 @@ class RobotBefore:
     def errors(self, poses: PoseSet) -> ErrorsBefore:
         """Errors at `poses`, whose stations and targets are those that were placed."""
         found = (
-            None if robot is None else poses.position - predict(robot, poses, elastic=False).position
+            None if robot is None else poses.position - predicted_positions(robot, poses, elastic=False)
             for robot in (self.declared, self.registered, self.own)
         )
         return ErrorsBefore(*found)
@@ -82,16 +83,24 @@ def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
     for station in poses.stations:
         model.station_index(station)
     at_base = replace(model, station=np.zeros_like(model.station))
-    nominal = predict(at_base, poses, elastic=False)
     declared = _declared(at_base, poses)
     if not registrable(poses):
         return RobotBefore(declared, None, None)
-    registered = at_base.with_values(rigid_placement(poses, nominal.position).values(at_base))
+    position, orientation = _tools(at_base, poses)
+    registered = at_base.with_values(rigid_placement(poses, position).values(at_base))
     own = None
     if enough_for_points(poses):
-        found = best_placement(poses, nominal.position, nominal.kinematics.orientation)
+        found = best_placement(poses, position, orientation)
         own = at_base.with_values(found.values(at_base))
     return RobotBefore(declared, registered, own)
+
+
+def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (N, 3) and orientations (N, 3, 3) of the rigid robot's targets in its base frame."""
+    blocks = [poses.subset(slice(first, first + _BLOCK)) for first in range(0, len(poses), _BLOCK)]
+    found = (predict(model, block, elastic=False) for block in blocks)
+    positions, orientations = zip(*((at.position, at.kinematics.orientation) for at in found), strict=True)
+    return np.concatenate(positions), np.concatenate(orientations)
 
 
 def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
@@ -109,7 +118,7 @@ def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
         }
     )
     for candidate in (model, beside):
-        away = poses.position - predict(candidate, poses, elastic=False).position
+        away = poses.position - predicted_positions(candidate, poses, elastic=False)
         if np.median(np.linalg.norm(away, axis=1)) < DECLARED_WITHIN * model.reach:
             return candidate
     return None

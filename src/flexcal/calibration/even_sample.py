@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.error_cells import SAME_COMMAND, distinct, occurrence
 from flexcal.calibration.error_statistics import ErrorStatistics
-from flexcal.calibration.prediction import predict
+from flexcal.calibration.prediction import predicted_positions
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
@@ -19,7 +19,6 @@ _COMMANDS = 400
 """Positions of which several visits are kept."""
 _LEAST = 100
 """Positions of every station and payload, as far as there are any."""
-_BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,10 +70,4 @@ def _kept_visits(command: np.ndarray, stratum: np.ndarray, budget: int) -> np.nd
 
 def all_errors(model: RobotModel, poses: PoseSet, progress: Progress = silent) -> ErrorStatistics:
     """Errors of a calibrated robot at any number of poses, in constant memory beside these."""
-    parts = []
-    for start in range(0, len(poses), _BLOCK):
-        progress("all points", start / len(poses))
-        block = poses.subset(slice(start, start + _BLOCK))
-        parts.append(block.position - predict(model, block).position)
-    progress("all points", 1.0)
-    return ErrorStatistics.of(np.concatenate(parts))
+    return ErrorStatistics.of(poses.position - predicted_positions(model, poses, progress=progress))

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
+from flexcal.calibration.error_cells import distinct
 from flexcal.calibration.registration import rigid_motion
 from flexcal.data import PoseSet
 from flexcal.model import RobotModel
@@ -19,6 +19,8 @@ _STEPS = 20
 _SMALL = 1e-10
 """m and rad: a Gauss-Newton step after which there is no other."""
 _RANK = 1e-8
+_BLOCK = 20_000
+"""Points that are linearised together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,12 +45,13 @@ class Placement:
     def expected(self, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
         """Where the instrument should read the targets (N, 3) m, which are at `nominal` (N, 3), turned by `orientation` (N, 3, 3)."""
         expected = np.empty(nominal.shape)
+        shift = np.zeros(nominal.shape)
+        for target, moved in self.shifts.items():
+            shift[poses.target == target] = moved
+        at = nominal + np.matmul(orientation, shift[:, :, None])[:, :, 0]
         for name, (turn, offset) in self.stations.items():
             own = poses.station == name
-            moved = np.array([self.shifts.get(t, np.zeros(3)) for t in poses.target[own].tolist()])
-            expected[own] = (
-                nominal[own] + np.einsum("nij,nj->ni", orientation[own], moved)
-            ) @ turn.T + offset
+            expected[own] = at[own] @ turn.T + offset
         return expected
 
 
@@ -68,35 +71,49 @@ def best_placement(poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray)
     never turns: where the point is, and where the instrument) is the shortest step from where it was.
     """
     found = rigid_placement(poses, nominal)
-    stations, shifts = dict(found.stations), {name: np.zeros(3) for name in poses.targets}
-    points_from = 6 * len(stations)
+    shifts = {name: np.zeros(3) for name in poses.targets}
+    points_from = 6 * len(found.stations)
+    blocks = [slice(first, first + _BLOCK) for first in range(0, len(poses), _BLOCK)]
+    parts = [(poses.subset(rows), nominal[rows], orientation[rows]) for rows in blocks]
+    found = Placement(found.stations, shifts)
     for _ in range(_STEPS):
-        columns = np.zeros((len(poses), 3, points_from + 3 * len(shifts)))
-        expected = Placement(stations, shifts).expected(poses, nominal, orientation)
-        for k, (name, (turn, offset)) in enumerate(stations.items()):
-            own = poses.station == name
-            columns[own, :, 6 * k : 6 * k + 3] = -np.cross(
-                (expected[own] - offset)[:, :, None], np.eye(3), axis=1
-            )
-            columns[own, :, 6 * k + 3 : 6 * k + 6] = np.eye(3)
-            for j, target in enumerate(shifts):
-                seen = own & (poses.target == target)
-                columns[seen, :, points_from + 3 * j : points_from + 3 * j + 3] = turn @ orientation[seen]
-        rows = columns.reshape(-1, columns.shape[2])
-        step = np.linalg.lstsq(rows, (poses.position - expected).ravel(), rcond=_RANK)[0]
-        for k, (name, (turn, offset)) in enumerate(stations.items()):
+        factor = np.zeros((0, points_from + 3 * len(shifts) + 1))
+        for part in parts:
+            factor = np.asarray(np.linalg.qr(np.vstack([factor, _linearised(found, *part)]), mode="r"))
+        step = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=_RANK)[0]
+        stations = {}
+        for k, (name, (turn, offset)) in enumerate(found.stations.items()):
             own = step[6 * k : 6 * k + 6]
             stations[name] = (vector_rotation(own[:3]) @ turn, offset + own[3:])
-        for j, target in enumerate(shifts):
-            shifts[target] = shifts[target] + step[points_from + 3 * j : points_from + 3 * j + 3]
+        moved = step[points_from:].reshape(-1, 3)
+        shifts = {name: shift + own for (name, shift), own in zip(found.shifts.items(), moved, strict=True)}
+        found = Placement(stations, shifts)
         if np.abs(step).max() < _SMALL:
             break
-    return Placement(stations, shifts)
+    return found
+
+
+def _linearised(found: Placement, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """(3 N, k + 1): how the points move with every station's turn and offset and every target's shift, and what they miss, m."""
+    points_from = 6 * len(found.stations)
+    expected = found.expected(poses, nominal, orientation)
+    columns = np.zeros((len(poses), 3, points_from + 3 * len(found.shifts) + 1))
+    for k, (name, (turn, offset)) in enumerate(found.stations.items()):
+        own = poses.station == name
+        columns[own, :, 6 * k : 6 * k + 3] = -np.cross(
+            (expected[own] - offset)[:, :, None], np.eye(3), axis=1
+        )
+        columns[own, :, 6 * k + 3 : 6 * k + 6] = np.eye(3)
+        for j, target in enumerate(found.shifts):
+            seen = own & (poses.target == target)
+            columns[seen, :, points_from + 3 * j : points_from + 3 * j + 3] = turn @ orientation[seen]
+    columns[:, :, -1] = poses.position - expected
+    return columns.reshape(-1, columns.shape[2])
 
 
 def enough_for_points(poses: PoseSet) -> bool:
     """Whether there are three coordinates for each parameter of `best_placement`, repeated visits apart."""
-    return len(distinct(poses)) >= 6 * len(poses.stations) + 3 * len(poses.targets)
+    return _distinct(poses) >= 6 * len(poses.stations) + 3 * len(poses.targets)
 
 
 def registrable(poses: PoseSet) -> bool:
@@ -104,12 +121,12 @@ def registrable(poses: PoseSet) -> bool:
     for station in poses.stations:
         own = poses.subset(poses.station == station)
         centred = own.position - own.position.mean(axis=0)
-        if len(distinct(own)) < _LEAST_POINTS or np.linalg.matrix_rank(centred, tol=1e-3) < 2:
+        if _distinct(own) < _LEAST_POINTS or np.linalg.matrix_rank(centred, tol=1e-3) < 2:
             return False
     return True
 
 
-def distinct(poses: PoseSet) -> set[tuple[Any, ...]]:
-    """Joint positions and targets without repeated visits."""
-    rows = zip(poses.q.round(3).tolist(), poses.target.tolist(), poses.station.tolist(), strict=True)
-    return {(*q, target, station) for q, target, station in rows}
+def _distinct(poses: PoseSet) -> int:
+    """Number of joint positions with a target, without repeated visits."""
+    labels = [np.unique(names, return_inverse=True)[1] for names in (poses.target, poses.station)]
+    return int(distinct(np.column_stack([poses.q.round(3), *labels])).max(initial=-1)) + 1

@@ -15,6 +15,10 @@ from flexcal.model.equilibrium import lateral_slopes
 from flexcal.model.hardening import twist_by_hardening, twist_of
 from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
+from flexcal.progress import Progress, silent
+
+_BLOCK = 20_000
+"""Poses whose predictions are in memory together."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,3 +166,15 @@ def predict(
         at[own], base[own] = place[:3], vector_rotation(place[3:])
     position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
     return Prediction(model, poses, position, base, tool.rest, tool.kinematics)
+
+
+def predicted_positions(
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True, progress: Progress = silent
+) -> np.ndarray:
+    """The positions (N, 3) of `predict`, m, for any number of poses: block by block."""
+    parts = [np.zeros((0, 3))]
+    for first in range(0, len(poses), _BLOCK):
+        progress("all points", first / len(poses))
+        parts.append(predict(model, poses.subset(slice(first, first + _BLOCK)), elastic=elastic).position)
+    progress("all points", 1.0)
+    return np.concatenate(parts)

@@ -222,10 +222,12 @@ def certify_robot(
     common = np.intersect1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
     every = np.union1d(wanted.pose[rows[before]], wanted.pose[rows[after]])
     visited = {}
-    for file, poses in sets.items():
+    for file in (before, after):
+        poses = sets.pop(file)
         kept = np.isin(wanted.pose[rows[file]], common)
         points = base[rows[file][kept]]
-        visited[file] = (poses.subset(kept), points)
+        visited[file] = (poses if kept.all() else poses.subset(kept), points)
+        del poses
     if not all(registrable(poses) for poses, _ in visited.values()):
         raise InputError(
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,8 +18,12 @@ _RESOLUTION = 1e-7
 
 def measurement_digests(poses: PoseSet) -> tuple[str, ...]:
     """Eight hexadecimal digits for every measurement, of its joint positions and its point."""
+    return tuple(_digests(poses))
+
+
+def _digests(poses: PoseSet) -> Iterator[str]:
     rows = np.round(np.hstack([poses.q, poses.position]) / _RESOLUTION).astype("<i8")
-    return tuple(f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
+    return (f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
 
 
 def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
@@ -30,5 +34,5 @@ def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: Pose
     if named:
         return named
     fitted = set(estimate.measurements)
-    again = sum(digest in fitted for digest in measurement_digests(poses))
+    again = sum(digest in fitted for digest in _digests(poses))
     return (f"{again} of these {len(poses)} points",) if again else ()

@@ -17,7 +17,7 @@ from flexcal.calibration import (
     common_way,
     drift_of_poses,
     noise_repeatability,
-    predict,
+    predicted_positions,
     repeatability,
     robot_before,
 )
@@ -180,7 +180,7 @@ def repeat_robot(
     if before is not None:
         errors["nominal"] = before
     if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
-        errors["calibrated"] = poses.position - predict(calibrated.model, poses).position
+        errors["calibrated"] = poses.position - predicted_positions(calibrated.model, poses)
     progress("visits", 1.0)
     stored = None if calibrated is None else calibrated.stored
     blocks = () if calibrated is None else tuple(calibrated.blocks)
