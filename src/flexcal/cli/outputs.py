@@ -83,7 +83,7 @@ class _Place:
             if owner is not None and self._overlap(owner.names):
                 raise InputError(
                     f"'{owner.verb}' (process {owner.process}) is writing into {self.folder} just now; wait for its end, or give another "
-                    "--out."
+                    f"--out; or, where no such process runs, remove {stage}."
                 )
 
     def own_files(self) -> dict[Path, str]:
