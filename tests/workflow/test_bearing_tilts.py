@@ -30,7 +30,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize("before", [False, True])
 def test_bearings_and_drives_are_found(before: bool, tmp_path: Path) -> None:
-    """Wherever the bearings tilt; what gravity does to a tilted column is that of CAD, whose error is 4e-5 of its stiffness."""
+    """Wherever the bearings tilt; gravity and inertia of the tilts are CAD's, whose error is 3e-4 of the stiffness."""
     own = write_tilting(tmp_path / "log.parquet", 5, before=before, noise=0.002, tilt_noise=1e-6)
     found = identify_robot_dynamics(robot_of(tmp_path, before=before), [own], flexible=True)
     document = found.document()
@@ -39,7 +39,7 @@ def test_bearings_and_drives_are_found(before: bool, tmp_path: Path) -> None:
     truth |= {f"{name}.damping": BEARING_DAMPING for name in BEARING}
     for name, value in truth.items():
         item = document["parameters"][name]
-        assert abs(item["estimate"] - value) < 4 * item["std"] + 1e-4 * value, name
+        assert abs(item["estimate"] - value) < 4 * item["std"] + 5e-4 * value, name
         assert item["std"] < (0.1 if name.endswith("damping") else 0.002) * value, name
     assert max(document["error_percent"]["per_bearing"].values()) < 1.0
     pickle.dumps(found.train.observation)

@@ -16,7 +16,8 @@ _KEPT_FIRST = ("Izz", "Ixx", "Ixy", "Ixz", "Iyz", "Iyy", "mc_x", "mc_y", "mc_z",
 """Of a link, in the order in which a person keeps them: the mass and what lies along the axis are regrouped first."""
 _SAMPLES_PER_PARAMETER = 3
 _TILT = 1e-10
-"""rad, of the tilts of bearings: real ones are so small too that what links add in proportion to them tells nothing of the links."""
+"""rad, of the tilts of bearings: real ones are so small too that what links add in proportion to them, and to their accelerations, tells
+nothing of the links beside their noise, which would bend the stiffness."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +50,7 @@ class BaseParameters:
         samples = _SAMPLES_PER_PARAMETER * len(names)
         q, dq, ddq = random_states(model, samples)
         x, y, arm = (ArmSide(*np.roll((q, dq, ddq), shift, axis=1)) for shift in (3, 2, 1))
-        small = (ArmSide(_TILT * side.q, _TILT * side.dq, side.ddq) for side in (x, y))
+        small = (ArmSide(_TILT * side.q, _TILT * side.dq, _TILT * side.ddq) for side in (x, y))
         arm = replace(arm, tilts=(next(small), next(small)))
         columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q), arm))
         matrix = np.zeros((len(columns) * samples, len(names)))
