@@ -179,7 +179,7 @@ def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> 
                 f"the readings of the sensor {name} do not change with the torques; check its cable and its column, or leave that out."
             )
         _check_gain(
-            model, name, float(np.median(np.abs(found))), float(np.median(found.real / np.abs(found)))
+            model, name, float(np.median(np.abs(found))), float(np.median(np.real(found) / np.abs(found)))
         )
 
 
