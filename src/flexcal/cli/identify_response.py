@@ -132,6 +132,11 @@ class IdentifyResponse:
             modes=_count("modes", self.modes, 0, 12),
             masses=_count("masses", self.masses, 1, 3),
         )
+        if self.method not in ("arithmetic", "local-polynomial"):
+            raise InputError(
+                f"--method {self.method} is for planned experiments; without a plan it is the local polynomial method, which is H1 without "
+                "leakage; leave --method out."
+            )
         if self.rate is not None and not self.rate > 0:
             raise InputError(f"--rate is {self.rate:g}; it must be positive.")
         console = Console(self.json)

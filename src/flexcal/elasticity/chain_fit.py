@@ -60,8 +60,7 @@ class ChainFit:
         derivative = jacobian(lambda z: predicted(z)[:, None, :, 0], np.zeros_like(at))
         rows = projection(derivative)
         errors = projection(_errors(self.data, self.chain, s.inputs))[..., 0]
-        unknowns = at.size + s.outputs.shape[0] * (SMOOTH + 2 * len(self.chain.stiffnesses))
-        return sandwich(rows, errors, s.excited, unknowns, _information(at.size))
+        return sandwich(rows, errors, s.excited, projection, _information(at.size))
 
     def values(self) -> dict[str, LogValue]:
         """Every parameter by name: inertia_1, stiffness_1, damping_1, …, viscous."""
@@ -119,7 +118,7 @@ def fit_chain(fit: ModalFit, masses: int, chosen: Sequence[tuple[float, float]])
     criterion = 2 * cost + unknowns * float(np.log(data.rows))
     mean_square = 2 * cost / max(1, data.rows - unknowns)
     for _ in range(_REWEIGHTED if mean_square > _EXPLAINED else 0):
-        data = _reweighted(data, chain, unknowns)
+        data = _reweighted(data, chain)
         chain, _ = _fitted(data, chain, prior)
     return ChainFit(data, chain, prior, criterion, mean_square)
 
@@ -138,12 +137,12 @@ def _single(data: BandData) -> BandData:
     )
 
 
-def _reweighted(data: BandData, chain: MassChain, unknowns: int) -> BandData:
+def _reweighted(data: BandData, chain: MassChain) -> BandData:
     """The data with the standard deviation of what the chain leaves."""
     whitened = _projection(data, chain)(_errors(data, chain, data.spectra.inputs))[:, 0, :, 0]
     half = whitened.shape[1] // 2
     errors = (whitened[:, :half] + 1j * whitened[:, half:])[:, :, None] / np.sqrt(2.0)
-    variance = np.real(pooled_covariance(errors, data.spectra.excited, unknowns)[:, 0, 0])
+    variance = np.real(pooled_covariance(errors, data.spectra.excited)[:, 0, 0])
     return BandData(data.spectra, data.sigma * np.sqrt(np.maximum(variance, 0.25))[:, None])
 
 

@@ -121,7 +121,7 @@ class ModalFit:
         errors = np.moveaxis(s.outputs, 2, 1) - np.einsum("kyu,rku->ryk", response, s.inputs)
         prior = np.zeros_like(size)
         prior[2 * count : 2 * count + 2] = _SLOW_PRIOR, 1.0
-        found = sandwich(rows, projection(errors[..., None])[..., 0], s.excited, self.unknowns, prior)
+        found = sandwich(rows, projection(errors[..., None])[..., 0], s.excited, projection, prior)
         outer = np.outer(size, size)
         return FitCovariance(found.covariance * outer, found.likelihood * outer, found.degrees_of_freedom)
 

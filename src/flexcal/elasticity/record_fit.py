@@ -13,7 +13,8 @@ from flexcal.frequency.record_spectra import RecordSpectra
 CLUSTERS = 8
 """Records from which the scatter between them gives the covariance."""
 _POOLED = 24
-"""Phasors of all records that share a variance."""
+"""Phasors of all records that share a variance, so the degrees of freedom of a parameter that few bins decide, about."""
+_MOST_LEVERAGE = 0.8
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,14 +136,10 @@ def thinned(data: BandData, most: int) -> BandData:
     )
 
 
-def pooled_covariance(errors: np.ndarray, excited: np.ndarray, unknowns: float) -> np.ndarray:
-    """Covariance (K, n_y, n_y) of errors (R, K, n_y) pooled over records and neighbouring bins of the same kind (excited or not).
-
-    `unknowns` real parameters were fitted to them.
-    """
+def pooled_covariance(errors: np.ndarray, excited: np.ndarray) -> np.ndarray:
+    """Covariance (K, n_y, n_y) of errors (R, K, n_y) pooled over records and neighbouring bins of the same kind (excited or not)."""
     records, bins, _ = errors.shape
     squares = np.einsum("rki,rkj->kij", errors, errors.conj()) / records
-    squares *= errors.size / max(errors.size - 0.5 * unknowns, 0.2 * errors.size)
     found = np.empty_like(squares)
     index = np.arange(bins)
     for kind in (True, False):
@@ -151,6 +148,15 @@ def pooled_covariance(errors: np.ndarray, excited: np.ndarray, unknowns: float) 
             count = min(own.size, max(5, -(-_POOLED // records)))
             found[own] = pool(squares[own], own, own, count)
     return found
+
+
+def _unshrunk(errors: np.ndarray, rows: np.ndarray, bread: np.ndarray, basis: np.ndarray) -> np.ndarray:
+    """Errors (R, n_y, 2K) over √(1 - h), with h the leverage of a bin: what the fit of parameters and transients took from it."""
+    own = np.einsum("rykp,pq,rykq->ryk", rows, bread, rows, optimize=True)
+    leverage = own + (basis**2).sum(2)
+    half = leverage.shape[2] // 2
+    mean = 0.5 * (leverage[:, :, :half] + leverage[:, :, half:])
+    return errors / np.sqrt(1.0 - np.minimum(np.concatenate([mean, mean], axis=2), _MOST_LEVERAGE))
 
 
 @dataclass(frozen=True, eq=False)
@@ -163,43 +169,46 @@ class FitCovariance:
 
 
 def sandwich(
-    rows: np.ndarray, errors: np.ndarray, excited: np.ndarray, unknowns: float, prior: np.ndarray
+    rows: np.ndarray, errors: np.ndarray, excited: np.ndarray, projection: Projection, prior: np.ndarray
 ) -> FitCovariance:
     """Covariance of least-squares parameters from whitened, projected Jacobian rows (R, n_y, 2K, p) and errors (R, n_y, 2K).
 
     From `CLUSTERS` records on the scatter of the scores between records decides, which needs no model of the noise, and what all
     records leave alike; with fewer, errors are
-    taken as independent between bins, correlated between outputs, and as large as their neighbours'. `unknowns` real
-    numbers were fitted in all, transients included. `prior` (p,): information known beforehand.
+    taken as independent between bins, correlated between outputs, and as large as their neighbours'. They are
+    corrected for the share that the fit took from each bin. `prior` (p,): information known beforehand.
     """
     records, _, count, _ = rows.shape
     information = np.einsum("rykp,rykq->pq", rows, rows, optimize=True) + np.diag(prior)
     bread = np.linalg.pinv(information, rcond=1e-13, hermitian=True)
     half = count // 2
-    complex_errors = np.moveaxis(errors[:, :, :half] + 1j * errors[:, :, half:], 1, 2)
+    whole = _unshrunk(errors, rows, bread, projection.basis)
+    complex_errors = np.moveaxis(whole[:, :, :half] + 1j * whole[:, :, half:], 1, 2)
     complex_rows = rows[:, :, :half] + 1j * rows[:, :, half:]  # (R, n_y, K, p)
     if records >= CLUSTERS:
         scores = np.einsum("rykp,ryk->rp", rows, errors, optimize=True)
         scores = scores - scores.mean(0)
         meat = scores.T @ scores * records / (records - 1)
-        meat = meat + _common(complex_rows, complex_errors, excited, unknowns)
-        return FitCovariance(bread @ (meat + np.diag(prior)) @ bread, bread, records - 1.0)
-    noise = pooled_covariance(complex_errors, excited, unknowns)
-    meat = 0.5 * np.real(
-        np.einsum("rikp,kij,rjkq->pq", complex_rows.conj(), noise, complex_rows, optimize=True)
-    )
-    return FitCovariance(bread @ (meat + np.diag(prior)) @ bread, bread, max(1.0, errors.size - unknowns))
+        meat = meat + _common(complex_rows, complex_errors, excited)
+        freedom = records - 1.0
+    else:
+        noise = pooled_covariance(complex_errors, excited)
+        meat = 0.5 * np.real(
+            np.einsum("rikp,kij,rjkq->pq", complex_rows.conj(), noise, complex_rows, optimize=True)
+        )
+        freedom = float(_POOLED)
+    return FitCovariance(bread @ (meat + np.diag(prior)) @ bread, bread, freedom)
 
 
-def _common(rows: np.ndarray, errors: np.ndarray, excited: np.ndarray, unknowns: float) -> np.ndarray:
+def _common(rows: np.ndarray, errors: np.ndarray, excited: np.ndarray) -> np.ndarray:
     """Covariance of the scores by what all records leave alike: errors of the model, which repetitions do not average.
 
     From complex rows (R, n_y, K, p) and errors (R, K, n_y): their mean over records beyond what their scatter explains.
     """
     records = len(errors)
     mean = errors.mean(0, keepdims=True)
-    alike = pooled_covariance(mean, excited, unknowns / records)
-    chance = pooled_covariance(errors - mean, excited, unknowns) / (records - 1)
+    alike = pooled_covariance(mean, excited)
+    chance = pooled_covariance(errors - mean, excited) / (records - 1)
     total, expected = (np.real(np.trace(values, axis1=1, axis2=2)) for values in (alike, chance))
     share = np.clip(1.0 - expected / np.maximum(total, np.finfo(float).tiny), 0.0, 1.0)
     summed = rows.sum(0)

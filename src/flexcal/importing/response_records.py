@@ -102,7 +102,7 @@ def _records(
     if not found:
         raise InputError(f"{file}: no stretch without a gap has {SHORTEST} samples; record longer.")
     if summary.sentence:
-        notes.append(f"{file.name}: {summary.sentence}")
+        notes.append(f"{summary.sentence} ({file.name})")
     return found, notes
 
 
