@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cli_files import read_csv, snapshot, write_csv
 
-from flexcal.data import read_poses
+from flexcal.data import read_poses, read_recording, read_recording_blocks
 from flexcal.model import RobotModel
 
 
@@ -159,10 +159,33 @@ def test_timestamps_of_poses(run, ur5_folder: Path) -> None:
     np.testing.assert_allclose(poses.time, 60.0 * np.arange(20))
     np.testing.assert_array_equal(poses.pose, np.arange(1, 21))
     np.testing.assert_allclose(poses.position, rows[:, 7:10], atol=1e-8)
-    before = snapshot(ur5_folder)
-    refused = run("import", robot, ur5_folder / "german.csv", "--write-signals")
-    assert refused.status == 2 and "leave --write-signals out" in refused.err
-    assert snapshot(ur5_folder) == before
+
+
+def test_a_log_with_timestamps_is_read_by_the_signals_that_import_writes(run, ur5_folder: Path) -> None:
+    robot, path, count = ur5_folder / "robot.yaml", ur5_folder / "log.csv", 400
+    rng, at = np.random.default_rng(3), 86_398.0 + 0.008 * np.arange(400)
+    at += rng.uniform(-2e-3, 2e-3, count)
+    q = 0.5 * np.sin(2 * np.pi * 0.7 * at[:, None] + np.arange(6))
+    moment = [np.datetime64("2026-03-01T00:00:00") + np.timedelta64(round(1e6 * t), "us") for t in at]
+    lines = [
+        ",".join([str(m), *(f"{x:.9f}" for x in row), *(f"{10 * x:.6f}" for x in row)])
+        for m, row in zip(moment, q, strict=True)
+    ]
+    header = ["stamp", *(f"q{k}" for k in range(1, 7)), *(f"tau{k}" for k in range(1, 7))]
+    path.write_text("\n".join([",".join(header), *lines]))
+    done = run("import", robot, path, "--write-signals")
+    assert done.status == 0, done.err
+    words = " ".join(done.out.split())
+    assert "timestamps of stamp are read as seconds from the first" in words and "resample" in words
+    model = RobotModel.from_yaml(robot, estimates=False)
+    recording = read_recording(path, model)
+    exact = 0.5 * np.sin(2 * np.pi * 0.7 * (recording.time[:, None] + at[0]) + np.arange(6))
+    np.testing.assert_allclose(recording.q, exact, atol=3e-6)
+    blocks = list(read_recording_blocks(path, model, rows=90))
+    assert len(blocks) > 1
+    np.testing.assert_allclose(np.concatenate([b.q for b in blocks]), recording.q, atol=1e-6)
+    path.write_text(path.read_text().replace(str(moment[7]), "later"))
+    assert "line 9, column stamp: 'later' is no time" in run("identify", "dynamics", robot, path).err
 
 
 def test_a_time_that_is_none_is_placed(run, ur5_folder: Path, foreign: Path) -> None:

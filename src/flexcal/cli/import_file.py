@@ -146,18 +146,20 @@ class Import:
         )
 
     def _add_signals(self, console: Console, found: ImportedFile) -> None:
-        from flexcal.importing.placed_columns import TIMESTAMP
+        from flexcal.data.signals import TIMESTAMP
         from flexcal.workflow.signals_block import add_signals
 
         if not found.signals:
             console.say("robot.yaml needs no `signals:` for these columns")
             return
-        if found.signals.get("t", {}).get("unit") == TIMESTAMP:
-            raise InputError(
-                f"{self.file}: its timestamps are texts, which only import turns into seconds; leave --write-signals out."
-            )
         add_signals(self.robot, found.signals)
         console.say(f"added `signals:` to {self.robot}")
+        if found.signals.get("t", {}).get("unit") == TIMESTAMP:
+            (column,) = found.signals["t"]["columns"]
+            console.say(
+                f"with it the timestamps of {column} are read as seconds from the first; where they are irregular, the verbs that read "
+                "logs resample them to a uniform time step, and say so"
+            )
 
     def _following(self, found: ImportedFile) -> str:
         if self.out is None:

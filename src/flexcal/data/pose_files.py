@@ -20,8 +20,9 @@ from flexcal.data.pose_columns import (
 )
 from flexcal.data.pose_pool import PosePool
 from flexcal.data.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
-from flexcal.data.signals import assign, standard_columns
+from flexcal.data.signals import assign, standard_columns, timestamp_columns
 from flexcal.data.table import TableFile, open_table, write_table
+from flexcal.data.timestamps import with_seconds
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
@@ -60,7 +61,8 @@ def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
     file = open_table(path)
     texts = tuple(name for name in _TEXTS if name in file.columns)
     signals = assign(file, model, ("pose", "q"), (*_NUMBERS, "xyz", "length"), texts)
-    table = file.read(texts)
+    stamps = timestamp_columns(signals)
+    (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
     q = signals["q"].values(table)
     check_joint_units(model, table, signals["q"], q)
     columns = [signals["q"].column_of(joint) for joint in range(model.n)]
@@ -112,7 +114,8 @@ def _read(path: Path, model: RobotModel) -> PoseSet:
     signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)
     if "sigma" in signals and "sigma_xyz" in signals:
         raise file.error("sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
-    table = file.read(texts)
+    stamps = timestamp_columns(signals)
+    (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
     found = {name: signal.values(table) for name, signal in signals.items()}
     check_joint_units(model, table, signals["q"], found["q"])
     rows = len(table)

@@ -11,9 +11,10 @@ import numpy as np
 from flexcal.data.joint_limits import check_joint_units
 from flexcal.data.recording import Recording, RecordingLabel
 from flexcal.data.sample_times import LATE, MOST_EQUAL
-from flexcal.data.signals import UNITS, Signal, assign, standard_columns
+from flexcal.data.signals import UNITS, Signal, assign, standard_columns, timestamp_columns
 from flexcal.data.table import Table, open_table, write_table
 from flexcal.data.time_base import TimeBase, uniform_blocks
+from flexcal.data.timestamps import with_seconds
 from flexcal.errors import InputError
 from flexcal.model.arm_sensor import sensor_column
 
@@ -52,7 +53,8 @@ def read_recording(
     """
     file = open_table(path)
     signals = assign(file, model, _REQUIRED, (*_OPTIONAL, *_sensor_columns(model)))
-    table = file.read()
+    texts = timestamp_columns(signals)
+    (table,) = with_seconds([file.read(texts)], texts)
     t = signals["t"].values(table)[:, 0]
     _check_time(table, signals["t"], t, None)
     values = _stacked(model, table, signals)
@@ -81,7 +83,8 @@ def read_recording_blocks(
     file = open_table(path)
     signals = assign(file, model, _REQUIRED, (*_OPTIONAL, *_sensor_columns(model)))
     empty = True
-    stamped = _stamped(model, signals, file.blocks((), rows))
+    texts = timestamp_columns(signals)
+    stamped = _stamped(model, signals, with_seconds(file.blocks(texts, rows), texts))
     for base, values in uniform_blocks(stamped, positions=model.n, fill=FILL):
         empty = False
         yield _recording(path, signals, values, base, label, model)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from math import pi
 from pathlib import Path
@@ -37,8 +37,10 @@ _RATE = {"rad/s": 1.0, "deg/s": DEGREE, "rpm": 2 * pi / 60, "m/s": 1.0, "mm/s": 
 _ACCELERATION = {"rad/s^2": 1.0, "deg/s^2": DEGREE, "m/s^2": 1.0, "mm/s^2": MILLIMETRE}
 _TORQUE = {"N m": 1.0, "Nm": 1.0, "N": 1.0, "A": 1.0, "mA": 1e-3}
 _LENGTH = {"m": 1.0, "mm": MILLIMETRE, "um": 1e-6}
+TIMESTAMP = "timestamp"
+"""In the place of a unit of time: texts with date or time of day, which count as seconds from the first."""
 UNITS: dict[str, dict[str, float]] = {
-    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6},
+    "t": {"s": 1.0, "ms": 1e-3, "us": 1e-6, TIMESTAMP: 1.0},
     **dict.fromkeys(("q", "qa", "qax", "qay"), _ANGLE),
     **dict.fromkeys(("dq", "dqa"), _RATE),
     "ddq": _ACCELERATION,
@@ -64,7 +66,8 @@ SENSOR_UNITS: tuple[dict[str, float], ...] = (
 class Signal:
     """SI = matrix · (factor ⊙ columns) + offset for one quantity; (k,) columns become (m,) values.
 
-    `column_of` names the column to blame for value i: its own where there is no matrix, else the first.
+    `column_of` names the column to blame for value i: its own where there is no matrix, else the first. `timestamps`: the columns are
+    texts, which `with_seconds` turns into numbers first.
     """
 
     quantity: str
@@ -72,6 +75,7 @@ class Signal:
     factor: np.ndarray
     matrix: np.ndarray | None
     offset: np.ndarray
+    timestamps: bool = False
 
     def values(self, table: Table) -> np.ndarray:
         """The quantity (N, m) in SI units."""
@@ -109,6 +113,11 @@ def standard_signal(quantity: str, n: int) -> Signal:
     """A quantity that stands in SI units under its own names."""
     columns = standard_columns(quantity, n)
     return Signal(quantity, columns, np.ones(len(columns)), None, np.zeros(len(columns)))
+
+
+def timestamp_columns(signals: Mapping[str, Signal]) -> tuple[str, ...]:
+    """The columns of texts among those of the signals."""
+    return tuple(column for signal in signals.values() if signal.timestamps for column in signal.columns)
 
 
 def mapped_signals(model: RobotModel) -> dict[str, Signal]:
@@ -227,7 +236,7 @@ def _mapped(model: RobotModel, name: str, config: SignalConfig) -> Signal:
         )
     gain = np.ones(k) if config.gain is None else np.array(config.gain)
     offset = np.zeros(m) if config.offset is None else np.array(config.offset) * unit
-    return Signal(name, tuple(config.columns), gain * unit, matrix, offset)
+    return Signal(name, tuple(config.columns), gain * unit, matrix, offset, config.unit == TIMESTAMP)
 
 
 def read_matrix(path: str | Path) -> np.ndarray:

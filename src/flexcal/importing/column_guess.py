@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.data.signals import UNITS, VECTORS
+from flexcal.data.signals import TIMESTAMP, UNITS, VECTORS
 from flexcal.importing.column_names import ColumnName, parse_name
 from flexcal.importing.column_words import NEUTRAL, NO_POINT, POINT, SIGMA, SINGLE, TURN, rank
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.joint_columns import joint_quantities
-from flexcal.importing.placed_columns import TIMESTAMP, PlacedColumns
+from flexcal.importing.placed_columns import PlacedColumns
 from flexcal.importing.rtde_names import rtde_columns
 from flexcal.importing.unit_guess import joint_units, point_unit, pose_time_unit, time_unit
 

@@ -7,9 +7,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from flexcal.data.timestamps import STAMP
 from flexcal.errors import InputError
 from flexcal.importing.column_names import is_unit
-from flexcal.importing.timestamps import STAMP
 
 NUMBER = re.compile(r"[-+]?(\d+([.,]\d*)?|[.,]\d+)([eE][-+]?\d+)?")
 

@@ -10,8 +10,6 @@ import numpy as np
 from flexcal.data.signals import UNITS, Signal, standard_columns
 from flexcal.data.table import Table
 
-TIMESTAMP = "timestamp"
-"""In the place of a unit: the file has texts that were turned into seconds from the first."""
 NUMBERED = ("pose",)
 """Quantities that `signals:` does not map: files have them under their own names."""
 
