@@ -173,6 +173,7 @@ def test_what_robot_yaml_lacks_is_proposed(
         "cutoff_hz": 100,
         "decimation": 100,
         "proposed": [],
+        "cross_validation": None,
         "time_stamps": {},
     }
     robot.write_text(declared.replace(line, "dynamics: {decimation: 100, friction: classic}"))

@@ -80,6 +80,7 @@ class IdentifyDynamics:
     def run(self) -> None:
         """Fit, and print the base parameters and the error of the torques."""
         from flexcal.cli.tables import base_parameter_table, friction_table, learned_table, quantity_table
+        from flexcal.report.dynamics_checks import check_fit
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
         from flexcal.workflow.used_signals import signal_sentences
 
@@ -124,6 +125,8 @@ class IdentifyDynamics:
         console.say(f"friction: {', '.join(found.friction.labels)}")
         error = document["error_percent"]
         console.say(f"relative torque error: {error['train']:.2f} % in the fit")
+        if large := check_fit(error["train"]):
+            console.say(f"warning: {large.answer}")
         if error["held_out"] is not None:
             console.say(f"relative torque error: {error['held_out']:.2f} % on data outside the fit")
         if learned := document["learned_residual"]:

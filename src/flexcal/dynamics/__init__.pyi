@@ -4,6 +4,7 @@ from .bandwidth import MotionBandwidth, motion_bandwidth
 from .base_parameters import BaseParameters
 from .batched_equations import Batch, ExperimentSystem, experiment_system
 from .bearing_spring import BearingSpring
+from .cutoff_choice import CutoffChoice, Piece, choose_cutoff, pieces
 from .didim import direct_and_inverse
 from .drive_play import with_play
 from .drive_spring import DriveSpring, Play
@@ -75,6 +76,7 @@ __all__ = [
     "Column",
     "Coulomb",
     "Coupling",
+    "CutoffChoice",
     "DriveSpring",
     "DriveTerm",
     "EssentialParameters",
@@ -95,6 +97,7 @@ __all__ = [
     "Observation",
     "PayloadEquations",
     "PayloadFit",
+    "Piece",
     "Play",
     "Presliding",
     "RecordedRows",
@@ -116,6 +119,7 @@ __all__ = [
     "Window",
     "attenuation",
     "batches_each",
+    "choose_cutoff",
     "column_errors",
     "direct_and_inverse",
     "drive_gains",
@@ -138,6 +142,7 @@ __all__ = [
     "noisy_logs",
     "observe",
     "ordinary_least_squares",
+    "pieces",
     "power_least_squares",
     "predict_torques",
     "read_learned_residual",

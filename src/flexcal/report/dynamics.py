@@ -13,6 +13,7 @@ from flexcal.report.dynamics_checks import (
     check_base,
     check_bodies,
     check_external,
+    check_fit,
     check_joints,
     check_shown,
     check_unseen,
@@ -136,6 +137,7 @@ def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
     return (
         check_unseen(results["error_percent"], held_out(results)).named("held_out", independent=True),
+        *([fit.named("torques")] if (fit := check_fit(results["error_percent"]["train"])) else []),
         check_joints(results["error_percent"]["per_joint"]).named("joints"),
         check_base(results).named("base_parameters"),
         check_bodies(results["bodiless_links"]).named("bodies"),

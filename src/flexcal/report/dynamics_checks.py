@@ -44,6 +44,19 @@ def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
     return Check(question, answer, "good")
 
 
+def check_fit(train: float) -> Check | None:
+    """Whether the torques of the fit itself are explained, by their relative error in per cent; None where they are."""
+    if train <= LARGE:
+        return None
+    return Check(
+        "Does the model explain the torques that it was fitted to?",
+        f"Their relative error is {significant(train, 3)} %, more than {LARGE:.0f} %: friction or loads that the model lacks, "
+        "noisy torques, or positions that are noise below the cut-off. The spectra of the residuals show the frequencies; "
+        "a lower `cutoff_hz:` and more `decimation:` remove noise.",
+        "bad" if train > TOO_LARGE else "care",
+    )
+
+
 def check_joints(per_joint: Mapping[str, float]) -> Check:
     """Whether the torques of every single joint are predicted."""
     question = "Is every joint predicted?"

@@ -169,10 +169,10 @@ def identify_robot_payload(
         model = model.with_estimate(
             blocks["dynamics"]
         )  # later blocks keep no covariance of links with drives
-    treatment = _slow(treatment_of(model, every, flexible=bool(model.elastic)), model, every)
+    carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
+    treatment = _slow(treatment_of(model, every, flexible=bool(model.elastic), loaded=carries), model, every)
     with scratch_folder() as folder:
         read = read_logs(every, model, treatment, folder, jobs=jobs)
-        carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
         _require_payloads(read, carries)
         require_no_wrenches(read)
         faults = tuple(weight_faults(read, model))

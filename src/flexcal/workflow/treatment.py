@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.data.filtering import Decimation
-from flexcal.dynamics import log_blocks, motion_bandwidth
+from flexcal.dynamics import CutoffChoice, Piece, choose_cutoff, log_blocks, motion_bandwidth, pieces
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
 
@@ -17,24 +17,35 @@ _HIGHEST = 0.4
 """Cut-off over the sampling rate, at most."""
 _REVERSALS = 0.1
 """Cut-off over the sampling rate, at least, where springs are identified."""
+_ROWS = 4.0
+"""Rows a second over a cut-off that is chosen by cross-validation: twice what it passes."""
+_SAMPLES = 40_000
+"""Of all logs, at most, that cross-validation looks at."""
 
 
 @dataclass(frozen=True)
 class Treatment:
-    """Low-pass of the positions, decimation, and whether standstill is masked; `proposed` names what robot.yaml lacks."""
+    """Low-pass of the positions, decimation, and whether standstill is masked; `proposed` names what robot.yaml lacks.
+
+    `choice` is that of a cut-off by cross-validation, None where the spectrum alone tells it.
+    """
 
     cutoff_hz: float
     decimation: Decimation
     mask_standstill: bool
     proposed: tuple[str, ...] = ()
+    choice: CutoffChoice | None = None
 
 
-def treatment_of(model: RobotModel, logs: Sequence[Path], *, flexible: bool = False) -> Treatment:
+def treatment_of(
+    model: RobotModel, logs: Sequence[Path], *, flexible: bool = False, loaded: Sequence[bool] | None = None
+) -> Treatment:
     """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
 
-    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities. For `flexible` drives it is a tenth of the
-    sampling rate, where that is more: a low-pass sees the motor reverse late, as its Coulomb friction brakes it before and after, and what
-    friction then lacks looks like more stiffness. Raises `InputError` where a log that is needed for it shows no motion.
+    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities, unless a lower one predicts the torques of
+    left-out blocks better (`choose_cutoff`); logs differ in load where `loaded` or their column says so. For `flexible` drives it is a
+    tenth of the sampling rate, where that is more: a low-pass sees the motor reverse late, as its Coulomb friction brakes it before and
+    after, and what friction then lacks looks like more stiffness. Raises `InputError` where a log that is needed for it shows no motion.
     """
     declared = model.config.dynamics
     if declared.cutoff_hz is not None and declared.decimation is not None:
@@ -46,12 +57,31 @@ def treatment_of(model: RobotModel, logs: Sequence[Path], *, flexible: bool = Fa
                 f"{log}: the positions show no motion above their noise; record a motion that excites all joints."
             )
     rate = min(motion.rate_hz for motion in found)
-    wanted = min(_PASSED * max(motion.frequency_hz for motion in found), _HIGHEST * rate)
-    cutoff = max(wanted, _REVERSALS * rate) if flexible else wanted
+    wanted = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in found), _HIGHEST * rate)
+    choice = None
+    if flexible:
+        wanted = max(wanted, _REVERSALS * rate)
+    elif declared.cutoff_hz is None:
+        choice = _chosen(model, logs, wanted, loaded)
+        if choice is not None:
+            wanted, rows_hz = choice.cutoff_hz, min(rows_hz, _ROWS * choice.cutoff_hz)
     proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
     return Treatment(
-        float(f"{cutoff:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
-        Decimation.near(rate / wanted) if declared.decimation is None else Decimation(declared.decimation),
+        float(f"{wanted:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
+        Decimation.near(rate / rows_hz) if declared.decimation is None else Decimation(declared.decimation),
         declared.mask_standstill,
         proposed,
+        choice,
     )
+
+
+def _chosen(
+    model: RobotModel, logs: Sequence[Path], proposed_hz: float, loaded: Sequence[bool] | None
+) -> CutoffChoice | None:
+    """By cross-validation within the logs of each load."""
+    loads: dict[tuple[bool, float | None], list[Piece]] = {}
+    for number, log in enumerate(logs):
+        for piece in pieces(log_blocks(log, model), _SAMPLES // len(logs), proposed_hz):
+            load = (bool(loaded and loaded[number]), piece.payload)
+            loads.setdefault(load, []).append(piece)
+    return choose_cutoff(model, list(loads.values()), proposed_hz)
