@@ -42,7 +42,7 @@ def identify_masses(fit: ModalFit, response: LocalResponse, masses: int | None =
     """
     if response.response.shape[2] > 1:
         return AxisMasses(
-            reason="several inputs act at once; name one with --input to fit masses to its axis"
+            reason="several inputs act at once; record an axis with its own drive alone to fit masses to it"
         )
     found = pairs(fit)
     bare = _bare(fit)
