@@ -90,3 +90,13 @@ def test_kalman_filter(log: Log, tmp_path: Path) -> None:
     parameters, torques = coverage(tmp_path, log, "ekf", range(25))
     assert 0.9 <= parameters <= 0.98
     assert 0.9 <= torques <= 0.98
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "noise", [{"position_noise": 3e-5}, {"torque_noise": 0.5, "memory": 1.5}], ids=["positions", "torques"]
+)
+def test_maximum_likelihood(noise: dict[str, float], tmp_path: Path) -> None:
+    parameters, torques = coverage(tmp_path, Log(**PERIODS, **noise), "ml", range(40))
+    assert 0.9 <= parameters <= 0.98
+    assert 0.9 <= torques <= 0.98

@@ -123,6 +123,8 @@ class IdentifyDynamics:
         if document["friction_tried"]:
             console.show(friction_table(document["friction_tried"]))
         console.say(f"friction: {', '.join(found.friction.labels)}")
+        if document["selection_remark"]:
+            console.say(document["selection_remark"])
         error = document["error_percent"]
         console.say(f"relative torque error: {error['train']:.2f} % in the fit")
         if large := check_fit(error["train"]):

@@ -218,8 +218,10 @@ def friction_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     table = Table(title="friction terms tried", title_justify="left")
     table.add_column("beyond the classic ones")
     table.add_column("cross-validation, %", justify="right")
+    table.add_column("p-value of the last", justify="right")
     for row in best.values():
-        table.add_row(", ".join(row["terms"]) or "none", f"{row['cross_validation_percent']:.2f}")
+        p_value = "" if row["p_value"] is None else f"{row['p_value']:.2g}"
+        table.add_row(", ".join(row["terms"]) or "none", f"{row['cross_validation_percent']:.2f}", p_value)
     return table
 
 

@@ -1,9 +1,11 @@
-"""Selection of friction terms: forward selection by cross-validation."""
+"""Selection of friction terms: forward selection by cross-validation and significance."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+
+import numpy as np
 
 from flexcal.dynamics.cross_validation import Fold, prediction_errors
 from flexcal.dynamics.drive_terms import Column, DriveTerm, Memory
@@ -13,6 +15,8 @@ from flexcal.model import RobotModel
 
 _WORTH = 0.01
 """A term is worth its parameters if the error falls by this share of itself."""
+_LEVEL = 0.05
+"""Probability, at most, that noise alone makes any of the candidates as significant as the one that is taken."""
 
 
 @dataclass(frozen=True)
@@ -40,10 +44,14 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Trial:
-    """A set of friction terms beyond the classic ones, and its cross-validation error ‖Y - W χ‖ / ‖Y‖."""
+    """A set of friction terms beyond the classic ones, and its cross-validation error ‖Y - W χ‖ / ‖Y‖.
+
+    `p_value` is that of the last of the terms, times the number of candidates; None where the error alone decided.
+    """
 
     terms: tuple[str, ...]
     error: float
+    p_value: float | None = None
 
 
 @dataclass(frozen=True)
@@ -53,24 +61,53 @@ class FrictionChoice:
     chosen: tuple[Candidate, ...]
     trials: tuple[Trial, ...]
 
+    @property
+    def rivals(self) -> tuple[tuple[str, ...], ...]:
+        """Other terms, by their labels, that predict as well: as many with an error larger by less than a hundredth, or with a smaller
+        error and a last one that is not significant."""
+        labels = tuple(candidate.label for candidate in self.chosen)
+        (error,) = (trial.error for trial in self.trials if trial.terms == labels)
+        return tuple(
+            trial.terms
+            for trial in self.trials
+            if set(trial.terms) != set(labels)
+            and (
+                (len(trial.terms) == len(labels) and trial.error <= (1 + _WORTH) * error)
+                or (trial.p_value is not None and trial.p_value > _LEVEL and trial.error < error)
+            )
+        )
+
 
 def forward_selection(
-    folds: Sequence[Fold], plain: Sequence[int], groups: Mapping[Candidate, Sequence[int]]
+    folds: Sequence[Fold],
+    plain: Sequence[int],
+    groups: Mapping[Candidate, Sequence[int]],
+    p_value: Callable[[Sequence[int], Sequence[int]], float],
 ) -> FrictionChoice:
-    """Adds the candidate that lowers the error most, one term after the other, while it falls by a hundredth of itself.
+    """Adds the significant candidate that lowers the error most, one term after the other, while it falls by a hundredth of itself.
 
-    `plain` are the numbers of the columns that are always in, `groups` those of each candidate.
+    `plain` are the numbers of the columns that are always in, `groups` those of each candidate. `p_value` is that of the columns of a
+    candidate beside those of the terms before it; times the number of candidates it must be 0.05 at most (Bonferroni). Cross-validation
+    alone takes a false term in up to a half of recordings whose noise remembers itself.
     """
     chosen: list[Candidate] = []
     (error,) = prediction_errors(folds, plain, [[]])
     trials = [Trial((), error)]
     while left := [c for c in groups if c.name not in {taken.name for taken in chosen}]:
-        found, tried = _best(folds, plain, groups, chosen, left)
+        before = [number for candidate in chosen for number in groups[candidate]]
+        _, tried = _best(folds, plain, groups, chosen, left)
+        taken = None
+        for number in np.argsort([t.error for t in tried]):
+            if taken is not None or tried[number].error > (1 - _WORTH) * error:
+                break
+            probability = min(1.0, len(groups) * p_value(before, groups[left[number]]))
+            tried[number] = replace(tried[number], p_value=probability)
+            taken = number if probability <= _LEVEL else None
         trials += tried
-        if min(t.error for t in tried) > (1 - _WORTH) * error:
+        if taken is None:
             break
-        chosen.append(found)
-        error = min(t.error for t in tried)
+        chosen.append(left[taken])
+        error = tried[taken].error
     return FrictionChoice(tuple(chosen), tuple(trials))
 
 

@@ -89,27 +89,77 @@ class WarmUp(_PerMotor):
     key = "warm_up"
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
-        begun, _ = memory.setdefault("begun", (motion.time[0], 0.0))
-        return axis.of(motion.dq) * np.exp(-(motion.time - begun) / self.time)
+        return axis.of(motion.dq) * _cold(motion, self.time, memory)
 
 
-@dataclass(frozen=True, eq=False)
-class LoadCoulomb:
-    """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears.
+@dataclass(frozen=True)
+class CoulombWarmUp(_PerMotor):
+    """`<joint>.coulomb_warm_up` · sign(ṡ) exp(-t/τ), with `time` τ, s: as `WarmUp`, of Coulomb friction."""
 
-    The load is what the links alone ask of the joint, by `inertials` (10 n,) as a fit without this term found them: the measured
-    torque would put the noise of Y into W, and the answer into a prediction.
+    time: float
+    key = "coulomb_warm_up"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        return np.sign(axis.of(motion.dq)) * _cold(motion, self.time, memory)
+
+
+@dataclass(frozen=True)
+class Cables:
+    """`<joint>.cable_stiffness` · q: cables and hoses along the arm; where they are at rest is part of the torque offset."""
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        for i, name in enumerate(model.joint_names):
+            yield Column(f"{name}.cable_stiffness", i, motion.q[:, i])
+
+
+class _PerLoad:
+    """One parameter a motor, of what the links alone ask of its joint.
+
+    That is by `inertials` (10 n,) as a fit without this term found them: the measured torque would put the noise of Y into W, and the
+    answer into a prediction.
     """
 
     inertials: np.ndarray
+    key: ClassVar[str]
+
+    def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
+        raise NotImplementedError
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
-        load = torque_regressor(model, motion.q, motion.dq, motion.ddq) @ self.inertials
-        load = np.abs(load if motion.external is None else load - motion.external)
+        load = np.abs(torque_regressor(model, motion.q, motion.dq, motion.ddq) @ self.inertials)
         for axis in motor_axes(model):
-            torque = load[:, axis.joint] * np.sign(axis.of(motion.dq))
+            torque = load[:, axis.joint] * self.share(axis.of(motion.dq), axis)
             for joint, ratio in axis.shares:
-                yield Column(f"{axis.name}.load_coulomb", joint, ratio * torque)
+                yield Column(f"{axis.name}.{self.key}", joint, ratio * torque)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCoulomb(_PerLoad):
+    """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears."""
+
+    inertials: np.ndarray
+    key = "load_coulomb"
+
+    def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
+        return np.sign(speed)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadStribeck(_PerLoad):
+    """`<joint>.load_stribeck` · |load| sign(ṡ) exp(-(ṡ/v)²), with `velocities` v as `Stribeck` (Bittencourt & Gunnarsson 2012)."""
+
+    inertials: np.ndarray
+    velocities: tuple[float, ...]
+    key = "load_stribeck"
+
+    def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
+        return np.sign(speed) * np.exp(-((speed / self.velocities[axis.joint]) ** 2))
+
+
+def _cold(motion: Motion, time: float, memory: Memory) -> np.ndarray:
+    """exp(-t/τ) from the start of the recording."""
+    begun, _ = memory.setdefault("begun", (motion.time[0], 0.0))
+    return np.exp(-(motion.time - begun) / time)
 
 
 def dahl(position: np.ndarray, travel: float, start: float) -> np.ndarray:

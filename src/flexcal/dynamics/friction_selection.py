@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from flexcal.data.filtering import Decimation
@@ -12,12 +12,15 @@ from flexcal.dynamics.cross_validation import folds
 from flexcal.dynamics.drive_terms import CLASSIC, DriveTerm
 from flexcal.dynamics.friction_choice import (
     Candidate,
+    FrictionChoice,
     Trial,
     best_shapes,
     candidate_columns,
     forward_selection,
 )
+from flexcal.dynamics.friction_significance import WideFit
 from flexcal.dynamics.friction_terms import LIBRARY, Scale, plain_terms, variants
+from flexcal.dynamics.model_spread import ModelSpread
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.wls import weighted_least_squares
@@ -27,14 +30,18 @@ from flexcal.model.regressor import INERTIAL
 _CLASSIC = ("viscous", "coulomb", "torque_offset")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FrictionSelection:
-    """All `terms` of the drives, the `names` of the friction terms among them, and the trials of the selection."""
+    """All `terms` of the drives, the `names` of the friction terms among them, the trials of the selection.
+
+    `spread` is that between the chosen terms and others that predict as well, None without such.
+    """
 
     terms: tuple[DriveTerm, ...]
     names: tuple[str, ...]
     chosen: tuple[Candidate, ...]
     trials: tuple[Trial, ...]
+    spread: ModelSpread | None = None
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -49,7 +56,7 @@ def select_friction(
     equations: Callable[[Observation], Sequence[ExperimentSystem]],
     decimation: Decimation,
 ) -> FrictionSelection:
-    """The terms that `friction` names; the shapes of those of the library, and with "auto" which of them, by cross-validation.
+    """The terms that `friction` names; the shapes of those of the library, and with "auto" which, by cross-validation and significance.
 
     `equations` gives those of the fit for any observation, after `decimation`; nothing else is looked at. Raises `FlexcalError` for an
     unknown term, and as `weighted_least_squares` does.
@@ -68,8 +75,9 @@ def select_friction(
     reach = -(-2 * decimation.support // decimation.factor)
     blocks = folds(systems, wide.members, len(wide.names), fixed, reach)
     groups = {candidate: candidate_columns(wide, candidate) for candidate in candidates}
+    fit = WideFit(wide, systems, fixed)
     choice = (
-        forward_selection(blocks, fixed, groups)
+        forward_selection(blocks, fixed, groups, fit.p_value)
         if friction == "auto"
         else best_shapes(blocks, fixed, groups, library)
     )
@@ -79,7 +87,14 @@ def select_friction(
         (*(name for name in names if name not in library), *taken),
         choice.chosen,
         choice.trials,
+        _spread(fit, choice, groups) if choice.rivals else None,
     )
+
+
+def _spread(fit: WideFit, choice: FrictionChoice, groups: Mapping[Candidate, Sequence[int]]) -> ModelSpread:
+    of = {candidate.label: numbers for candidate, numbers in groups.items()}
+    sets = [[c.label for c in choice.chosen], *choice.rivals]
+    return ModelSpread.of([fit.estimate([n for label in labels for n in of[label]]) for labels in sets])
 
 
 def _scale(model: RobotModel, equations: Callable[[Observation], Sequence[ExperimentSystem]]) -> Scale:

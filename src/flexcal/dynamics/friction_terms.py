@@ -21,7 +21,10 @@ from flexcal.dynamics.drive_terms import (
 from flexcal.dynamics.friction_choice import Candidate
 from flexcal.dynamics.friction_library import (
     AsymmetricCoulomb,
+    Cables,
+    CoulombWarmUp,
     LoadCoulomb,
+    LoadStribeck,
     Presliding,
     Stribeck,
     SublinearViscous,
@@ -37,13 +40,24 @@ _PLAIN: dict[str, DriveTerm] = {
     "torque_offset": TorqueOffset(),
     "asymmetric_coulomb": AsymmetricCoulomb(),
 }
-LIBRARY = ("sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_up")
+LIBRARY = (
+    "sublinear_viscous",
+    "load_coulomb",
+    "load_stribeck",
+    "stribeck",
+    "presliding",
+    "warm_up",
+    "coulomb_warm_up",
+    "cable_stiffness",
+)
 """What is tried beyond the classic terms; an asymmetric Coulomb friction is not, as it is a torque offset."""
 FRICTION_TERMS = (*_PLAIN, *LIBRARY)
 
 _SHARES_OF_SPEED = (0.01, 0.03, 0.1, 0.3, 1.0)
+_SHARES_OF_SPEED_LOADED = (0.3, 1.0, 3.0)
 _SHARES_OF_STROKE = (0.001, 0.003, 0.01, 0.03, 0.1)
-_SHARES_OF_DURATION = (0.1, 0.2, 0.4, 0.8)
+_SHARES_OF_DURATION = (0.05, 0.1, 0.2, 1 / 3)
+"""A time constant near the length of a recording is drift by another name: it says nothing about other recordings."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -103,9 +117,21 @@ def variants(name: str, scale: Scale) -> tuple[Candidate, ...]:
                 Candidate(name, f"{share:g} of the stroke", Presliding(tuple(share * scale.stroke)))
                 for share in _SHARES_OF_STROKE
             )
+        case "load_stribeck":
+            return tuple(
+                Candidate(
+                    name,
+                    f"{share:g} of the speed",
+                    LoadStribeck(scale.inertials, tuple(share * scale.speed)),
+                )
+                for share in _SHARES_OF_SPEED_LOADED
+            )
+        case "cable_stiffness":
+            return (Candidate(name, "", Cables()),)
         case _:
+            warming = WarmUp if name == "warm_up" else CoulombWarmUp
             times = [share * scale.duration for share in _SHARES_OF_DURATION]
-            return tuple(Candidate(name, f"{time:.3g} s", WarmUp(time)) for time in times)
+            return tuple(Candidate(name, f"{time:.3g} s", warming(time)) for time in times)
 
 
 def plain_terms(friction: tuple[str, ...]) -> tuple[DriveTerm, ...]:

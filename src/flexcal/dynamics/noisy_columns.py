@@ -16,7 +16,15 @@ from flexcal.dynamics.rows import Experiment, Rows, rows
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 
-_EXACT = ("coulomb", "load_coulomb", "stribeck", "presliding", "torque_offset")
+_EXACT = (
+    "coulomb",
+    "load_coulomb",
+    "load_stribeck",
+    "stribeck",
+    "presliding",
+    "coulomb_warm_up",
+    "torque_offset",
+)
 """What names of columns begin with that are constants or signs of a velocity: these have no errors but at a reversal."""
 _ORDER = 4
 _GAIN = 70.0

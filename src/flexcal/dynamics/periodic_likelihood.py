@@ -21,6 +21,8 @@ from flexcal.estimation import Estimate
 
 _REACH = 5
 """Neighbouring lines on either side that the noise of a line is read from."""
+_CORNERS = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0, np.inf)
+"""Lines at which the power of first-order noise has fallen by half; the last is white."""
 _SMALLEST = 1e-9
 """Noise of torques that are fitted exactly, relative to them."""
 _SETTLED = 1e-2
@@ -97,15 +99,32 @@ def _scatter(
 ) -> np.ndarray:
     """Covariance (2 K + 1, n, n) of the mean of τ − W χ over the periods, smooth over the lines."""
     memory: Memory = {}
-    residuals = np.array([_rows(_missed(observation, p, parameters, memory), factor) for p in motion.periods])
+    residuals = np.array([_rows(_missed(observation, p, parameters, memory), factor) for p in motion.smooth])
     count = len(residuals)
     apart = residuals - residuals.mean(axis=0)
-    products = np.einsum("tli,tlj->lij", apart, apart)
-    above = np.arange(1, len(products) // 2 + 1)
+    above = np.arange(1, apart.shape[1] // 2 + 1)
     lines = np.concatenate([[0], above, above])
+    shape = _shapes(np.sum(apart**2, axis=0), lines)
+    scaled = apart / shape
+    products = np.einsum("tli,tlj->lij", scaled, scaled)
     near = (np.abs(lines[:, None] - lines) <= _REACH).astype(float)
     pooled = np.einsum("lk,kij->lij", near, products) / near.sum(axis=1)[:, None, None]
-    return pooled / (count * (count - 1))
+    return pooled * shape[:, :, None] * shape[:, None, :] / (count * (count - 1))
+
+
+def _shapes(squares: np.ndarray, lines: np.ndarray) -> np.ndarray:
+    """Amplitude (2 K + 1, n) of first-order noise that fits the lowest lines of `squares` (2 K + 1, n) best.
+
+    Noise with a memory has far more power in the lowest lines than in those that they are pooled with.
+    """
+    lowest = lines <= 2 * _REACH
+    tried = np.array([1.0 / (1.0 + (lines / corner) ** 2) for corner in _CORNERS])
+    floor = np.finfo(float).tiny
+    levels = np.log(
+        np.maximum(np.array([(squares / own[:, None])[lowest].mean(axis=0) for own in tried]), floor)
+    )
+    cost = levels * np.sum(lowest) + np.log(tried)[:, lowest].sum(axis=1)[:, None]
+    return np.sqrt(tried[np.argmin(cost, axis=0)].T)
 
 
 def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, memory: Memory) -> np.ndarray:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -30,15 +31,28 @@ class RepeatedMotion:
 
     @property
     def mean(self) -> Motion:
-        """Average of all periods, time included; of positions and their derivatives the lines that stand out of the scatter between them.
-
-        What the other lines hold is noise, of which high derivatives have much, and it would bend the parameters.
-        """
+        """Average of all `smooth` periods, time included."""
         time, q, dq, ddq, torque = (
-            np.array([getattr(p, name) for p in self.periods]) for name in ("time", "q", "dq", "ddq", "net")
+            np.array([getattr(p, name) for p in self.smooth]).mean(axis=0)
+            for name in ("time", "q", "dq", "ddq", "torque")
         )
-        moved = (_standing_out(periods) for periods in (q, dq, ddq))
-        return Motion(time.mean(axis=0), *moved, torque=torque.mean(axis=0))
+        return Motion(time, q, dq, ddq, torque)
+
+    @cached_property
+    def smooth(self) -> tuple[Motion, ...]:
+        """The periods, of their positions those lines that stand out of the scatter between them; the torques are as they are.
+
+        What the other lines hold is noise, of which high derivatives have much, and it would bend the parameters. Derivatives are those of
+        the lines: differences of samples would make accelerations too small, by (ωh)²/3.
+        """
+        q = np.array([period.q for period in self.periods])
+        size, time = q.shape[1], self.periods[0].time
+        lines = np.fft.rfft(q, axis=1) * _standing_out(q)
+        omega = 2j * np.pi * np.fft.rfftfreq(size, (time[-1] - time[0]) / (size - 1))[:, None]
+        moved = zip(*(np.fft.irfft(lines * omega**order, n=size, axis=1) for order in range(3)), strict=True)
+        return tuple(
+            Motion(p.time, *states, torque=p.net) for p, states in zip(self.periods, moved, strict=True)
+        )
 
     @classmethod
     def of(cls, experiment: Experiment, window: Window) -> RepeatedMotion:
@@ -75,13 +89,13 @@ def _moving(whole: Motion, window: Window, slowest: np.ndarray) -> Motion:
 
 
 def _standing_out(periods: np.ndarray) -> np.ndarray:
-    """Average (N, n) of (P, N, n), of those lines that noise alone would not make as large."""
+    """Which lines (N/2 + 1, n) of the average of (P, N, n) noise alone would not make as large."""
     lines = np.fft.rfft(periods, axis=1)
     mean, freedom = lines.mean(axis=0), len(lines) - 1
     variance = np.sum(np.abs(lines - mean) ** 2, axis=0) / (freedom * len(lines))
     seen = np.abs(mean) ** 2 > _STANDS_OUT * variance
     seen[0] = True
-    return np.fft.irfft(np.where(seen, mean, 0.0), n=periods.shape[1], axis=0)
+    return seen
 
 
 def _period(q: np.ndarray) -> int:

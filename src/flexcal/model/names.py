@@ -10,7 +10,10 @@ if TYPE_CHECKING:
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
 SPRINGS = ("bearing_x", "bearing_y", "drive")
 LATERAL = ("gravity_compliance_1", "gravity_compliance_2")
-FRICTION = ("coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "stribeck", "presliding", "warm_up")
+FRICTION = (
+    "coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "load_stribeck", "stribeck", "presliding", "warm_up", "coulomb_warm_up",
+    "cable_stiffness",
+)  # fmt: skip
 PARALLEL = ("spring_stiffness", "spring_torque", "cable_torque")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 INERTIALS = ("mass", "com_x", "com_y", "com_z")
@@ -29,7 +32,7 @@ _UNITS = {
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
-    "warm_up": "N m s/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
+    "warm_up": "N m s/rad", "coulomb_warm_up": "N m", "cable_stiffness": "N m/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
     "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad",
 }  # fmt: skip
 

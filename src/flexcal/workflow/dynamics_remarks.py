@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flexcal.dynamics import RegressionData, attenuation
+from flexcal.dynamics import FrictionSelection, RegressionData, attenuation
 from flexcal.estimation import Estimate
 from flexcal.model.regressor import INERTIAL
 from flexcal.workflow.estimators import EstimatorName
@@ -41,6 +41,23 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: Estima
             where = "in any recording" if name not in structural else "in these recordings"
             remarks.append(f"{name} is not identifiable beside {heirs} {where}")
     return (*remarks, *_attenuated(data, estimate))
+
+
+def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:
+    """What other friction terms that predict as well do to the standard deviations; None without such."""
+    if friction.spread is None:
+        return None
+    growth = friction.spread.growth(estimate)
+    name, factor = max(growth.items(), key=lambda item: item[1])
+    others = len(friction.spread.deviations) - 1
+    others = len(friction.spread.deviations) - 1
+    sets = "1 other set of friction terms or shapes predicts"
+    if others > 1:
+        sets = f"{others} other sets of friction terms or shapes predict"
+    return (
+        f"{sets} the torques about as well; the differences are included in the standard deviations, which are up to {factor:.2g} times as "
+        f"large for it ({name})"
+    )
 
 
 def _by_joint(names: tuple[str, ...]) -> dict[str, list[str]]:

@@ -107,6 +107,9 @@ def identify_robot_dynamics(
             held_out = RegressionData.of(observation, base, divided.unseen_equations(observation))
         rows = divided.rows(observation, base)
         estimate = ESTIMATORS[estimator](train, rows)
+        essential = essential_parameters(train, estimate)
+        if friction.spread is not None:
+            estimate = friction.spread.widened(estimate)
         external = None
         if model.force_sensor is not None:
             wide = replace(observation, terms=(*observation.terms, ExternalExcess()))
@@ -133,7 +136,7 @@ def identify_robot_dynamics(
             held_out=held_out,
             hold_out=hold_out,
             validated=tuple(validate),
-            essential=essential_parameters(train, estimate),
+            essential=essential,
             friction=friction,
             motors=observation.motors,
             treatment=treatment,

@@ -14,7 +14,7 @@ from flexcal.model.names import torque_units
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.report.dynamics import dynamics_checks
 from flexcal.report.trust import Trust
-from flexcal.workflow.dynamics_remarks import dynamics_remarks
+from flexcal.workflow.dynamics_remarks import dynamics_remarks, selection_remark
 from flexcal.workflow.estimators import EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
 from flexcal.workflow.results import dropped_parameters, quantities
@@ -97,11 +97,12 @@ class RobotDynamics:
             "friction_terms": list(self.friction.names),
             "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
             "friction_tried": [
-                {"terms": list(t.terms), "cross_validation_percent": 100 * t.error}
+                {"terms": list(t.terms), "cross_validation_percent": 100 * t.error, "p_value": t.p_value}
                 for t in self.friction.trials
             ],
             "weight_faults": list(self.weight_faults),
             "external_share": None if self.external is None else asdict(self.external),
+            "selection_remark": selection_remark(self.friction, self.estimate),
             "remarks": list(dynamics_remarks(self.train, self.estimate, self.estimator)),
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
