@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from flexcal.units import LARGEST
+
 if TYPE_CHECKING:
     from flexcal.model import RobotModel
 
@@ -43,8 +45,10 @@ def _widest(model: RobotModel, prismatic: bool) -> float:
 
 def point_unit(model: RobotModel, xyz: np.ndarray) -> str:
     """The unit of points (N, 3): metres where they fit into a few times the reach, else millimetres or micrometres."""
-    with np.errstate(over="ignore"):  # what no point can be is refused later
-        distance = np.linalg.norm(xyz - np.nanmedian(xyz, axis=0), axis=1)
+    xyz = xyz[(np.abs(xyz) <= LARGEST).all(axis=1)]  # what no point can be is refused later
+    if not len(xyz):
+        return "m"
+    distance = np.linalg.norm(xyz - np.median(xyz, axis=0), axis=1)
     spread = float(np.nanquantile(distance, _NEARLY_ALL))
     for unit, factor in (("m", 1.0), ("mm", 1e-3)):
         if spread * factor <= _LARGEST * max(model.reach, 0.1):
