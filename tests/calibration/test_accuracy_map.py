@@ -60,7 +60,7 @@ def uncertain(model: RobotModel, rng: np.random.Generator, kinds: tuple[str, ...
             continue
         names.append(name)
     parameters = Parameters(
-        Parameter(n, unit_of(n), model.value(n), scale="log" if n.endswith("stiffness") else "linear")
+        Parameter(n, unit_of(n), model.value(n), scale="log" if n.endswith(".stiffness") else "linear")
         for n in names
     )
     mixed = np.eye(len(names)) + 0.1 * rng.standard_normal((len(names), len(names)))

@@ -43,7 +43,7 @@ def test_a_target_on_the_last_axis_loses_two_more(tx90l: RobotModel, simulate: C
 def test_noiseless_recovery(simulate: Callable, tx90l: RobotModel) -> None:
     """With the true elasticity, exact points are met to 1 µm, a thirtieth of σ, and the kept parameters are the regrouped truth."""
     simulated = simulate(2, 80, noise=False)
-    elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith("stiffness")}
+    elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith(".stiffness")}
     fit = calibrate(tx90l.with_values(elastic), simulated.poses)
     assert fit.errors.max < 1e-6
     expected = fit.estimate.regrouped(simulated.truth)
@@ -82,7 +82,7 @@ def test_a_robust_loss_cannot_weigh_poses_tied_by_marginalised_springs(
 
 def stage_one(model: RobotModel, std: float, correlation: float = 0.0) -> Estimate:
     """An identification that found every spring where `model` has it, to a relative `std`, the springs correlated alike."""
-    names = [n for n in model.values if n.endswith("stiffness")]
+    names = [n for n in model.values if n.endswith(".stiffness")]
     parameters = Parameters(Parameter(n, "N m/rad", model.value(n), scale="log") for n in names)
     covariance = std**2 * ((1 - correlation) * np.eye(len(names)) + correlation)
     good = (True,) * len(names)
@@ -97,7 +97,7 @@ def test_the_posterior_of_the_model_is_the_prior_of_the_springs(
     informed = tx90l.with_estimate(stage_one(tx90l, 0.01, correlation=0.5))
     bare, known = ElasticPrior.of(tx90l, poses), ElasticPrior.of(informed, poses)
     assert known.parameters.names == bare.parameters.names
-    springs = [k for k, n in enumerate(known.parameters.names) if n.endswith("stiffness")]
+    springs = [k for k, n in enumerate(known.parameters.names) if n.endswith(".stiffness")]
     block = known.covariance[np.ix_(springs, springs)]
     np.testing.assert_allclose(block, 0.01**2 * (0.5 * np.eye(9) + 0.5))
     others = np.setdiff1d(np.arange(len(bare.parameters)), springs)
@@ -223,7 +223,7 @@ def test_a_stiffer_secant_is_found(simulate: Callable, tx90l: RobotModel) -> Non
     truth = simulate(11, 80).truth
     simulated = simulate(11, 80)
     drives = [f"joint_{i}.drive.stiffness" for i in (1, 2, 3)]
-    tangent = {n: v for n, v in truth.items() if n.endswith("stiffness") or n.startswith("link_")}
+    tangent = {n: v for n, v in truth.items() if n.endswith(".stiffness") or n.startswith("link_")}
     tangent |= {name: truth[name] * 1.08 for name in drives}
     start = tx90l.with_values(tangent)
     precise = replace(start.config, prior=replace(start.config.prior, mass=1e-3, com=1e-4))
@@ -307,7 +307,7 @@ def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: 
 
 def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, tx90l: RobotModel) -> None:
     simulated, name = simulate(4, 60), "joint_2.drive.stiffness"
-    elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith("stiffness")}
+    elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith(".stiffness")}
     sure = replace(tx90l.config, prior=replace(tx90l.config.prior, mass=1e-3, com=1e-4))
     known = replace(tx90l, config=sure).with_values(elastic)
     stiffer = known.with_values({name: 1.5 * known.value(name)})

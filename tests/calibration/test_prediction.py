@@ -40,7 +40,7 @@ def slope(model: RobotModel, poses, name: str, step: float, flank: np.ndarray) -
         (("gravity_compliance_1", "gravity_compliance_2"), 1e-8, 1e-5),
         (("com_x", "com_y", "com_z"), 1e-4, 1e-6),
         (("mass",), 1e-3, 1e-6),
-        (("stiffness",), 10.0, 1e-5),
+        ((".stiffness",), 10.0, 1e-5),
     ],
 )
 def test_every_column(simulate: Callable, suffixes: tuple, step: float, relative: float) -> None:

@@ -15,6 +15,8 @@ from flexcal.cell.config import FrictionConfig, MismatchConfig
 from flexcal.data import PosePlan
 from flexcal.errors import InputError
 from flexcal.model import RobotModel
+from flexcal.model.arm_sensor import ArmSensor
+from flexcal.model.config import ArmSensorConfig
 from flexcal.workflow.frequency_plans import frequency_plan
 from flexcal.yaml_reader import read_yaml
 
@@ -24,6 +26,13 @@ BASE = CellConfig(
     friction=FrictionConfig(stribeck=0.3),
     mismatch=MismatchConfig(hysteresis=1e-5, temperature_drift=1e-4),
 )
+_AXIS = np.array([1.0, 0.0, 0.0])
+_DECLARED = ArmSensorConfig(frame="flange", xyz=(0.0, 0.0, 0.0), direction=(1.0, 0.0, 0.0))
+SENSORS = {
+    name: ArmSensor(name, 5, 0.1 * _AXIS, _AXIS, order == 2, order, _DECLARED)
+    for order, name in enumerate(("probe", "beam", "hand"))
+}
+"""One of each kind: displacement, velocity, acceleration."""
 
 
 def options(config: Any, above: tuple[str, ...] = ()) -> Iterator[tuple[str, ...]]:
@@ -50,6 +59,7 @@ def changed(config: Any, path: tuple[str, ...]) -> Any:
 def outcome(model: RobotModel, config: CellConfig) -> bytes:
     """All that the cell lets out of a truth that it draws."""
     truth = draw_truth(model, config.spread, np.random.default_rng(0))
+    model = replace(model, sensors=SENSORS)
     cell = VirtualCell(model.with_values(truth), config, 1, controller_model=model, threads=1)
     file = model.path.parent / "frequency_poses.csv"
     short = {"base_frequency_hz": 4.0, "lines": np.array([1, 3, 5]), "amplitude": np.full((3, 3), 20.0)}
@@ -58,7 +68,16 @@ def outcome(model: RobotModel, config: CellConfig) -> bytes:
     plan = replace(plan, poses=plan.poses[:1])
     recording = next(iter(cell.record(plan)))
     poses = cell.measure(PosePlan(q=plan.poses + np.array([[0.0], [0.3], [-0.4]]), seed=2))
-    seen = [recording.q, recording.torque, recording.arm, poses.q, poses.position, poses.sigma, poses.torque]
+    seen = [
+        recording.q,
+        recording.torque,
+        recording.arm,
+        recording.sensed,
+        poses.q,
+        poses.position,
+        poses.sigma,
+        poses.torque,
+    ]
     return repr(truth).encode() + b"".join(x.tobytes() for x in (*seen, poses.temperature) if x is not None)
 
 

@@ -263,7 +263,7 @@ def test_nominal_springs_are_said_to_be_nominal(run, tx90l_folder: Path, elastic
     remark = "the stiffness was not identified: the nominal one of robot.yaml is used with a standard deviation of 30%"
     assert remark in run("calibrate", robot, elastic_poses).out
     model = RobotModel.from_yaml(robot, estimates=False)
-    springs = [n for n in model.values if n.endswith("stiffness")]
+    springs = [n for n in model.values if n.endswith(".stiffness")]
     parameters = Parameters(Parameter(n, "N m/rad", model.value(n), scale="log") for n in springs)
     found = Estimate(parameters, 1e-4 * np.eye(9), 9, (), (True,) * 9, 0.0, 0.0, 0, "converged", "", 0)
     estimates.unlink()
@@ -278,7 +278,7 @@ def test_a_secant_scale_frees_the_drives_from_what_stage_one_said(
     robot, estimates = tx90l_folder / "robot.yaml", tx90l_folder / "estimates.yaml"
     model = RobotModel.from_yaml(robot, estimates=False)
     drives = [f"joint_{i}.drive.stiffness" for i in (1, 2, 3)]
-    springs = [n for n in model.values if n.endswith("stiffness")]
+    springs = [n for n in model.values if n.endswith(".stiffness")]
     tangent = {n: model.value(n) * (1.08 if n in drives else 1.0) for n in springs}
     parameters = Parameters(Parameter(n, "N m/rad", tangent[n], scale="log") for n in springs)
     found = Estimate(parameters, 1e-4 * np.eye(9), 9, (), (True,) * 9, 0.0, 0.0, 0, "converged", "", 0)

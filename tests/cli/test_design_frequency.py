@@ -35,7 +35,7 @@ def test_a_designed_plan_says_what_it_will_tell(run, tx90l_folder):
     predicted = document["predicted_std"]
     assert len(predicted) == 18 and predicted == document["predicted_std_flat"]
     largest = document["largest_stiffness_std"]
-    assert largest["std"] == max(std for name, std in predicted.items() if name.endswith("stiffness"))
+    assert largest["std"] == max(std for name, std in predicted.items() if name.endswith(".stiffness"))
     assert [row["poses"] for row in document["curve"]] == [1, 2, 3, 4, 5, 6]
     page = out.with_suffix(".html").read_text(encoding="utf-8")
     assert "Number of poses" in page and "Amplitude spectrum" in page

@@ -283,7 +283,7 @@ def alter_log(folder: Path, change: Callable[[pl.DataFrame], pl.DataFrame]) -> N
 LOGS = {
     "gap": (lambda f: pl.concat([f[:700], f[760:]]), ["gap of 0.061 s", "row 701"]),
     "time runs backwards": (lambda f: pl.concat([f[:700], f[600:]]), ["runs backwards", "row 701"]),
-    "time stands still": (lambda f: pl.concat([f[:700], f[699:]]), ["stands still", "row 701"]),
+    "time stands still": (lambda f: pl.concat([f[:700], *[f[699:700]] * 9, f[700:]]), ["stands still"]),
     "no time": (lambda f: f.drop("t"), ["'t'", "missing"]),
     "no torque": (lambda f: f.drop("tau2"), ["tau"]),
     "five joints": (lambda f: f.drop("q6"), ["5", "6 joints"]),

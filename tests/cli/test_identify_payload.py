@@ -1,19 +1,24 @@
 """`flexcal identify payload`: what the robot holds, what uses it afterwards, and what is refused."""
 
+from __future__ import annotations
+
 import json
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 import pytest
-from conftest import Run
 from two_links import GAINS, HELD, swings, two_links
 
 from flexcal.dynamics import CLASSIC, Observation
 from flexcal.errors import InputError
 from flexcal.estimates_file import read_estimates
 from flexcal.model import RobotModel, gravity_torque
+
+if TYPE_CHECKING:
+    from conftest import Run
 
 ROBOT = "dynamics: {cutoff_hz: 20, decimation: 1, friction: classic}\n"
 DECLARED = "payload: {frame: lower, mass: 3.0, com: [0.3, 0.07, 0], mass_std: 0.05}\n"

@@ -78,7 +78,7 @@ def test_what_is_said_leads_on(
     assert main(words) == 0
     out = tmp_path / "inertials"
     assert main(["identify", "inertials", str(robot), str(tmp_path / "exciting"), "--out", str(out)]) == 0
-    line = capsys.readouterr().out.partition("write '")[2].partition("'")[0]
+    line = capsys.readouterr().out.partition("add the line '")[2].partition("'")[0]
     (recorded / "elsewhere.yaml").write_text(f"{robot.read_text()}\n{line}\n")
     found = read_estimates(out / "estimates.yaml")["dynamics"]
     model = RobotModel.from_yaml(recorded / "elsewhere.yaml")

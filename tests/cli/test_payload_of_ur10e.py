@@ -1,11 +1,16 @@
 """The payload of a UR10e from its currents, against what was screwed on: as right as the drive gains are."""
 
+from __future__ import annotations
+
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import polars as pl
 import pytest
-from conftest import Run
 from ur10e_logs import FOLDER, at_hand, log, published_gains
+
+if TYPE_CHECKING:
+    from conftest import Run
 
 PAYLOAD = 2.805
 NAMES = ("ur-20_02_19_14harm50sec.csv", "ur-20_02_19_14harm50secLoad.csv")

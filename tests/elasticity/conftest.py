@@ -106,7 +106,7 @@ def drawn() -> Callable[..., RobotModel]:
     def draw(model: RobotModel, rng: np.random.Generator, *, inertias: bool) -> RobotModel:
         values = {}
         for name in spring_names(model):
-            size = 0.15 if name.endswith("stiffness") else 0.3
+            size = 0.15 if name.endswith(".stiffness") else 0.3
             values[name] = model.value(name) * np.exp(size * rng.standard_normal())
         for joint in model.joint_names[:3]:
             name = f"{joint}.rotor_inertia"

@@ -266,7 +266,7 @@ def test_springs_far_from_the_truth_are_no_reason_to_refuse_readings(
     sensing: RobotModel, poses, sensed, factor: float
 ) -> None:
     """Modes are elsewhere than expected, and some lines lie on them; the readings are right all the same."""
-    springs = [name for name in spring_names(sensing) if name.endswith("stiffness")]
+    springs = [name for name in spring_names(sensing) if name.endswith(".stiffness")]
     truth = sensing.with_values({name: factor * sensing.value(name) for name in springs})
     for q in poses["default"]:
         check_sensors(sensing, sensed(truth, q[None], ("hand", "forearm", "beam", "probe"), 0.02, gains=1.05))

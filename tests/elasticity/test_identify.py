@@ -76,7 +76,7 @@ def test_paper_plan_leaves_the_forearm_torsion_unidentified(tx90l, poses, synthe
     assert quantity["std"] is None
     assert paper.quantity("joint_1.drive.stiffness")["identifiable"]
     default = identify_stiffness(tx90l, synthesise(truth, poses["default"], noise=0.05, rng=rng), rng=rng)
-    assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith("stiffness"))
+    assert all(default.quantity(n)["identifiable"] for n in spring_names(tx90l) if n.endswith(".stiffness"))
 
 
 def test_inertials_known_from_before_count_as_known(tx90l, poses, synthesise, drawn, rng):

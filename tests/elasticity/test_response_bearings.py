@@ -28,7 +28,7 @@ def test_undeclared_axes_are_those_of_the_robot(
     found = identify_stiffness(stiff, responses, rng=rng, inertias_known=True, tolerances=Tolerances.none())
     assert found.bearings is not None and found.bearings.taken == true
     assert found.robot(stiff).bearings == true
-    names = [name for name in spring_names(stiff) if name.endswith("stiffness")]
+    names = [name for name in spring_names(stiff) if name.endswith(".stiffness")]
     errors = [abs(np.log(found.estimate.values[name] / truth.value(name))) for name in names]
     assert max(errors) < 0.1
 
@@ -46,6 +46,6 @@ def test_axes_declared_wrongly_are_contradicted(
     responses = synthesise(truth, poses["default"], noise=0.05, rng=rng, step=8)
     found = identify_stiffness(stiff.with_bearings("after"), responses, rng=rng)
     assert found.bearings is not None and found.bearings.contradicted and found.bearings.taken == "after"
-    names = [name for name in spring_names(stiff) if name.endswith("stiffness")]
+    names = [name for name in spring_names(stiff) if name.endswith(".stiffness")]
     errors = [abs(np.log(found.estimate.values[name] / truth.value(name))) for name in names]
     assert max(errors) > 0.4

@@ -157,7 +157,7 @@ def test_the_friction_that_was_taken_is_marked() -> None:
     ]
     results = {"friction_terms": ["viscous", "b"], "friction_shapes": {"b": "2"}, "friction_tried": tried}
     table = next(block for block in friction_section(results).blocks if block.kind == "table")
-    assert table.strong == (2,) and table.rows[2] == ("b (2)", "3.000")
+    assert table.strong == (2,) and table.rows[2] == ("b (2)", "3.000", "–")
 
 
 def test_the_folder_gives_the_same_page_again(folder: Path) -> None:

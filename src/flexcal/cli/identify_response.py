@@ -82,7 +82,7 @@ class IdentifyResponse:
             raise InputError(
                 "no records given; name robot.yaml and the folder of an experiment, or files of records."
             )
-        if self.source[0].suffix in _ROBOT or any((path / "plan.yaml").is_file() for path in self.source):
+        if any(path.suffix in _ROBOT or (path / "plan.yaml").is_file() for path in self.source):
             self._planned()
         else:
             self._unplanned()
@@ -92,6 +92,8 @@ class IdentifyResponse:
         from flexcal.workflow.identify_response import identify_response
 
         if len(self.source) != 2 or not self.source[1].is_dir():
+            if any(path.suffix in _ROBOT for path in self.source[1:]):
+                require_robot(*self.source)
             if self.source[0].suffix in _ROBOT and len(self.source) > 1:
                 require_robot(self.source[0], *self.source[1:])
                 files = " ".join(str(path) for path in self.source[1:])

@@ -26,6 +26,8 @@ _STEPS = 8.0
 """Steps of its resolution by which the signal leaves its extreme within half the stay; a peak that is quantised leaves it by four."""
 _OVERSHOOT = 0.1
 """Of the large steps between samples, how far from its extreme a signal may stay."""
+_RIPPLE = 3
+"""Samples on either side of a stay in which the interpolation onto even instants oscillates."""
 _ROUNDING = 1e-12
 """Relative difference of values that are the same."""
 _LARGE = 0.5
@@ -113,7 +115,7 @@ def _plateau(
     """The longest stay at the largest (`sign` 1) or smallest value, with the highest speed at any.
 
     `same` (N - 1,) are the samples followed by their like, `speed` is that over `reach` samples from each on. Where time stamps were
-    repaired, the cubic overshoots the ends of a stay by up to `overshoot`.
+    repaired, the interpolation overshoots the ends of a stay by up to `overshoot`.
     """
     extreme = float(sign * np.max(sign * values))
     near = np.abs(values - extreme) <= overshoot
@@ -127,6 +129,9 @@ def _plateau(
     around = values[max(0, starts[k] - count // 2) : ends[k] + count // 2]
     stays = ends - starts >= _SAMPLES
     first, last = starts[stays], ends[stays]
+    for _ in range(_RIPPLE):
+        first = np.where((first > 0) & near[first - 1], first - 1, first)
+        last = np.where((last < len(near)) & near[np.minimum(last, len(near) - 1)], last + 1, last)
     beside = np.concatenate([first - reach - 1, first - reach, last - 1, last])
     fastest = float(speed[beside[(beside >= 0) & (beside < len(speed))]].max(initial=0.0))
     value = float(values[starts[k]])

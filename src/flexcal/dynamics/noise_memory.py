@@ -12,13 +12,14 @@ from flexcal.dynamics.batch_scores import Scores
 _BATCHES = 64
 """Batches of an experiment, at most, in which memory is looked for: short memory is not what this is for."""
 _FEWEST = 12
-"""Batches without which nothing is told about memory."""
+"""Contrasts between batches without which nothing is told about memory."""
 _SHARES = (1.0, 0.8, 0.5, 0.2)
 """Shares of the variance of a batch that the process with memory has; the rest is white."""
 _LONGEST = 1 / 3
 """Longest memory, as share of the recording: longer ones are drift, which an offset absorbs."""
 _STEPS = 14
-_CERTAIN = 1e-10
+_TAKEN = 1e-4
+"""Share of a contrast between batches below which the fit has taken it: nothing is left there to tell noise by."""
 
 
 def remembered(experiments: Sequence[Scores], offsets: np.ndarray) -> tuple[np.ndarray, float]:
@@ -56,12 +57,15 @@ def _own(
 ) -> tuple[np.ndarray, float]:
     """Of one joint and experiment: batches with these numbers, sums (B,) of residuals, of regressors (B, k), and numbers of rows."""
     batches, size = rows.shape
-    if batches < _FEWEST:
-        return np.zeros((size, size)), 0.0
     root = np.sqrt(level)
     residual, regressors = sums / root, rows / root[:, None]
-    left = np.eye(batches) - regressors @ regressors.T
-    others = regressors @ (np.eye(size) - regressors.T @ regressors) @ regressors.T
+    taken, directions = np.linalg.eigh(np.eye(batches) - regressors @ regressors.T)
+    contrasts = directions[:, taken > _TAKEN]
+    if contrasts.shape[1] < _FEWEST:
+        return np.zeros((size, size)), 0.0
+    left = contrasts.T - (contrasts.T @ regressors) @ regressors.T
+    others = contrasts.T @ regressors @ (np.eye(size) - regressors.T @ regressors) @ regressors.T @ contrasts
+    seen = contrasts.T @ residual
     lag = np.abs(np.subtract.outer(number, number))
     sizes = np.outer(root, root) / np.mean(level)
     memories = np.geomspace(0.5, max(1.0, _LONGEST * (number[-1] + 1)), _STEPS)
@@ -73,12 +77,12 @@ def _own(
     ]
     evidence, squares = [], []
     for _, noise in tried:
-        factor = cholesky(left @ noise @ left + others + _CERTAIN * np.eye(batches), lower=True)
-        squares.append(float(np.sum(solve_triangular(factor, residual, lower=True) ** 2)))
-        evidence.append(-np.sum(np.log(np.diag(factor))) - 0.5 * batches * np.log(squares[-1]))
+        factor = cholesky(left @ noise @ left.T + others, lower=True)
+        squares.append(float(np.sum(solve_triangular(factor, seen, lower=True) ** 2)))
+        evidence.append(-np.sum(np.log(np.diag(factor))) - 0.5 * len(seen) * np.log(squares[-1]))
     weights = np.exp(np.array(evidence) - np.max(evidence))
     weights /= weights.sum()
     each = zip(weights, squares, tried, strict=True)
-    noise = sum(w * s / (batches - 2.0) * matrix for w, s, (_, matrix) in each)
+    noise = sum(w * s / (len(seen) - 2.0) * matrix for w, s, (_, matrix) in each)
     memory = float(sum(w * time for w, (time, _) in zip(weights, tried, strict=True)))
     return regressors.T @ noise @ regressors, memory
