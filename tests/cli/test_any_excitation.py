@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import json
-import sys
+import os
 from pathlib import Path
 
 import numpy as np
 import pytest
+from axis_simulator import STEP, Axis, chirp, multisine
 
 from flexcal.cli.main import main
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "elasticity"))
-from axis_simulator import STEP, Axis, chirp, multisine
-
-LINK = Path("/work/shared/datasets/flexible_link")
+LINK = Path(os.environ.get("FLEXCAL_DATASETS", "")) / "flexible_link"
 
 
 def write(path: Path, columns: dict[str, np.ndarray], separator: str = ",") -> Path:
@@ -171,7 +169,9 @@ def test_what_cannot_be_used_is_said(
     assert sentence in said and said.count("\n") <= 3
 
 
-@pytest.mark.skipif(not LINK.is_dir(), reason="the flexible link's records are not here")
+@pytest.mark.skipif(
+    not LINK.is_dir(), reason="FLEXCAL_DATASETS names no folder with the records of the flexible link"
+)
 def test_the_3_hz_mode_of_a_flexible_link(tmp_path: Path) -> None:
     files = sorted(LINK.glob("swept*.txt"))
     assert len(files) == 10

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
+from axis_simulator import DAMPINGS, INERTIAS, STEP, STIFFNESSES, VISCOUS, Axis, chirp, multisine
 
 from flexcal.elasticity.axis_masses import identify_masses
 from flexcal.elasticity.mass_chain import MassChain, synthesise
@@ -17,9 +15,6 @@ from flexcal.frequency.excited_band import excited_band
 from flexcal.frequency.local_response import local_response
 from flexcal.frequency.period import find_period
 from flexcal.frequency.record_spectra import record_spectra
-
-sys.path.insert(0, str(Path(__file__).parent))
-from axis_simulator import DAMPINGS, INERTIAS, STEP, STIFFNESSES, VISCOUS, Axis, chirp, multisine
 
 
 def test_the_response_is_that_of_the_matrices() -> None:
