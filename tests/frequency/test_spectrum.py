@@ -41,6 +41,8 @@ def test_noise_is_read_where_neither_response_nor_reference_is(make_plan):
     one_period = make_plan(signs=False, periods=2, settle_periods=1)
     assert (noise_lines(one_period) % 2 == 0).all()
     assert noise_in_half_sum(make_plan())
+    with pytest.raises(FlexcalError, match="fall on every line"):
+        noise_lines(make_plan(reference_amplitude=0.02, reference_frequency_hz=0.25))
 
 
 def fourier_of_steps(values, omega, step, fine=400):

@@ -91,6 +91,8 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
     that are no whole multiples of f0 (the half-integers for P = 2) and no multiples of f_ref. With the reference on
     the grid all distortion is periodic in one period and none of it lands there. For P = 1 the even lines are left,
     where even distortion and friction sidebands count as noise.
+
+    Raises `FlexcalError` where the harmonics of the reference leave no such bin.
     """
     if noise_in_half_sum(plan):
         candidates = np.asarray(plan.lines)
@@ -104,7 +106,13 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
             candidates = bins[bins % kept != 0] / kept
     if not has_reference(plan):
         return candidates
-    return candidates[~_is_whole(candidates / _reference_ratio(plan))]
+    clear = candidates[~_is_whole(candidates / _reference_ratio(plan))]
+    if not clear.size:
+        raise FlexcalError(
+            f"the harmonics of the reference motion ({plan.reference_frequency_hz:g} Hz) fall on every line of this plan, so that none shows the "
+            f"noise; choose reference_frequency_hz (m + 1/2) times the base frequency ({plan.base_frequency_hz:g} Hz), with m = 8 for example."
+        )
+    return clear
 
 
 def torque_hold(plan: MultisinePlan | TrajectoryPlan, omega: np.ndarray, time_step: float) -> np.ndarray:
