@@ -109,7 +109,7 @@ def noise_lines(plan: MultisinePlan) -> np.ndarray:
     clear = candidates[~_is_whole(candidates / _reference_ratio(plan))]
     if not clear.size:
         raise FlexcalError(
-            f"the harmonics of the reference motion ({plan.reference_frequency_hz:g} Hz) fall on every line of this plan, so that none shows "
+            f"the harmonics of the reference motion ({plan.reference_frequency_hz:g} Hz) fall on every line of this plan, so none shows "
             "the noise; choose reference_frequency_hz (m + 1/2) times the base frequency "
             f"({plan.base_frequency_hz:g} Hz), with m = 8 for example."
         )
