@@ -27,12 +27,6 @@ class Channel:
     unit: str = ""
     derivative: int = 0
 
-    @property
-    def acceleration_unit(self) -> str:
-        """Unit of the acceleration that belongs to it."""
-        base = self.unit or self.name
-        return (base, f"{base}/s", f"{base}/s²")[2 - self.derivative]
-
 
 @dataclass(frozen=True, eq=False)
 class ExcitationRecord:

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.frequency.local_windows import ORDER, LocalWindows, projected
 from flexcal.frequency.record_spectra import RecordSpectra
 
-_ORDER = 2
 _FREEDOM = 16
 _CHUNK = 256
 
@@ -27,7 +27,7 @@ def with_reference(spectra: RecordSpectra, references: np.ndarray) -> RecordSpec
         raise FlexcalError(
             f"{n_r} references cannot explain {n_u} inputs; name one reference for each input."
         )
-    unknowns = (_ORDER + 1) * (n_r + records)
+    unknowns = (ORDER + 1) * (n_r + records)
     window = (_FREEDOM + unknowns) // records + 1
     window += 1 - window % 2
     if window > bins:
@@ -42,24 +42,15 @@ def with_reference(spectra: RecordSpectra, references: np.ndarray) -> RecordSpec
 def _explained(inputs: np.ndarray, references: np.ndarray, at: np.ndarray, window: int) -> np.ndarray:
     """The fitted inputs (R, L, n_u) at the bins `at` (L,)."""
     records, bins, n_u = inputs.shape
-    index = np.clip(at - window // 2, 0, bins - window)[:, None] + np.arange(window)
-    distance = (index - at[:, None]) / (window // 2)
-    powers = distance[:, :, None] ** np.arange(_ORDER + 1)
-    smooth = np.linalg.qr(powers)[0][:, None]
-
-    def without_transient(values: np.ndarray) -> np.ndarray:
-        return values - smooth @ (np.swapaxes(smooth, -1, -2) @ values)
-
-    seen_r, seen_u = (np.moveaxis(values[:, index], 0, 1) for values in (references, inputs))
+    windows = LocalWindows.of(at, bins, window)
+    smooth = windows.smooth
+    seen_r, seen_u = windows.seen(references), windows.seen(inputs)
     scale = np.sqrt((np.abs(seen_r) ** 2).mean((1, 2)))[:, None, None, :] + np.finfo(float).tiny
-    regressors = (powers[:, None, :, :, None] * (seen_r / scale)[:, :, :, None, :]).reshape(
-        len(at), records, window, -1
-    )
-    rows, seen = without_transient(regressors), without_transient(seen_u)
+    regressors = windows.regressors(seen_r / scale)
+    rows, seen = (values - projected(smooth, values) for values in (regressors, seen_u))
     flat = rows.reshape(len(at), records * window, -1)
     solved = np.linalg.pinv(flat, rcond=1e-9) @ seen.reshape(len(at), records * window, n_u)
     rest = seen_u - regressors @ solved[:, None]
-    transient = smooth @ (np.swapaxes(smooth, -1, -2) @ rest)
-    fitted = regressors @ solved[:, None] + transient
-    own = at[:, None] == index
+    fitted = regressors @ solved[:, None] + projected(smooth, rest)
+    own = at[:, None] == windows.index
     return np.moveaxis((fitted * own[:, None, :, None]).sum(2), 0, 1)

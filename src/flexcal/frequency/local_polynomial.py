@@ -15,11 +15,11 @@ from flexcal.data import MultisinePlan, Recording
 from flexcal.errors import FlexcalError
 from flexcal.frequency import covariance as cov
 from flexcal.frequency.line_spectra import has_reference, kept_samples
+from flexcal.frequency.local_windows import ORDER, LocalWindows
 from flexcal.frequency.periods import column_factor
 from flexcal.frequency.records import PoseRecords, by_pose
 from flexcal.frequency.response import SMALLEST_FREEDOM, FrequencyResponse, axis_names, sensed
 
-ORDER = 2
 LEAST_LINES, MOST_LINES = 3, 7
 """Lines in a window: enough for a parabola, and not so many that a resonance is none."""
 TRANSIENT_BINS = 12
@@ -54,17 +54,15 @@ def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> Loc
             "covariance; measure more lines or experiments."
         )
     at = np.arange(lines)
-    window = np.clip(at - count // 2, 0, lines - count)[:, None] + np.arange(count)
-    powers = ((window - at[:, None]) / max(count // 2, 1))[:, :, None] ** np.arange(ORDER + 1)  # (L, W, M)
-    u = np.moveaxis(inputs[:, window], 0, 1)  # (L, E, W, n_u)
-    y = np.moveaxis(outputs[:, window], 0, 1).reshape(lines, -1, outputs.shape[-1])
+    windows = LocalWindows.of(at, lines, count)
+    u = windows.seen(inputs)
+    y = windows.seen(outputs).reshape(lines, -1, outputs.shape[-1])
     scale = np.sqrt((np.abs(u) ** 2).mean((1, 2)))[:, None, None, :]
     if not (scale > 0.0).all():
         raise FlexcalError(
             "an input of the local polynomial method carries no power at some line; excite every axis."
         )
-    regressors = powers[:, None, :, :, None] * (u / scale)[:, :, :, None, :]
-    q, r = np.linalg.qr(regressors.reshape(lines, experiments * count, unknowns))
+    q, r = np.linalg.qr(windows.regressors(u / scale).reshape(lines, experiments * count, unknowns))
     diagonal = np.abs(np.diagonal(r, axis1=-2, axis2=-1))
     if (diagonal.min(-1) < _RANK_TOLERANCE * diagonal.max(-1)).any():
         raise FlexcalError(

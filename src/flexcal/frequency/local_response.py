@@ -9,9 +9,9 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.frequency import covariance as cov
+from flexcal.frequency.local_windows import ORDER, LocalWindows, projected
 from flexcal.frequency.record_spectra import RecordSpectra
 
-_ORDER = 2
 _FREEDOM = 12
 """Degrees of freedom of the scatter in a window, at least."""
 _MOST_LINES = 1500
@@ -82,10 +82,10 @@ def _window(spectra: RecordSpectra, lines: int) -> int:
     """Bins in a window: enough for the degrees of freedom, an odd number."""
     records, bins, n_u = spectra.inputs.shape
     share = lines / bins
-    unknowns = (_ORDER + 1) * n_u
-    least = (_ORDER + 1) * (n_u + 1) + 2  # a transient and equal inputs in all records must differ
+    unknowns = (ORDER + 1) * n_u
+    least = (ORDER + 1) * (n_u + 1) + 2  # a transient and equal inputs in all records must differ
     for window in range(least + 1 - least % 2, bins + 1, 2):
-        if records * share * (window - (_ORDER + 1)) - unknowns >= _FREEDOM and window * share >= 3:
+        if records * share * (window - (ORDER + 1)) - unknowns >= _FREEDOM and window * share >= 3:
             return window
     raise FlexcalError(
         f"{records} records with {lines} excited lines are too few for a frequency response of {n_u} inputs; record longer, or more often."
@@ -103,18 +103,12 @@ def _windows(
     """G, the right factor of its covariance, the scatter, the outputs' power that G explains, and degrees of freedom, at bins `at`."""
     records, bins, n_u = spectra.inputs.shape
     n_y, lines = spectra.outputs.shape[2], len(at)
-    index = np.clip(at - window // 2, 0, bins - window)[:, None] + np.arange(window)
-    distance = (index - at[:, None]) / (window // 2)
-    powers = distance[:, :, None] ** np.arange(_ORDER + 1)
-    smooth = np.linalg.qr(powers)[0][:, None]  # (L, 1, W, 3): the transient of every record
-    if spectra.settled:
-        smooth = smooth[..., :0]
+    windows = LocalWindows.of(at, bins, window)
+    seen = windows.seen
+    smooth = windows.smooth[..., : 0 if spectra.settled else None]
 
     def without_transient(values: np.ndarray) -> np.ndarray:
-        return values - smooth @ (np.swapaxes(smooth, -1, -2) @ values)
-
-    def seen(values: np.ndarray) -> np.ndarray:
-        return np.moveaxis(values[:, index], 0, 1)  # (L, R, W, c)
+        return values - projected(smooth, values)
 
     instruments = seen(spectra.instruments)
     scale = np.sqrt((np.abs(instruments) ** 2).mean((1, 2)))[:, None, None, :]
@@ -122,10 +116,9 @@ def _windows(
         raise FlexcalError(
             "an input does not move at all at some frequencies; leave that column out with --input."
         )
-    regressors = (powers[:, None, :, :, None] * (instruments / scale)[:, :, :, None, :]).reshape(
-        lines, records, window, -1
+    regressors = without_transient(windows.regressors(instruments / scale)).reshape(
+        lines, records * window, -1
     )
-    regressors = without_transient(regressors).reshape(lines, records * window, -1)
     columns = without_transient(np.concatenate([seen(spectra.outputs), seen(spectra.inputs)], -1)).reshape(
         lines, records * window, n_y + n_u
     )
@@ -138,21 +131,23 @@ def _windows(
             "inputs, or name one of them with --input."
         )
     r = np.where(degenerate[:, None, None], np.eye(r.shape[-1]), r)
-    projected = np.swapaxes(q, -1, -2).conj() @ columns
+    coefficients = np.swapaxes(q, -1, -2).conj() @ columns
     inverse = np.linalg.solve(r, np.broadcast_to(np.eye(r.shape[-1]), r.shape))[:, :n_u]
-    local = np.swapaxes(inverse @ projected / scale[:, 0, 0, :, None], -1, -2)  # (L, n_y + n_u, n_u)
+    local = np.swapaxes(inverse @ coefficients / scale[:, 0, 0, :, None], -1, -2)  # (L, n_y + n_u, n_u)
     local[degenerate, :n_y], local[degenerate, n_y:] = 0.0, np.eye(n_u)
     to_input = np.linalg.inv(local[:, n_y:])
     response = local[:, :n_y] @ to_input
     root = np.swapaxes(to_input, -1, -2) @ (inverse / scale[:, 0, 0, :, None])
     gain = root @ np.swapaxes(root, -1, -2).conj()
     gain[degenerate] = _UNKNOWN * np.eye(n_u)
-    residual = columns - q @ projected
+    residual = columns - q @ coefficients
     error = residual[:, :, :n_y] - residual[:, :, n_y:] @ np.swapaxes(response, -1, -2)
-    carried = np.broadcast_to(spectra.excited[index][:, None], (lines, records, window)).reshape(lines, -1)
+    carried = np.broadcast_to(spectra.excited[windows.index][:, None], (lines, records, window)).reshape(
+        lines, -1
+    )
     error = error * carried[:, :, None]
     count = carried.sum(1)
-    freedom = count * (1 - (_ORDER + 1) / window) - regressors.shape[-1]
+    freedom = count * (1 - (ORDER + 1) / window) - regressors.shape[-1]
     scatter = np.swapaxes(error, -1, -2) @ error.conj() / freedom[:, None, None]
     fitted = (seen(spectra.inputs) * seen(spectra.excited[None, :, None])) @ np.swapaxes(response, -1, -2)[
         :, None
