@@ -41,11 +41,14 @@ def test_axes_declared_wrongly_are_contradicted(
     drawn: Callable,
     rng: np.random.Generator,
 ) -> None:
-    """A stiffness is then off by half and more."""
+    """A stiffness would else be stated with an interval that it misses by far: by 0.17 to 6 in its logarithm over five robots."""
     truth = drawn(stiff, rng, inertias=True).with_bearings("before")
     responses = synthesise(truth, poses["default"], noise=0.05, rng=rng, step=8)
     found = identify_stiffness(stiff.with_bearings("after"), responses, rng=rng)
     assert found.bearings is not None and found.bearings.contradicted and found.bearings.taken == "after"
-    names = [name for name in spring_names(stiff) if name.endswith(".stiffness")]
-    errors = [abs(np.log(found.estimate.values[name] / truth.value(name))) for name in names]
-    assert max(errors) > 0.4
+    missed = [
+        abs(found.estimate.values[name] - truth.value(name)) > 3 * std
+        for name in spring_names(stiff)
+        if name.endswith(".stiffness") and (std := found.estimate.std(name)) is not None
+    ]
+    assert any(missed)
