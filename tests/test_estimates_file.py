@@ -14,6 +14,7 @@ from flexcal.estimates_file import (
     block_sha256,
     provenance,
     read_estimates,
+    require_place,
     sha256_of,
     write_estimates,
 )
@@ -204,7 +205,26 @@ def test_an_npz_of_another_program_stays(tmp_path: Path, content: str) -> None:
     before = path.read_bytes()
     with pytest.raises(InputError, match=r"estimates.npz was not written by flexcal"):
         write_estimates(tmp_path / "estimates.yaml", "calibration", make_estimate())
+    with pytest.raises(InputError, match=r"estimates.npz was not written by flexcal"):
+        require_place(tmp_path / "estimates.yaml", "calibration")
     assert path.read_bytes() == before and [p.name for p in tmp_path.iterdir()] == ["estimates.npz"]
+
+
+def test_a_place_is_refused_for_what_writing_refuses(tmp_path: Path) -> None:
+    """A place that takes the block, and others that do not: an end of a name, a link, and another block that cannot be read."""
+    path = tmp_path / "estimates.yaml"
+    require_place(path, "stiffness")
+    write_estimates(path, "stiffness", make_estimate())
+    require_place(path, "calibration")
+    with pytest.raises(InputError, match=r"\.yaml"):
+        require_place(tmp_path / "estimates.txt", "stiffness")
+    (tmp_path / "link.yaml").symlink_to(path)
+    with pytest.raises(InputError, match="is a link"):
+        require_place(tmp_path / "link.yaml", "calibration")
+    (tmp_path / "estimates.npz").unlink()
+    require_place(path, "stiffness")
+    with pytest.raises(InputError, match=r"estimates\.npz cannot be read"):
+        require_place(path, "calibration")
 
 
 def test_values_only_are_no_estimate(tmp_path: Path) -> None:

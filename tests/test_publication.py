@@ -248,3 +248,16 @@ def test_no_file_of_flexcals_own(tmp_path: Path) -> None:
         write_text("/dev/null", "new")
     assert (tmp_path / "target").read_text() == "mine"
     assert sorted(os.listdir(tmp_path)) == ["dangling", "folder", "link", "pipe", "target"]
+
+
+def test_what_is_read_once_or_has_no_end_is_not_read(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "pipe")
+    (tmp_path / "link").symlink_to("pipe")
+    for path, kind in (
+        (tmp_path / "pipe", "pipe"),
+        (tmp_path / "link", "pipe"),
+        (Path("/dev/zero"), "device"),
+    ):
+        with pytest.raises(InputError, match=f"{path} is a {kind}, not a file; write its content to a file"):
+            current(path)
+    assert current(tmp_path / "none") == tmp_path / "none" and current(tmp_path) == tmp_path

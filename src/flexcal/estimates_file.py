@@ -20,8 +20,8 @@ import numpy as np
 from flexcal.atomic import atomic_paths
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
-from flexcal.npz_reader import ArrayForm, NpzFile
-from flexcal.publication import current, settle
+from flexcal.npz_reader import ArrayForm, NpzFile, refuse_foreign
+from flexcal.publication import current, refuse_irregular, settle
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import to_plain, yaml_text
 
@@ -137,19 +137,7 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
         raise FlexcalError(
             f"there is no block '{block}' in an estimates file; there are {', '.join(BLOCKS)}."
         )
-    if path.suffix not in (".yaml", ".yml"):
-        raise InputError(
-            f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name."
-        )
-    stored, arrays = StoredEstimates(), {}
-    _refuse_foreign(path.with_suffix(".npz"))
-    if current(path).exists():
-        file = read_yaml_file(path)
-        stored = file.structure(StoredEstimates)
-        for name in BLOCKS:
-            other = stored.block(name)
-            if other is not None and name != block and other.covariance_sha256 is not None:
-                arrays[name] = (tuple(other.values), _covariance(file, name, other))
+    stored, arrays = _kept(path, block)
     covariance = np.asarray(estimate.covariance, dtype=np.float64)
     size = len(estimate.parameters)
     if covariance.shape != (size, size) or not np.isfinite(covariance).all():
@@ -168,6 +156,14 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
         with binary.open("wb") as stream:
             np.savez(stream, allow_pickle=False, **named)
         plain.write_text(text, encoding="utf-8", newline="")
+
+
+def require_place(path: str | Path, block: Block) -> None:
+    """Raise `InputError` where `write_estimates` would not put a block into this file: so that it is known before the work begins."""
+    settle(Path(path).parent)
+    for file in (Path(path), Path(path).with_suffix(".npz")):
+        refuse_irregular(file)
+    _kept(Path(path), block)
 
 
 def provenance(
@@ -219,19 +215,25 @@ def block_sha256(path: str | Path, block: Block) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
 
 
-def _refuse_foreign(path: Path) -> None:
-    """Raise `InputError` for a file that holds something else than covariances and their names."""
-    if not current(path).exists():
-        return
-    ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
-    try:
-        foreign = NpzFile(path, "").names - ours
-    except InputError:
-        foreign = {"no arrays"}
-    if foreign:
+def _kept(
+    path: Path, block: Block
+) -> tuple[StoredEstimates, dict[Block, tuple[tuple[str, ...], np.ndarray]]]:
+    """What stays in a file when `block` is written: its content, and names and covariance of the other blocks."""
+    if path.suffix not in (".yaml", ".yml"):
         raise InputError(
-            f"{path} was not written by flexcal (it holds {min(foreign)}), and such a file is never changed; move it away."
+            f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name."
         )
+    stored, arrays = StoredEstimates(), {}
+    ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
+    refuse_foreign(path.with_suffix(".npz"), ours)
+    if current(path).exists():
+        file = read_yaml_file(path)
+        stored = file.structure(StoredEstimates)
+        for name in BLOCKS:
+            other = stored.block(name)
+            if other is not None and name != block and other.covariance_sha256 is not None:
+                arrays[name] = (tuple(other.values), _covariance(file, name, other))
+    return stored, arrays
 
 
 def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:

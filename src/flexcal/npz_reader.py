@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zipfile
 import zlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -124,3 +124,17 @@ class NpzFile:
         if form.finite and form.kind in ("real", "complex") and not np.isfinite(array).all():
             raise self.error(f"holds numbers in '{name}' that are not finite")
         return array
+
+
+def refuse_foreign(path: Path, ours: Set[str]) -> None:
+    """Raise `InputError` where a file is there that holds something else than arrays of the names `ours`: no flexcal wrote it."""
+    if not current(path).exists():
+        return
+    try:
+        foreign = NpzFile(path, "").names - ours
+    except InputError:
+        foreign = {"no arrays"}
+    if foreign:
+        raise InputError(
+            f"{path} was not written by flexcal (it holds {min(foreign)}), and such a file is never changed; move it away."
+        )

@@ -131,3 +131,29 @@ def test_a_ledger_without_verbs_hinders_none(tmp_path: Path) -> None:
         write_text(tmp_path / "x", "2")
     with pytest.raises(InputError, match="'flexcal demo'"), outputs("verify", tmp_path, ("x",)):
         pass
+
+
+@pytest.mark.parametrize(
+    "words",
+    ["calibrate robot.yaml none.csv", "identify dynamics robot.yaml none.csv", "identify stiffness robot.yaml none",
+     "identify inertials robot.yaml none"],
+)  # fmt: skip
+def test_another_programs_covariances_are_seen_before_the_work(run, tx90l_folder: Path, words: str) -> None:
+    """Before the measurements are read: these are not even there."""
+    out = tx90l_folder / "out"
+    out.mkdir()
+    (out / "estimates.npz").write_bytes(b"mine")
+    arguments = [
+        tx90l_folder / word if word.startswith(("robot", "none")) else word for word in words.split()
+    ]
+    assert "out/estimates.npz was not written by flexcal" in refused(
+        run, tx90l_folder, *arguments, "--out", out
+    )
+
+
+def test_another_programs_file_is_no_learned_residual(run, tx90l_folder: Path) -> None:
+    pytest.importorskip("sklearn", reason="scikit-learn (the extra 'learn') is not installed")
+    (tx90l_folder / "learned_residual.npz").write_bytes(b"mine")
+    robot, log = tx90l_folder / "robot.yaml", tx90l_folder / "none.csv"
+    sentence = refused(run, tx90l_folder, "identify", "dynamics", robot, log, "--learn-residual")
+    assert "learned_residual.npz was not written by flexcal" in sentence

@@ -18,6 +18,7 @@ from fuzz_mutations import (
     by_yaml_structure,
     by_yaml_text,
 )
+from fuzz_recordings import by_counts, by_names, by_statements, by_universal_fields, by_values
 
 Words = tuple[str, ...]
 
@@ -52,6 +53,9 @@ REPORT = "report results"
 VIRTUAL = "--cell virtual --robot robot.yaml --config cell.yaml --out new"
 _YAML = (by_bytes, by_yaml_text, by_yaml_structure, by_numbers)
 _TABLE = (by_bytes, by_cells)
+_RECORDING = (by_bytes, by_counts, by_names)
+_IMPORT = "import robot.yaml --out new.csv"
+_RESPONSE = "identify response --input tau1 --output q1 --out new"
 
 SUBJECTS = (
     Subject(
@@ -108,6 +112,7 @@ SUBJECTS = (
             "identify payload robot.yaml log.csv --free validation.csv --out new",
             "identify gains robot.yaml log.csv validation.csv --out new",
             "import robot.yaml log.csv --out new.csv",
+            f"{_RESPONSE} log.csv",
         ),
     ),
     Subject(
@@ -117,10 +122,25 @@ SUBJECTS = (
     ),
     *(
         Subject(name, (by_bytes,), (f"import robot.yaml {name} --out new.csv",))
-        for name in (
-            *("measured.parquet", "measured.mat", "measured_hdf5.mat", "measured.xlsx"),
-            *("recorded.mcap", "recorded.db3"),
-        )
+        for name in (*("measured.parquet", "measured.mat", "measured_hdf5.mat", "measured.xlsx"),)
+    ),
+    Subject(
+        "measured.uff",
+        (by_bytes, by_universal_fields),
+        (f"{_IMPORT} measured.uff", f"{_RESPONSE} measured.uff"),
+    ),
+    Subject(
+        "measured_binary.uff",
+        (by_bytes, by_universal_fields, by_values),
+        (f"{_IMPORT} measured_binary.uff", f"{_RESPONSE} measured_binary.uff"),
+    ),
+    Subject("recorded.bag", (*_RECORDING, by_values), (f"{_IMPORT} recorded.bag",)),
+    Subject("recorded.mcap", (*_RECORDING, by_values), (f"{_IMPORT} recorded.mcap",)),
+    Subject("recorded.db3", (*_RECORDING, by_statements), (f"{_IMPORT} recorded.db3",)),
+    *(
+        Subject(f"bag_{ending}/{file}", ways, (f"{_IMPORT} bag_{ending}",))
+        for ending in ("mcap", "db3")
+        for file, ways in (("metadata.yaml", _YAML), (f"bag_{ending}.{ending}", _RECORDING))
     ),
     Subject("cell.yaml", _YAML, (f"measure plan.yaml {VIRTUAL}",)),
     Subject("plan.yaml", _YAML, (f"measure plan.yaml {VIRTUAL}",)),

@@ -11,10 +11,11 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from fuzz_cases import Case, cases, names_of
+from fuzz_cases import SUBJECTS, Case, cases, names_of
 from fuzz_process import FlexcalProcesses
 from fuzz_regressions import REGRESSIONS, regressions
 from fuzz_seeds import run_verbs, write_files
+from fuzz_special import KINDS, ended
 
 STRIDE = 20
 QUICK = 1000
@@ -76,6 +77,42 @@ def test_a_few_broken_files(flexcal: FlexcalProcesses, files: Path, tmp_path: Pa
     assert len(chosen) >= 15
     found = faults(flexcal, chosen, files, tmp_path)
     assert not found, "\n\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("file", "line"),
+    [
+        ("robot.yaml", "export urdf robot.yaml --out new.urdf"),
+        ("arm.urdf", "export urdf robot.yaml --out new.urdf"),
+        ("poses.csv", "calibrate robot.yaml poses.csv --out new"),
+        ("foreign.txt", "import robot.yaml foreign.txt --out new.csv"),
+        ("bag/bag.mcap", "import robot.yaml bag --out new.csv"),
+    ],
+)
+def test_a_pipe_is_no_file(
+    file: str, line: str, flexcal: FlexcalProcesses, files: Path, tmp_path: Path
+) -> None:
+    """Nothing waits for what may come out of it; a reader each."""
+    shutil.copytree(files, tmp_path / "files")
+    (tmp_path / "files/bag").mkdir()
+    (tmp_path / "files/bag/metadata.yaml").write_text("rosbag2_bagfile_information: {}\n")
+    (tmp_path / "files/bag/bag.mcap").touch()
+    ending, fault = ended(flexcal, "pipe", file, line, tmp_path / "files", tmp_path / "case")
+    assert fault is None and f"{file} is a pipe, not a file" in ending.err, (fault, ending)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_no_file(kind: str, flexcal: FlexcalProcesses, all_files: Path, tmp_path: Path) -> None:
+    """No verb waits for a pipe, reads a device without end, or stumbles over a folder."""
+    there = [subject for subject in SUBJECTS if (all_files / subject.file).is_file()]
+    found = [
+        ended(flexcal, kind, subject.file, line, all_files, tmp_path / "case")[1]
+        for subject in there
+        for line in subject.lines
+    ]
+    assert len(found) > 60
+    assert not any(found), "\n\n".join(filter(None, found))
 
 
 @pytest.mark.slow

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sqlite3
 from pathlib import Path
 
 import numpy as np
@@ -110,3 +111,33 @@ def test_what_cannot_be_used_is_said(ur5, tmp_path: Path, rng) -> None:
     points = write(tmp_path / "points", "MCAP", [], [("/tracker", 1.0, np.ones(3))])
     with pytest.raises(InputError, match="no joint states"):
         read_foreign(points, ur5.joint_names)
+
+
+def test_messages_that_are_lost_or_useless_are_counted(ur5, tmp_path: Path, rng) -> None:
+    """A recording that was cut off announces more than it holds; a driver that starts up sends names without positions."""
+    q = rng.uniform(-1.5, 1.5, (3, 6))
+    messages = list(stop_and_go(ur5, q, rng, points=False))
+    names = [ur5.joint_names[i] for i in ORDER]
+    messages[7] = ("/joint_states", messages[7][1], np.zeros(0))
+    path = write(tmp_path / "bag", "SQLITE3", names, messages)
+    with sqlite3.connect(next(path.glob("*.db3"))) as storage:
+        storage.execute("DELETE FROM messages WHERE id > 200")
+    foreign = read_foreign(path, ur5.joint_names)
+    assert len(foreign) == 199
+    assert foreign.notes[:2] == (
+        "300 messages on /joint_states are announced, but 200 are there: the recording is damaged or incomplete",
+        "messages on /joint_states without a position for every joint name, left out: 1",
+    )
+    with sqlite3.connect(next(path.glob("*.db3"))) as storage:
+        storage.execute("DELETE FROM messages WHERE id != 8")
+    with pytest.raises(
+        InputError, match=r"no usable joint states in it: 300 messages .* but 1 are there"
+    ) as caught:
+        read_foreign(path, ur5.joint_names)
+    assert "left out: 1" in str(caught.value)
+    (path / "metadata.yaml").write_text("rosbag2_bagfile_information:\n  version: [\n")
+    with pytest.raises(InputError, match=r"metadata\.yaml line 3"):
+        read_foreign(path, ur5.joint_names)
+    (path / "metadata.yaml").write_text("rosbag2_bagfile_information: 3\n")
+    with pytest.raises(InputError, match="not a readable recording of ROS"):
+        read_foreign(path, ur5.joint_names)

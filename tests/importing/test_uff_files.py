@@ -95,3 +95,37 @@ def test_what_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, rng: np.r
     monkeypatch.setitem(sys.modules, "pyuff", None)
     with pytest.raises(InputError, match="universal files need pyuff: pip install pyuff"):
         read_foreign(tmp_path / "frf.uff", ())
+
+
+def test_a_file_that_was_cut_off(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Wherever: a data set without its end, one with fewer values than it announces, and a header without some of its lines."""
+    path = written(tmp_path / "whole.uff", *(history(rng.normal(size=40), 0.01, id1=f"q{k}") for k in (1, 2)))
+    content = path.read_bytes()
+    lines = content.splitlines(keepends=True)
+    cut = tmp_path / "cut.uff"
+    for length in range(len(content) * 3 // 5, len(content) - 8, 97):
+        cut.write_bytes(content[:length])
+        with pytest.raises(InputError, match="its last data set has no end, so the file was cut off"):
+            read_foreign(cut, ())
+    assert len(lines) == 2 * (14 + 10)
+    cut.write_bytes(b"".join(lines[:20] + lines[23:]))
+    with pytest.raises(InputError, match="data set 1 announces 40 values, but 28 can be read from it"):
+        read_foreign(cut, ())
+    cut.write_bytes(b"".join(lines[:27] + lines[29:]))
+    with pytest.raises(InputError, match="data set 2 does not have the lines and fields of a data set 58"):
+        read_foreign(cut, ())
+
+
+def test_binary_histories_with_padding(tmp_path: Path, rng: np.random.Generator) -> None:
+    """Values end where the header says so: writers fill the last record of their file."""
+    data = rng.normal(size=(2, 25))
+    path = written(
+        tmp_path / "a.uff", *(history(item, 0.01, binary=1, id1=f"q{k}") for k, item in enumerate(data))
+    )
+    content = path.read_bytes()
+    path.write_bytes(
+        content.replace(data[0, -1].astype("<f8").tobytes(), data[0, -1].astype("<f8").tobytes() + bytes(40))
+    )
+    assert path.read_bytes() != content
+    foreign = read_foreign(path, ())
+    np.testing.assert_array_equal(np.array([foreign.numbers["q0"], foreign.numbers["q1"]]), data)

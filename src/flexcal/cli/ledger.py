@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.errors import InputError
+from flexcal.publication import current
 
 LEDGER = ".flexcal"
 """In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it, each verb's lines under a comment
@@ -26,7 +27,7 @@ class Ledger:
         path, verb = folder / LEDGER, ""
         entries: dict[str, tuple[str, str]] = {}
         try:
-            lines = path.read_bytes().decode("utf-8", "surrogateescape").split("\n")
+            lines = current(path).read_bytes().decode("utf-8", "surrogateescape").split("\n")
         except FileNotFoundError:
             return cls(entries)
         except OSError as problem:

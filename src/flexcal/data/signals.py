@@ -13,6 +13,7 @@ import numpy as np
 
 from flexcal.data.table import Table, TableFile
 from flexcal.errors import InputError
+from flexcal.publication import current
 from flexcal.structuring import suggestion
 from flexcal.units import DEGREE, MILLIMETRE
 from flexcal.yaml_reader import read_yaml_file
@@ -243,7 +244,7 @@ def read_matrix(path: str | Path) -> np.ndarray:
     """A matrix (m, k) from CSV without a header; raises `InputError` with line and column of what is no number."""
     path = Path(path)
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        lines = current(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as problem:
         reason = getattr(problem, "strerror", None) or str(problem)
         raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem

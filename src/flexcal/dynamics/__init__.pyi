@@ -35,7 +35,12 @@ from .joint_loads import external_torque
 from .joint_log import JointLog, log_blocks
 from .learned_errors import ResidualErrors, residual_errors
 from .learned_residual import LearnedMotor, LearnedResidual
-from .learned_residual_file import LEARNED, read_learned_residual, write_learned_residual
+from .learned_residual_file import (
+    LEARNED,
+    read_learned_residual,
+    require_learned_place,
+    write_learned_residual,
+)
 from .log_faults import LogFaults
 from .motion import Motion
 from .noisy_columns import column_errors, noisy_logs
@@ -146,6 +151,7 @@ __all__ = [
     "power_least_squares",
     "predict_torques",
     "read_learned_residual",
+    "require_learned_place",
     "require_scikit_learn",
     "residual_errors",
     "select_friction",

@@ -15,7 +15,8 @@ from flexcal.dynamics.gaussian_process import GaussianProcess
 from flexcal.dynamics.learned_residual import LearnedMotor, LearnedResidual
 from flexcal.errors import InputError
 from flexcal.estimates_file import block_sha256
-from flexcal.npz_reader import ArrayForm, NpzFile
+from flexcal.npz_reader import ArrayForm, NpzFile, refuse_foreign
+from flexcal.publication import refuse_irregular
 
 LEARNED = "learned_residual.npz"
 _NUMBERS = ArrayForm("real", ("motors",))
@@ -30,6 +31,12 @@ _FORMS = {
     "inflation": _NUMBERS,
     "dynamics": ArrayForm("text"),
 }
+
+
+def require_learned_place(path: Path) -> None:
+    """Raise `InputError` where a file stands at `path` that no flexcal wrote."""
+    refuse_irregular(path)
+    refuse_foreign(path, _FORMS.keys())
 
 
 def write_learned_residual(path: Path, learned: LearnedResidual, estimates: Path) -> None:

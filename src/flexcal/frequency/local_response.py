@@ -88,7 +88,7 @@ def _window(spectra: RecordSpectra, lines: int) -> int:
         if records * share * (window - (ORDER + 1)) - unknowns >= _FREEDOM and window * share >= 3:
             return window
     raise FlexcalError(
-        f"{records} records with {lines} excited lines are too few for a frequency response of {n_u} inputs; record longer, or more often."
+        f"a frequency response needs more excited lines than {lines} (records: {records}, inputs: {n_u}); record longer, or more often."
     )
 
 

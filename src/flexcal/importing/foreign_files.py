@@ -9,6 +9,7 @@ from flexcal.data.table import tables_in
 from flexcal.errors import InputError
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.timestamps import with_times
+from flexcal.publication import refuse_stream
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _EXCEL = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")
@@ -31,6 +32,8 @@ def _read(path: Path, joints: Sequence[str], sheet: str | None, topic: str | Non
     suffix = path.suffix.lower()
     if not path.exists():
         raise InputError(f"{path}: there is no such file; check the name and the folder.")
+    for file in (path, *(sorted(path.iterdir()) if path.is_dir() else ())):
+        refuse_stream(file)
     if suffix in _ROS or (path.is_dir() and (path / "metadata.yaml").is_file()):
         from flexcal.importing.ros_recordings import read_ros
 

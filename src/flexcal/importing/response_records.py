@@ -18,6 +18,7 @@ from flexcal.importing.foreign_files import read_foreign
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.response_columns import ResponseColumns, response_columns
 from flexcal.importing.unit_guess import time_unit
+from flexcal.units import LARGEST
 
 _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
@@ -116,11 +117,14 @@ def _check(file: Path, table: ForeignTable, column: str) -> None:
         raise InputError(
             f"{file}: there is no column of numbers '{column}', which the first file has; give files of one experiment."
         )
-    wrong = np.flatnonzero(~np.isfinite(table.numbers[column]))
+    numbers = table.numbers[column]
+    wrong = np.flatnonzero(~(np.abs(numbers) <= LARGEST))
     if wrong.size:
-        raise table.table.error(
-            int(wrong[0]), column, "there is no number; complete the cell or remove the row."
-        )
+        row = int(wrong[0])
+        what = f"the value is {numbers[row]:g}, which is no measurement"
+        if np.isnan(numbers[row]):
+            what = "there is no number"
+        raise table.table.error(row, column, f"{what}; complete the cell or remove the row.")
 
 
 def _times(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,9 +14,11 @@ from flexcal.data.table import Table, TableFile
 from flexcal.errors import InputError
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.standstill import points_at_rest
+from flexcal.yaml_reader import read_yaml_file
 
 _JOINTS = "sensor_msgs/msg/JointState"
 _POINTS = ("geometry_msgs/msg/PointStamped", "geometry_msgs/msg/PoseStamped")
+_METADATA = "metadata.yaml"
 _FIELDS = {"position": "rad", "velocity": "rad/s", "effort": "N m"}
 
 
@@ -42,24 +45,25 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise InputError(f"{path}: recordings of ROS need rosbags: pip install rosbags.") from None
+    if path.is_dir():
+        read_yaml_file(path / _METADATA)  # its errors name the line
+    notes: list[str] = []
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
-            topics = {c.topic: c.msgtype for c in reader.connections if c.msgtype in (_JOINTS, *_POINTS)}
-            seen = sorted({f"{c.topic} ({c.msgtype})" for c in reader.connections})
-            chosen = _point_topic(path, topics, topic)
-            states = _joint_states(reader)
-            points = None if chosen is None else _points(reader, chosen)
+            kinds = {c.topic: c.msgtype for c in reader.connections}
+            chosen = _point_topic(path, kinds, topic)
+            states = _joint_states(reader, notes)
+            points = None if chosen is None else _points(reader, chosen, notes)
     except InputError:
         raise
     except Exception as problem:  # whatever a reader of a foreign, perhaps broken file may raise
-        reason = " ".join(str(problem).split())[:200] or type(problem).__name__
-        raise InputError(f"{path}: not a readable recording of ROS ({reason}); record it again.") from problem
-    if not states:
         raise InputError(
-            f"{path}: there are no joint states (sensor_msgs/JointState) in it; there are {', '.join(seen) or 'no messages'}."
-        )
+            f"{path}: not a readable recording of ROS ({_reason(problem)}); record it again."
+        ) from problem
+    if not states:
+        raise InputError(f"{path}: {_without_states(kinds, notes)}")
     best = max(states, key=lambda s: (len(set(s.names) & set(joints)), len(s.names), len(s.received)))
-    notes = [
+    notes += [
         f"the joint states of {', '.join(other.names)} on {other.topic} are left out"
         for other in states
         if other is not best
@@ -69,8 +73,25 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
     return _poses(path, best, points, notes)
 
 
-def _point_topic(path: Path, topics: dict[str, str], asked: str | None) -> str | None:
-    having = sorted(name for name, kind in topics.items() if kind in _POINTS)
+def _reason(problem: Exception) -> str:
+    """What rosbags says of a recording; in general words where it met what it had not expected."""
+    own = type(problem).__module__.startswith("rosbags.") or isinstance(problem, OSError)
+    text = " ".join(str(problem).split())[:200].rstrip(".")
+    return text if own and text else "its content is not as ROS writes it"
+
+
+def _without_states(kinds: dict[str, str], notes: Sequence[str]) -> str:
+    """Why there are no joint states in a recording that has topics of these `kinds`."""
+    named = sorted(topic for topic, kind in kinds.items() if kind == _JOINTS)
+    if not named:
+        seen = ", ".join(f"{topic} ({kind})" for topic, kind in sorted(kinds.items()))
+        return f"there are no joint states (sensor_msgs/JointState) in it; there are {seen or 'no messages'}."
+    reason = "; ".join(notes) or f"there are no messages on {', '.join(named)}"
+    return f"there are no usable joint states in it: {reason}; record it again."
+
+
+def _point_topic(path: Path, kinds: dict[str, str], asked: str | None) -> str | None:
+    having = sorted(name for name, kind in kinds.items() if kind in _POINTS)
     if asked is not None:
         if asked not in having:
             raise InputError(
@@ -82,14 +103,21 @@ def _point_topic(path: Path, topics: dict[str, str], asked: str | None) -> str |
     return having[0] if having else None
 
 
-def _joint_states(reader: Any) -> list[_Stream]:
-    """A stream for every topic and set of names."""
+def _joint_states(reader: Any, notes: list[str]) -> list[_Stream]:
+    """A stream for every topic and set of names; what is left out is added to the `notes`."""
     found: dict[tuple[str, tuple[str, ...]], list[tuple[float, float, list[np.ndarray]]]] = {}
-    for topic, received, message in _messages(reader, (_JOINTS,)):
+    without: Counter[str] = Counter()
+    for topic, received, message in _messages(reader, (_JOINTS,), notes):
         values = [np.asarray(getattr(message, field), dtype=float) for field in _FIELDS]
         names = tuple(message.name)
         if len(values[0]) == len(names) > 0:
             found.setdefault((topic, names), []).append((_stamp(message), received, values))
+        else:
+            without[topic] += 1
+    notes += [
+        f"messages on {topic} without a position for every joint name, left out: {count}"
+        for topic, count in without.items()
+    ]
     streams = []
     for (topic, names), rows in found.items():
         fields = {}
@@ -100,19 +128,30 @@ def _joint_states(reader: Any) -> list[_Stream]:
     return streams
 
 
-def _points(reader: Any, topic: str) -> _Stream:
+def _points(reader: Any, topic: str, notes: list[str]) -> _Stream:
     rows = []
-    for name, received, message in _messages(reader, _POINTS):
+    for name, received, message in _messages(reader, _POINTS, notes):
         if name == topic:
             place = message.point if hasattr(message, "point") else message.pose.position
             rows.append((_stamp(message), received, [place.x, place.y, place.z]))
     return _stream(topic, rows, {"xyz": np.array([row[2] for row in rows], dtype=float).reshape(-1, 3)})
 
 
-def _messages(reader: Any, kinds: Sequence[str]) -> Any:
+def _messages(reader: Any, kinds: Sequence[str], notes: list[str]) -> Any:
+    """Topic, time of reception, s, and message; a number of messages other than the recording announces is added to the `notes`."""
     connections = [c for c in reader.connections if c.msgtype in kinds]
+    read: Counter[str] = Counter()
     for connection, received, raw in reader.messages(connections=connections) if connections else ():
+        read[connection.topic] += 1
         yield connection.topic, received * 1e-9, reader.deserialize(raw, connection.msgtype)
+    announced: Counter[str] = Counter()
+    for connection in connections:
+        announced[connection.topic] += connection.msgcount
+    notes += [
+        f"{count} messages on {topic} are announced, but {read[topic]} are there: the recording is damaged or incomplete"
+        for topic, count in announced.items()
+        if count != read[topic]
+    ]
 
 
 def _stamp(message: Any) -> float:

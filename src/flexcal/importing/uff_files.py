@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,7 @@ from flexcal.importing.foreign_table import ForeignTable
 
 _FUNCTION, _TIME_RESPONSE = 58, 1
 _DIRECTIONS = ("", "X", "Y", "Z", "RX", "RY", "RZ")
+_DELIMITER = b"    -1"
 _SAME_CLOCK = 1e-6
 """Share of a step by which two histories may be sampled apart."""
 
@@ -29,14 +30,14 @@ def read_uff(path: Path) -> ForeignTable:
         import pyuff
     except ImportError:
         raise InputError(f"{path}: universal files need pyuff: pip install pyuff.") from None
+    _require_whole(path)
     try:
         file = pyuff.UFF(str(path))
         kinds = [int(kind) for kind in file.get_set_types()]
-        sets: list[Any] = [file.read_sets(k) for k, kind in enumerate(kinds) if kind == _FUNCTION]
     except Exception as problem:  # of no class of its own
-        reason = " ".join(str(problem).split()) or type(problem).__name__
-        raise InputError(f"{path}: not a readable universal file ({reason}); export it again.") from problem
-    timed = [item for item in sets if int(item["func_type"]) == _TIME_RESPONSE]
+        raise InputError(f"{path}: not a readable universal file; export it again.") from problem
+    sets = [_data_set(path, file, k) for k, kind in enumerate(kinds) if kind == _FUNCTION]
+    timed = [item for item in sets if item is not None]
     if not timed:
         raise InputError(
             f"{path}: it holds no time history (data set 58, function type 1); export the recording as such."
@@ -59,7 +60,48 @@ def read_uff(path: Path) -> ForeignTable:
     return ForeignTable(Table(TableFile(path, tuple(columns), 1), 1, columns), units, notes=tuple(notes))
 
 
-def _names(timed: list[Mapping[str, Any]]) -> list[str]:
+def _require_whole(path: Path) -> None:
+    """Raise `InputError` for a file that cannot be read, or whose last data set has no end: what pyuff leaves out."""
+    try:
+        content = path.read_bytes()
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+    if sum(line.rstrip() == _DELIMITER for line in content.splitlines()) % 2:
+        raise InputError(f"{path}: its last data set has no end, so the file was cut off; export it again.")
+
+
+def _data_set(path: Path, file: Any, index: int) -> dict[str, Any] | None:
+    """A data set 58 with as many values as its header announces; None of one that is no time history."""
+    place = f"{path}: data set {index + 1}"
+    try:
+        with np.errstate(all="ignore"):
+            item = file.read_sets(index)
+        timed, announced, values = (
+            int(item["func_type"]) == _TIME_RESPONSE,
+            int(item["num_pts"]),
+            len(item["data"]),
+        )
+    except Exception as problem:  # of no class of its own, and without a reason
+        raise InputError(
+            f"{place} does not have the lines and fields of a data set 58; export the file again."
+        ) from problem
+    if not timed:
+        return None
+    padded = bool(item.get("binary")) and values > announced > 0
+    if values != announced and not padded:
+        raise InputError(
+            f"{place} announces {announced} values, but {values} can be read from it; export the file again."
+        )
+    x, data = np.asarray(item["x"], dtype=float)[:announced], np.asarray(item["data"])[:announced]
+    if not (announced and np.isfinite(x).all()):
+        raise InputError(
+            f"{place} has {'no finite time axis' if announced else 'no values'}; export the file again."
+        )
+    return {**item, "x": x, "data": data}
+
+
+def _names(timed: Sequence[Mapping[str, Any]]) -> list[str]:
     """The histories' first lines, or their nodes and directions, numbered where these are the same."""
     lines = [str(item.get("id1", "")).strip() for item in timed]
     if len(set(lines)) == len(lines) and not {"", "NONE", "t"} & set(lines):

@@ -18,6 +18,7 @@ from flexcal.model.inertia import Inertia
 from flexcal.model.joint import Joint, normals_to
 from flexcal.model.urdf_checks import carried_links
 from flexcal.model.urdf_xml import read_elements
+from flexcal.publication import current
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,7 +51,7 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
     """
     import pinocchio as pin
 
-    if not path.is_file():
+    if not current(path).is_file():
         raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
     robot = read_elements(path)
     links = carried_links(robot, locked)

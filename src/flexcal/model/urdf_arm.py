@@ -10,6 +10,7 @@ from pathlib import Path
 from flexcal.errors import InputError
 from flexcal.model.urdf_checks import carried_links
 from flexcal.model.urdf_xml import Element, read_elements
+from flexcal.publication import current
 from flexcal.structuring import suggestion
 
 _GRIPPER = re.compile(
@@ -48,7 +49,7 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
         )
     if path.is_dir():
         raise InputError(f"{path} is a folder; name the robot's URDF in it.")
-    if not path.is_file():
+    if not current(path).is_file():
         raise InputError(f"{path}: there is no such file; name the robot's URDF.")
     root = read_elements(path)
     joints = {joint.attributes.get("name", ""): joint for joint in root.all("joint")}

@@ -11,6 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from flexcal.errors import InputError
+from flexcal.publication import current
 from flexcal.units import LARGEST
 
 _DEEPEST = 50
@@ -82,7 +83,7 @@ def read_elements(path: Path) -> Element:
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda tag: above.pop()
     try:
-        content = path.read_bytes()
+        content = current(path).read_bytes()
     except OSError as problem:
         raise InputError(f"{path} cannot be read ({problem.strerror}); check the file.") from problem
     try:

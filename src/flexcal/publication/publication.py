@@ -11,7 +11,7 @@ from types import TracebackType
 from flexcal.errors import InputError
 from flexcal.publication.journal import Change, Journal, Seen, seen, sync_folder
 from flexcal.publication.locks import locked
-from flexcal.publication.regular import refuse_irregular
+from flexcal.publication.regular import refuse_irregular, refuse_stream
 from flexcal.publication.settling import settle
 from flexcal.publication.stage import Stage
 from flexcal.publication.undisturbed import undisturbed
@@ -178,9 +178,14 @@ class Publication:
 
 
 def current(path: str | Path) -> Path:
-    """Where to read `path`: the file that waits for this place in the publication being carried out, else the path itself."""
+    """Where to read `path`: the file that waits for this place in the publication being carried out, else the path itself.
+
+    Raises `InputError` where this is a pipe, socket or device.
+    """
     running = Publication.running()
-    return (running.waiting(Path(path)) if running else None) or Path(path)
+    place = (running.waiting(Path(path)) if running else None) or Path(path)
+    refuse_stream(place)
+    return place
 
 
 def _place(path: Path) -> Path:

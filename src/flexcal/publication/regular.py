@@ -1,4 +1,4 @@
-"""What may be replaced by a file."""
+"""What may be read as a file, and what may be replaced by one."""
 
 from __future__ import annotations
 
@@ -7,14 +7,13 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 
-_KINDS = (
-    (stat.S_ISDIR, "a folder"),
-    (stat.S_ISLNK, "a link"),
+_STREAMS = (
     (stat.S_ISFIFO, "a pipe"),
     (stat.S_ISSOCK, "a socket"),
     (stat.S_ISCHR, "a device"),
     (stat.S_ISBLK, "a device"),
 )
+_KINDS = ((stat.S_ISDIR, "a folder"), (stat.S_ISLNK, "a link"), *_STREAMS)
 
 
 def refuse_irregular(path: Path) -> None:
@@ -26,3 +25,17 @@ def refuse_irregular(path: Path) -> None:
     for holds, kind in _KINDS:
         if holds(mode):
             raise InputError(f"{path} is {kind}, which is not replaced by a file; give another name.")
+
+
+def refuse_stream(path: Path) -> None:
+    """Raise `InputError` where a pipe, socket or device, or a link to one, stands in the place of a file to be read.
+
+    Reading it may wait for ever or have no end, and what came out of it cannot be read again for a SHA-256.
+    """
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError):  # the reader says what is wrong
+        return
+    for holds, kind in _STREAMS:
+        if holds(mode):
+            raise InputError(f"{path} is {kind}, not a file; write its content to a file, and name that.")

@@ -65,7 +65,7 @@ from flexcal.workflow.results import (
     write_results,
 )
 from flexcal.workflow.sample_remarks import fitted_sample, sample_document
-from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.stored_block import place_of_block, store_block
 
 AUTO = "auto"
 
@@ -221,6 +221,7 @@ def calibrate_robot(
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
+    target = place_of_block(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
     measured = read_poses(list(files), model)
     require_points(measured, " and ".join(str(file) for file in files))
@@ -274,7 +275,6 @@ def calibrate_robot(
         ranges=joint_extents(selected.model, selected.poses.q),
         measurements=measurement_digests(poses),
     )
-    target = source if out is None else out / ESTIMATES
     before = robot_before(model, poses).errors(poses)
     result = RobotCalibration(
         before,

@@ -35,7 +35,7 @@ from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.results import write_results
 from flexcal.workflow.robot_dynamics import RobotDynamics
 from flexcal.workflow.scratch import scratch_folder
-from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.stored_block import place_of_block, store_block
 from flexcal.workflow.treatment import treatment_of
 from flexcal.workflow.used_signals import used_signals
 
@@ -76,6 +76,9 @@ def identify_robot_dynamics(
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
+    target = place_of_block(source, out, "dynamics")
+    if learn_residual:
+        LearnedDynamics.require_place(target)
     model = with_blocks(bare, blocks, source)
     springs = drive_springs(model, [*logs, *validate], estimator) if flexible else ()
     bearings = bearing_springs(model, [*logs, *validate]) if flexible else ()
@@ -145,13 +148,13 @@ def identify_robot_dynamics(
             external=external,
             learned=learned,
             seconds=time.perf_counter() - begun,
-            estimates=source if out is None else out / ESTIMATES,
+            estimates=target,
             provenance=provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks)),
             command=command,
         )
-        store_block(source, result.estimates, blocks, "dynamics", estimate)
+        store_block(source, target, blocks, "dynamics", estimate)
         if learned is not None:
-            learned.store(result.estimates)
+            learned.store(target)
         if out is not None:
             from flexcal.workflow.report_folder import report_folder
 

@@ -223,6 +223,23 @@ def identify_excitation(
         references=options.references,
         rate_hz=options.rate_hz,
     )
+    try:
+        result = _identified(measured, files, options, command, progress)
+    except InputError:
+        raise
+    except FlexcalError as problem:
+        raise InputError(f"{files[0]}: {problem}") from problem
+    _write(out, result)
+    return result
+
+
+def _identified(
+    measured: ResponseRecords,
+    files: Sequence[Path],
+    options: ExcitationOptions,
+    command: str,
+    progress: Progress,
+) -> IdentifiedExcitation:
     pieces = equal_pieces(measured.records)
     periodic = [find_period(r.references if r.references.size else r.inputs) for r in pieces]
     period = periodic[0] if len(set(periodic)) == 1 else None
@@ -235,7 +252,7 @@ def identify_excitation(
         spectra = with_reference(spectra, references[:, kept])
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
     masses = identify_masses(identified.fit, identified.response, options.masses)
-    result = IdentifiedExcitation(
+    return IdentifiedExcitation(
         measured=measured,
         options=options,
         spectra=spectra,
@@ -247,8 +264,6 @@ def identify_excitation(
         files=tuple(files),
         command=command,
     )
-    _write(out, result)
-    return result
 
 
 def _in_band(whole: RecordSpectra, band: tuple[float, ...], files: Sequence[Path]) -> RecordSpectra:

@@ -18,7 +18,7 @@ from flexcal.progress import Progress, silent
 from flexcal.report.inertials import inertials_checks
 from flexcal.report.trust import Trust
 from flexcal.workflow.results import quantities, write_results
-from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.stored_block import place_of_block, store_block
 
 _SENSELESS = 0.5
 """Share of the torques that no robot misses whose torques they are."""
@@ -67,6 +67,8 @@ def identify_robot_inertials(
     `FlexcalError` where the folder does not hold trajectories of this robot; nothing is written then.
     """
     nominal = RobotModel.from_yaml(robot, estimates=False)
+    source = nominal.path.parent / nominal.config.estimates
+    target = place_of_block(source, out, "dynamics")
     cell = FolderCell(folder, nominal)
     plan = cell.plan
     if not isinstance(plan, TrajectoryPlan):
@@ -87,8 +89,6 @@ def identify_robot_inertials(
         )
     origin = provenance([robot, nominal.urdf, folder / PLAN, *files], {})
     estimate = replace(estimate, provenance=origin)
-    source = nominal.path.parent / nominal.config.estimates
-    target = source if out is None else out / ESTIMATES
     before = trajectory_error(nominal, plan, recordings)
     found = RobotInertials(nominal, estimate, len(plan), before, error, target, command)
     others = read_estimates(source, without="dynamics") if source.exists() else {}

@@ -39,7 +39,7 @@ from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.recorded_logs import RecordedLogs, recorded_with
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.scratch import scratch_folder
-from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.stored_block import place_of_block, store_block
 from flexcal.workflow.treatment import Treatment, treatment_of
 from flexcal.workflow.used_signals import used_signals
 
@@ -157,6 +157,7 @@ def identify_robot_payload(
     if estimates is not None and not source.exists():
         raise InputError(f"{source} does not exist; give the estimates.yaml of 'flexcal identify dynamics'.")
     blocks = read_estimates(source, without="payload") if source.exists() else {}
+    target = place_of_block(source, out, "payload")
     if "dynamics" not in blocks and not free:
         raise InputError(
             f"{source} has no block 'dynamics', so payload and robot inertia are not identifiable separately; run 'flexcal identify "
@@ -202,7 +203,6 @@ def identify_robot_payload(
         tuple(blocks),
     )
     estimate = replace(fit.estimate, provenance=origin | {PAYLOAD_FRAME: frame})
-    target = source if out is None else out / ESTIMATES
     result = RobotPayload(
         declared=nominal,
         model=model,

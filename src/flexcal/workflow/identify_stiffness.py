@@ -32,7 +32,7 @@ from flexcal.workflow.bearing_remarks import response_bearings_block
 from flexcal.workflow.experiment_files import common_plan, plan_files, read_responses
 from flexcal.workflow.results import dropped_parameters, quantities, springs_block, write_results
 from flexcal.workflow.stiffness_remarks import further_joints, stiffness_remarks
-from flexcal.workflow.stored_block import ESTIMATES, store_block
+from flexcal.workflow.stored_block import place_of_block, store_block
 
 WeightingName = Literal["covariance", "paper", "uniform"]
 SearchName = Literal["multi-start", "population"]
@@ -119,6 +119,7 @@ def identify_robot_stiffness(
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="stiffness") if source.exists() else {}
+    target = place_of_block(source, out, "stiffness")
     model = with_blocks(bare, {block: e for block, e in blocks.items() if block == "dynamics"}, source)
     calibrated = blocks.get("calibration")
     if calibrated is not None:
@@ -145,7 +146,6 @@ def identify_robot_stiffness(
         [robot, bare.urdf, *inputs, *plans], options, source if blocks else None, tuple(blocks)
     )
     estimate = replace(result.estimate, provenance=origin)
-    target = source if out is None else out / ESTIMATES
     seen = {response.pose for response in responses}
     missing = () if plan is None else tuple(k + 1 for k in range(len(plan.poses)) if k not in seen)
     found = RobotStiffness(

@@ -16,6 +16,7 @@ from flexcal.dynamics import (
     RecordedRows,
     ResidualErrors,
     learn_residual,
+    require_learned_place,
     residual_errors,
     write_learned_residual,
 )
@@ -46,6 +47,11 @@ class LearnedDynamics:
         values = estimate.parameters.coordinates()
         held_out = None if unseen is None else residual_errors(learned, unseen, values)
         return cls(learned, blocks, residual_errors(learned, recorded, values), held_out)
+
+    @staticmethod
+    def require_place(estimates: Path) -> None:
+        """Raise `InputError` where another program's file stands where it would be written, beside the file `estimates`."""
+        require_learned_place(estimates.with_name(LEARNED))
 
     def file(self, estimates: Path) -> Path | None:
         """Where it is written: beside the file `estimates`, and nowhere where nothing was learned."""

@@ -5,10 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from flexcal.estimates_file import Block, write_estimates
+from flexcal.estimates_file import Block, require_place, write_estimates
 from flexcal.estimation import Estimate
 
 ESTIMATES = "estimates.yaml"
+
+
+def place_of_block(source: Path, out: Path | None, block: Block) -> Path:
+    """The file into which an identification puts its block: in the folder `out`, else the robot's own `source`.
+
+    Raises `InputError` where that cannot take the block, as one that another program wrote.
+    """
+    target = source if out is None else out / ESTIMATES
+    require_place(target, block)
+    return target
 
 
 def store_block(
