@@ -9,7 +9,8 @@ import pytest
 from scipy.optimize import minimize
 
 from flexcal.calibration.error_cells import ErrorCells
-from flexcal.calibration.restricted_likelihood import PointSums, RestrictedLikelihood
+from flexcal.calibration.point_sums import PointSums
+from flexcal.calibration.restricted_likelihood import RestrictedLikelihood
 from flexcal.calibration.scatter import Scatter
 from flexcal.calibration.variance_components import LinearFit
 
@@ -17,10 +18,15 @@ ONE_POINT = np.arange(30)
 SEVERAL_POINTS = np.r_[np.repeat(np.arange(9), 2), np.repeat([9, 10, 11], 3), 12, 12, 13]
 
 
-def drawn(visits: np.ndarray) -> LinearFit:
+ALL_AGAIN = np.arange(30) % 11
+SOME_AGAIN = np.r_[np.arange(20), np.arange(10)]
+NONE_AGAIN = np.arange(30)
+
+
+def drawn(visits: np.ndarray, command: np.ndarray = ALL_AGAIN) -> LinearFit:
     """A fit of seven parameters, two of them with a prior, to 30 points with all kinds of shared errors."""
     rng = np.random.default_rng(4)
-    cells = ErrorCells(visits, np.arange(30) // 6, (7 * np.arange(30)) % 4, np.arange(30) % 11)
+    cells = ErrorCells(visits, np.arange(30) // 6, (7 * np.arange(30)) % 4, command)
     sigma = rng.uniform(1e-5, 3e-5, (30, 3))
     parts = (rng.normal(size=(30, 3, k)) for k in (5, 2, 3, 4))
     free, tied, turns, waves = parts
@@ -52,8 +58,11 @@ def derivative(fit: LinearFit, name: str) -> np.ndarray:
         ("robot", "transmission", "share"),
     ],
 )
-def test_likelihood_and_its_derivatives(visits: np.ndarray, names: tuple[str, ...]) -> None:
-    fit = drawn(visits)
+@pytest.mark.parametrize("command", [ALL_AGAIN, SOME_AGAIN, NONE_AGAIN])
+def test_likelihood_and_its_derivatives(
+    visits: np.ndarray, names: tuple[str, ...], command: np.ndarray
+) -> None:
+    fit = drawn(visits, command)
     stds = dict(zip(names, np.linspace(1e-5, 3e-5, len(names)).tolist(), strict=True)) | {"share": 0.7}
     seen = RestrictedLikelihood.of(PointSums.of(fit), names, Scatter(**stds))
     tied, free, rest = fit.tied.reshape(90, -1), fit.free.reshape(90, -1), fit.residual.ravel()
@@ -69,6 +78,11 @@ def test_likelihood_and_its_derivatives(visits: np.ndarray, names: tuple[str, ..
     np.testing.assert_allclose(seen.slopes, slopes, rtol=1e-8)
     average = [[rest @ a @ b @ projection @ rest for b in pushed] for a in pushed]
     np.testing.assert_allclose(seen.information, average, rtol=1e-8)
+    columns = 1e-5 * np.random.default_rng(6).normal(size=(30, 3, 2))
+    both = np.c_[columns.reshape(90, 2), rest]
+    if "share" not in names and set(fit.cells.blocks) <= set(names):
+        products = fit.products(Scatter(**stds), columns)
+        np.testing.assert_allclose(products, both.T @ projection @ both, rtol=1e-8)
 
 
 @pytest.mark.parametrize("visits", [ONE_POINT, SEVERAL_POINTS])

@@ -62,8 +62,9 @@ class Drift:
         share = np.linspace(-0.5, 0.5, len(poses))
         kept = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
         ramp = share[kept][:, None, None] * np.eye(3)
-        residual, columns = fit.linear.projected(replace(fit.scatter, order=0.0), ramp)
-        travel, left = np.linalg.lstsq(columns, residual, rcond=None)[:2]
+        products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
+        covariance = np.linalg.inv(products[:-1, :-1])
+        travel = covariance @ products[:-1, -1]
         freedom = fit.linear.residual.size - fit.linear.free.shape[2] - len(travel)
-        scale = float(left[0]) / max(freedom, 1) if left.size else 0.0
-        return cls(travel, np.linalg.inv(columns.T @ columns) * max(1.0, scale), freedom)
+        left = float(products[-1, -1] - products[:-1, -1] @ travel)
+        return cls(travel, covariance * max(1.0, left / max(freedom, 1)), freedom)

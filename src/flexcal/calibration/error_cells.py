@@ -10,6 +10,8 @@ import numpy as np
 from flexcal.calibration.folds import order_folds, workspace_folds
 from flexcal.data import PoseSet
 
+COMMAND = "command"
+"""The model error common to all visits of a command."""
 _CELL_VISITS, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
 """Visits to poses a block of the model error, and bounds on the number of blocks."""
 SAME_COMMAND = 1e-4
@@ -56,7 +58,7 @@ class ErrorCells:
     @property
     def blocks(self) -> dict[str, np.ndarray]:
         """The labels (N,) of a common model error that there are, by name."""
-        named = {"workspace": self.workspace, "order": self.order, "command": self.command}
+        named = {"workspace": self.workspace, "order": self.order, COMMAND: self.command}
         return {name: labels for name, labels in named.items() if labels is not None}
 
     @property

@@ -312,12 +312,12 @@ class FittedPoints:
         white = own.reshape(-1, 3, len(slopes))[self.inliers] @ estimate.covariance
         respond = np.swapaxes(task.whitening[self.inliers], 1, 2) @ white
         linear = self.linear
-        together = np.einsum("nip,nik->pk", respond, scatter.shared(linear.cells))
+        together = scatter.shared(linear.cells, respond)
         jointly = scatter.jointly(linear.sigma, linear.turns, linear.cells)
         visits = linear.cells.gathered(respond)
         spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
         taken = np.einsum("nip,niq->pq", white, white, optimize=True)
-        return estimate.covariance + spread - taken + together @ together.T
+        return estimate.covariance + spread - taken + together.T @ together
 
     def _gain(self, names: list[str]) -> np.ndarray:
         """How the estimates (p, h) follow parameters that are held, per unit of these: -Σ Aᵀ A_h of the whitened columns."""

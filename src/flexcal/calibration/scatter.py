@@ -6,7 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.error_cells import ErrorCells, block_columns
+from flexcal.calibration.error_cells import ErrorCells
+from flexcal.calibration.incidence import incidence
 from flexcal.calibration.prediction import Prediction
 from flexcal.model import RobotModel
 
@@ -89,13 +90,16 @@ class Scatter:
         turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
         return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
 
-    def shared(self, cells: ErrorCells) -> np.ndarray:
-        """Columns (N, 3, k) m of the model error that some measurements share, each times a standard normal number."""
-        stds = {name: getattr(self, name) for name in cells.blocks}
-        columns = [
-            stds[name] * block_columns(labels) for name, labels in cells.blocks.items() if stds[name] > 0
-        ]
-        return np.concatenate([np.zeros((len(cells.pose), 3, 0)), *columns], axis=2)
+    def shared(self, cells: ErrorCells, rows: np.ndarray) -> np.ndarray:
+        """Sums (k, m) of `rows` (N, 3, m) over the points that share each coordinate of a model error, times its standard deviation."""
+        flat = rows.reshape(len(rows), -1)
+        sums = [np.zeros((0, flat.shape[1]))]
+        for name, labels in cells.blocks.items():
+            if (std := getattr(self, name)) > 0:
+                sums.append(
+                    std * (incidence(labels, np.arange(len(rows)), (int(labels.max()) + 1, len(rows))) @ flat)
+                )
+        return np.concatenate(sums).reshape(-1, rows.shape[2])
 
 
 def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:

@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.error_cells import ErrorCells
-from flexcal.calibration.restricted_likelihood import PointSums, RestrictedLikelihood
+from flexcal.calibration.point_sums import PointSums
+from flexcal.calibration.restricted_likelihood import RestrictedLikelihood
 from flexcal.calibration.scatter import Scatter
 
 _CLEAR_GAIN = 3.0
@@ -46,23 +47,17 @@ class LinearFit:
     turns: np.ndarray
     cells: ErrorCells
 
-    def projected(self, scatter: Scatter, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Whitened residual (m,) and further `columns` (N, 3, k) as (m, k), without what parameters and shared errors explain.
+    def products(self, scatter: Scatter, columns: np.ndarray) -> np.ndarray:
+        """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, the last, the residual, less what the parameters explain.
 
-        Their scalar products are those under the marginal covariance of the residual, the `tied` numbers integrated out.
+        They are weighted by the inverse of the residual's marginal covariance, the `tied` numbers and shared errors integrated out.
         """
-        whitening = np.linalg.inv(np.linalg.cholesky(scatter.jointly(self.sigma, self.turns, self.cells)))
-        waves = scatter.transmission * self.waves
-        tied = np.concatenate([self.tied, waves, scatter.shared(self.cells)], axis=2)
-        both = np.concatenate([self.free, tied, self.residual[:, :, None], columns], axis=2)
-        size, count = self.free.shape[2], tied.shape[2]
-        white = np.matmul(whitening, self.cells.gathered(both)).reshape(-1, both.shape[2])
-        prior = np.zeros((count, both.shape[2]))
-        prior[:, size : size + count] = np.eye(count)
-        stacked = np.vstack([white, prior])
-        basis = np.linalg.qr(stacked[:, : size + count])[0]
-        left = stacked[:, size + count :] - basis @ (basis.T @ stacked[:, size + count :])
-        return left[:, 0], left[:, 1:]
+        shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
+        names = [name for name in shared if getattr(scatter, name) > 0]
+        sums = PointSums.of(self, columns)
+        last = sums.columns.shape[2]
+        own = np.arange(last - columns.shape[2] - 1, last)
+        return RestrictedLikelihood.of(sums, names, scatter).products(own)
 
     def scatter(self, *, stated: bool) -> tuple[Scatter, dict[str, float]]:
         """The components, and the standard deviation of each of them that is not zero.

@@ -1,0 +1,131 @@
+"""Symmetric matrices of many short diagonal blocks that a few columns border."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+
+@dataclass(frozen=True, eq=False)
+class Arrowhead:
+    """M = [[B, F], [Fᵀ, D]]: `border` F (b, d), `corner` D (d, d), and the diagonal `blocks` of B in their order, (k, m, m) of one size."""
+
+    blocks: tuple[np.ndarray, ...]
+    border: np.ndarray
+    corner: np.ndarray
+
+    def scaled(self, outer: float, inner: np.ndarray, used: np.ndarray) -> Arrowhead:
+        """S M S of the columns `used` (d',) of the corner, with the factors `outer` of the first b rows and `inner` (d',) of these."""
+        blocks = tuple(outer**2 * values for values in self.blocks)
+        corner = self.corner[np.ix_(used, used)] * inner * inner[:, None]
+        return Arrowhead(blocks, self.border[:, used] * (outer * inner), corner)
+
+    def rows(self, outer: float, inner: np.ndarray, used: np.ndarray, columns: np.ndarray) -> np.ndarray:
+        """S M (b + d', k) of some `columns` (k,) of the corner, S as in `scaled`."""
+        return np.concatenate(
+            [outer * self.border[:, columns], inner[:, None] * self.corner[np.ix_(used, columns)]]
+        )
+
+    def plus_identity(self, inner: np.ndarray) -> Arrowhead:
+        """M with 1 added to the diagonal of B and, where `inner` (d,) says so, of D."""
+        blocks = tuple(values + np.eye(values.shape[1]) for values in self.blocks)
+        return Arrowhead(blocks, self.border, self.corner + np.diag(inner.astype(float)))
+
+    def times(self, vector: np.ndarray) -> np.ndarray:
+        """M v (b + d,)."""
+        first, last = vector[: len(self.border)], vector[len(self.border) :]
+        upper = self.border @ last + _by_blocks(self.blocks, first[:, None])[:, 0]
+        return np.concatenate([upper, self.border.T @ first + self.corner @ last])
+
+    def factored(self) -> ArrowheadFactor:
+        """Its Cholesky factor, with B eliminated first; raises `LinAlgError` where M is not positive definite."""
+        inverses = tuple(np.linalg.inv(np.linalg.cholesky(values)) for values in self.blocks)
+        border = _by_blocks(inverses, self.border)
+        return ArrowheadFactor(inverses, border, np.linalg.cholesky(self.corner - border.T @ border))
+
+
+@dataclass(frozen=True, eq=False)
+class ArrowheadFactor:
+    """L with L Lᵀ = M: `inverses` of the blocks' factors L_B, `border` L_B⁻¹ F (b, d), and `corner` L_S of S = D - Fᵀ B⁻¹ F (d, d)."""
+
+    inverses: tuple[np.ndarray, ...]
+    border: np.ndarray
+    corner: np.ndarray
+
+    @property
+    def log_determinant(self) -> float:
+        """ln det M."""
+        diagonals = [1 / np.diagonal(values, axis1=1, axis2=2).ravel() for values in self.inverses]
+        return 2 * float(np.log(np.concatenate([*diagonals, np.diag(self.corner)])).sum())
+
+    def half(self, columns: np.ndarray) -> np.ndarray:
+        """L⁻¹ C of columns (b + d, k)."""
+        from scipy.linalg import solve_triangular
+
+        count = len(self.border)
+        upper = _by_blocks(self.inverses, columns[:count])
+        lower = solve_triangular(self.corner, columns[count:] - self.border.T @ upper, lower=True)
+        return np.concatenate([upper, lower])
+
+    def other_half(self, columns: np.ndarray) -> np.ndarray:
+        """L⁻ᵀ C of columns (b + d, k)."""
+        from scipy.linalg import solve_triangular
+
+        count = len(self.border)
+        lower = solve_triangular(self.corner.T, columns[count:])
+        return np.concatenate([_by_blocks(self._turned, columns[:count] - self.border @ lower), lower])
+
+    def trace(self, other: Arrowhead) -> float:
+        """tr M⁻¹ A of an `other` matrix A with blocks of the same sizes."""
+        whole = float(np.sum(self._corner_inverse * other.corner))
+        for inverse, values in zip(self.inverses, other.blocks, strict=True):
+            whole += float(np.sum((inverse @ values) * inverse))
+        across = _by_blocks(other.blocks, self._eliminated) - 2 * other.border
+        return whole + float(np.sum(self._spread * across))
+
+    def squares(self, other: Arrowhead) -> float:
+        """‖L⁻¹ A‖² of the first b columns of an `other` matrix A with blocks of the same sizes."""
+        whole, first = 0.0, 0
+        lower = other.border.T.copy()
+        for inverse, values in zip(self.inverses, other.blocks, strict=True):
+            half, rows = inverse @ values, slice(first, first + values.shape[0] * values.shape[1])
+            whole += float(np.sum(half**2))
+            border = self.border[rows].reshape(len(half), half.shape[1], -1)
+            lower[:, rows] -= np.matmul(np.swapaxes(half, 1, 2), border).reshape(-1, border.shape[2]).T
+            first = rows.stop
+        return whole + float(np.sum(self._corner_inverse * (lower @ lower.T)))
+
+    @property
+    def _turned(self) -> tuple[np.ndarray, ...]:
+        return tuple(np.swapaxes(values, 1, 2) for values in self.inverses)
+
+    @cached_property
+    def _corner_inverse(self) -> np.ndarray:
+        """S⁻¹ (d, d)."""
+        from scipy.linalg import cho_solve
+
+        return cho_solve((self.corner, True), np.eye(len(self.corner)))
+
+    @cached_property
+    def _eliminated(self) -> np.ndarray:
+        """B⁻¹ F (b, d)."""
+        return _by_blocks(self._turned, self.border)
+
+    @cached_property
+    def _spread(self) -> np.ndarray:
+        """B⁻¹ F S⁻¹ (b, d)."""
+        return self._eliminated @ self._corner_inverse
+
+
+def _by_blocks(blocks: Sequence[np.ndarray], columns: np.ndarray) -> np.ndarray:
+    """Block-diagonal matrix times columns (b, k)."""
+    result, first = np.empty(columns.shape), 0
+    for values in blocks:
+        last = first + values.shape[0] * values.shape[1]
+        own = columns[first:last].reshape(*values.shape[:2], columns.shape[1])
+        result[first:last] = np.matmul(values, own).reshape(-1, columns.shape[1])
+        first = last
+    return result

@@ -1,0 +1,43 @@
+"""Sparse matrices that add rows, or pairs of rows, of the visits to poses."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+
+def incidence(labels: np.ndarray, columns: np.ndarray, shape: tuple[int, int]) -> csr_matrix:
+    """Matrix of ones at row `labels` and column `columns`, of any shapes that go together; none where a label is negative."""
+    from scipy.sparse import csr_matrix
+
+    labels, columns = np.broadcast_arrays(labels, columns)
+    known = labels >= 0
+    return csr_matrix((np.ones(int(known.sum())), (labels[known], columns[known])), shape=shape)
+
+
+def pairs_of(first: np.ndarray, second: np.ndarray, rows: int, columns: int) -> csr_matrix:
+    """(rows columns, G T T): adds the pairs of rows of a visit whose labels (G, T, kinds) are one of the `first` and one of the `second`.
+
+    Negative labels are of no row.
+    """
+    visits, places = first.shape[:2]
+    one, other = first[:, :, None, :, None], second[:, None, :, None, :]
+    label = np.where((one >= 0) & (other >= 0), one * columns + other, -1)
+    entry = np.arange(visits * places**2).reshape(visits, places, places, 1, 1)
+    return incidence(label, entry, (rows * columns, visits * places**2))
+
+
+def by_axes(inner: np.ndarray) -> np.ndarray:
+    """The 3 × 3 entries (G T T, 9) of blocks (G, 3 T, 3 T)."""
+    places = inner.shape[1] // 3
+    return inner.reshape(-1, places, 3, places, 3).transpose(0, 1, 3, 2, 4).reshape(-1, 9)
+
+
+def added(sums: csr_matrix, rows: np.ndarray) -> np.ndarray:
+    """Sums (3 K, k) of `rows` (G, 3 T, k) over K blocks."""
+    width = rows.shape[2]
+    return (sums @ rows.reshape(-1, 3 * width)).reshape(-1, width)
