@@ -12,6 +12,7 @@ import pytest
 from flexcal.cell import CellConfig, FrictionConfig, LoopConfig, SensorConfig, VirtualCell
 from flexcal.cell.arm_readings import mounted, sensitivities
 from flexcal.data import MultisinePlan, read_recording, write_recording
+from flexcal.elasticity import ReferenceMotion, reference_shift
 from flexcal.frequency import multisine
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
@@ -68,17 +69,17 @@ def plan() -> MultisinePlan:
     )
 
 
+EXACT = CellConfig(
+    controller=LoopConfig(substeps=4),
+    sensors=SensorConfig(0, False, 0.0, acceleration_noise=0.0, velocity_noise=0.0, displacement_noise=0.0),
+    friction=FrictionConfig(scale=0.0),
+)
+
+
 def test_readings_follow_the_linearised_robot(sensing: RobotModel, plan: MultisinePlan) -> None:
-    config = CellConfig(
-        controller=LoopConfig(substeps=4),
-        sensors=SensorConfig(
-            0, False, 0.0, acceleration_noise=0.0, velocity_noise=0.0, displacement_noise=0.0
-        ),
-        friction=FrictionConfig(scale=0.0),
-    )
     period = multisine.samples_per_period(plan.base_frequency_hz, 1 / RATE_HZ)
     torque, read, q = [], [], []
-    for recording in VirtualCell(sensing, config, SEED).record(plan):
+    for recording in VirtualCell(sensing, EXACT, SEED).record(plan):
         assert recording.sensors == ("hand", "forearm", "beam", "probe")
         last = slice(-period, None)
         torque.append(np.fft.rfft(recording.torque[last, :3], axis=0)[plan.lines])
@@ -92,6 +93,41 @@ def test_readings_follow_the_linearised_robot(sensing: RobotModel, plan: Multisi
     expected = expected * sensitivities(tuple(sensing.sensors.values()), SEED)[:, None]
     off = np.linalg.norm(measured - expected, axis=2) / np.linalg.norm(expected, axis=2)
     assert np.median(off) < 3e-4 and off.max() < 3e-3, off
+
+
+def test_readings_along_the_reference_motion(sensing: RobotModel, plan: MultisinePlan) -> None:
+    """What a sensor sees of a displacement turns with the arm: a simulation in time that swings by 0.04 rad."""
+    swaying = replace(plan, signs=True, reference_amplitude=0.04, reference_frequency_hz=1.75)
+    period = 2 * multisine.samples_per_period(plan.base_frequency_hz, 1 / RATE_HZ)
+    torque, read, q = [], [], []
+    for recording in VirtualCell(sensing, EXACT, SEED).record(swaying):
+        last = slice(-period, None)
+        torque.append(np.fft.rfft(recording.torque[last, :3], axis=0)[2 * plan.lines])
+        read.append(np.fft.rfft(recording.sensor_readings[last], axis=0)[2 * plan.lines])
+        q.append(recording.q[last].mean(axis=0))
+    torque, read = (
+        [(up - down) / 2 for up, down in zip(x[::2], x[1::2], strict=True)] for x in (torque, read)
+    )
+    s = 2j * np.pi * plan.frequencies_hz
+    held = -np.expm1(-s / RATE_HZ) / (s / RATE_HZ)
+    measured = np.stack(read, axis=2) @ np.linalg.inv(held[:, None, None] * np.stack(torque, axis=2))
+    at, sensors, gains = (
+        np.mean(q, axis=0),
+        mounted(sensing, SEED),
+        sensitivities(mounted(sensing, SEED), SEED),
+    )
+    still = transfer_matrix(
+        linearise(sensing, at, plan.payload, sensors=sensors), plan.frequencies_hz
+    ).response
+    motion = ReferenceMotion.of(swaying)
+    shift = reference_shift(sensing, at, plan.payload, plan.frequencies_hz, motion, sensors=sensors)
+    size = np.linalg.norm(still[:, 3:], axis=2)
+    off, off_still = (
+        np.linalg.norm(measured / gains[:, None] - expected[:, 3:], axis=2) / size
+        for expected in (still + shift, still)
+    )
+    assert (np.median(off, axis=0) < 1e-3).all(), off
+    assert (np.median(off_still, axis=0) > 2e-3).all(), off_still
 
 
 def test_readings_have_their_noise_and_round_trip(

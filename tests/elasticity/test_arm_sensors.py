@@ -9,16 +9,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.elasticity import CovarianceWeighting, ResponseModel, Tolerances, stage_one_parameters
+from flexcal.elasticity import (
+    CovarianceWeighting,
+    ReferenceMotion,
+    ResponseModel,
+    Tolerances,
+    reference_shift,
+    stage_one_parameters,
+)
 from flexcal.elasticity.fit import ResponseData, fit_responses
 from flexcal.elasticity.parameters import check_sensors
 from flexcal.elasticity.residual import StageOneResidual
 from flexcal.errors import FlexcalError, InputError
+from flexcal.estimation import Estimate
 from flexcal.export.mjcf import mjcf_spec
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
 from flexcal.model.linearisation import linearise
 from flexcal.model.names import spring_names
+from flexcal.model.stored import with_blocks
 from flexcal.model.transfer import transfer_matrix
 
 SENSORS = """
@@ -176,6 +185,24 @@ def test_tilt_matters_at_low_frequencies(sensing: RobotModel, poses) -> None:
     assert share[0] > 0.5 and 1e-3 < share[1] < 0.5 and share[2] < 0.01
 
 
+def test_readings_along_a_very_slow_motion_average_the_frozen_ones(sensing: RobotModel, poses) -> None:
+    """In the quasi-static limit with free motors the response is the mean of those along the motion, linearised one by one."""
+    q, frequencies, size = poses["default"][1], np.linspace(5, 60, 12), np.deg2rad(1.0)
+    sensors = tuple(sensing.sensors.values())
+    motion = ReferenceMotion(size, 1e-5, np.zeros(3), np.zeros(3), np.zeros((3, 1)))
+    shift = reference_shift(sensing, q, None, frequencies, motion, sensors=sensors)
+    still = transfer_matrix(linearise(sensing, q, sensors=sensors), frequencies).response
+    frozen = []
+    for angle in 2 * np.pi * np.arange(8) / 8:
+        at = q.copy()
+        at[:3] += size * np.sin(angle)
+        frozen.append(transfer_matrix(linearise(sensing, at, sensors=sensors), frequencies).response)
+    expected = np.mean(frozen, axis=0) - still
+    for row in range(expected.shape[1]):
+        largest = np.abs(expected[:, row]).max()
+        np.testing.assert_allclose(shift[:, row], expected[:, row], atol=0.05 * largest, err_msg=str(row))
+
+
 def test_jacobian_is_that_of_finite_differences(sensing: RobotModel, poses, drawn, sensed, rng) -> None:
     truth = drawn(sensing, rng, inertias=True)
     responses = sensed(truth, poses["default"][:2], ("hand", "beam", "probe"), 0.1, rng, step=48)
@@ -196,8 +223,14 @@ def test_jacobian_is_that_of_finite_differences(sensing: RobotModel, poses, draw
 def test_a_sensor_determines_the_forearm_that_motors_do_not_see(
     sensing: RobotModel, poses, drawn, sensed
 ) -> None:
-    """Without a payload the forearm's torsion bearing hardly moves a motor: known to its prior. An accelerometer off its axis sees it."""
+    """Without a payload the forearm's torsion bearing hardly moves a motor: known to its prior. An accelerometer off its axis, whose place
+    is known, sees it."""
     rng = np.random.default_rng(11)
+    placed = {
+        name: replace(sensor, config=replace(sensor.config, position_std=0.0, direction_std=0.0))
+        for name, sensor in sensing.sensors.items()
+    }
+    sensing = replace(sensing, sensors=placed)
     truth = drawn(sensing, rng, inertias=False)
     name = "joint_3.bearing_y.stiffness"
     std, error = {}, {}
@@ -221,7 +254,7 @@ def test_a_sensor_determines_the_forearm_that_motors_do_not_see(
 
 @pytest.mark.slow
 def test_intervals_cover(sensing: RobotModel, poses, drawn, sensed) -> None:
-    """95 % intervals of springs and sensitivities over 40 robots, links as far off as the prior says, sensitivities 2 %.
+    """95 % intervals of springs and sensitivities over 40 robots, links, sensitivities and mounting as far off as their priors say.
 
     The fit starts at the truth: what finds the basin, the search, is not looked at here.
     """
@@ -230,7 +263,19 @@ def test_intervals_cover(sensing: RobotModel, poses, drawn, sensed) -> None:
         rng = np.random.default_rng(1000 + seed)
         truth = drawn(sensing, rng, inertias=True)
         gains = np.exp(0.02 * rng.standard_normal(2))
-        responses = sensed(truth, poses["default"][:3], ("hand", "forearm"), 0.02, rng, gains, step=16)
+        placed = {
+            name: sensor.misplaced(sensor.mounting_std * rng.standard_normal(5))
+            for name, sensor in truth.sensors.items()
+        }
+        responses = sensed(
+            replace(truth, sensors=placed),
+            poses["default"][:3],
+            ("hand", "forearm"),
+            0.02,
+            rng,
+            gains,
+            step=16,
+        )
         data = ResponseData(tuple(responses), tolerances=Tolerances.none())
         parameters = data.parameters(sensing)[0]
         x = parameters.coordinates()
@@ -280,6 +325,19 @@ def test_responses_with_sensors_round_trip(sensing: RobotModel, poses, sensed, t
     np.testing.assert_array_equal(back.stacked, response.stacked)
     np.testing.assert_array_equal(back.stacked_covariance, response.stacked_covariance)
     np.testing.assert_allclose(back.stacked_std[:, :3], back.std, rtol=1e-12)
+
+
+def test_estimates_with_sensors_are_read_by_other_verbs(
+    sensing: RobotModel, poses, sensed, tmp_path: Path
+) -> None:
+    responses = sensed(sensing, poses["default"][:1], ("hand", "beam"), 0.01)
+    parameters = stage_one_parameters(sensing, responses)
+    count = len(parameters)
+    estimate = Estimate(
+        parameters, 1e-4 * np.eye(count), count, (), (True,) * count, 0.0, 0.0, 1, "converged", "", 1
+    )
+    assert {"sensor.hand.sensitivity", "sensor.beam.direction_2"} <= set(parameters.names)
+    with_blocks(sensing, {"stiffness": estimate}, tmp_path / "estimates.yaml")
 
 
 def test_a_sensor_that_is_not_declared_is_refused(

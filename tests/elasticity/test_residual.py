@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -45,6 +47,31 @@ def test_whitened_noise_has_unit_variance(tx90l, poses, synthesise, rng):
         rows.append(PoseResidual.of(noisy, CovarianceWeighting()).residual(exact.response))
     scatter = np.cov(np.array(rows).reshape(-1, 18).T)
     np.testing.assert_allclose(scatter, np.eye(18), atol=0.1)
+
+
+def test_outputs_that_are_known_from_each_other_have_linear_errors(tx90l, poses, synthesise, rng):
+    """Disturbances of the torques scatter all outputs by 8 % together: logarithms, whose second-order terms differ from output to output,
+    are not for rows whose ratio is known to a thousandth; errors that are linear in the response have unit variance."""
+    exact = synthesise(tx90l, poses["default"][:1], noise=0.05, step=4)[0]
+    g = np.concatenate([exact.response, exact.response[:, :1] + 0.5 * exact.response[:, 1:2]], axis=1)
+    lines, (m, n) = len(g), g.shape[1:]
+    own = (1e-3 * np.linalg.norm(g, axis=2)) ** 2  # of every reading alone
+    one = 0.08**2 * g @ np.swapaxes(g, 1, 2).conj() + own[:, :, None] * np.eye(m)
+    covariance = np.zeros((lines, n * m, n * m), dtype=complex)
+    for c in range(n):
+        covariance[:, m * c : m * c + m, m * c : m * c + m] = one
+    squares = []
+    for _ in range(20):
+        draw = rng.standard_normal((2, lines, m, n)) / np.sqrt(2)
+        stacked = g + np.linalg.cholesky(one) @ (draw[0] + 1j * draw[1])
+        rows = (np.arange(n)[:, None] * m + np.arange(n)).ravel()
+        noisy = replace(
+            exact, response=stacked[:, :n], covariance=covariance[:, rows[:, None], rows],
+            sensors=("hand",), sensor_response=stacked[:, n:], joint_covariance=covariance,
+        )  # fmt: skip
+        residual = PoseResidual.of(noisy, CovarianceWeighting())
+        squares.append(np.mean(residual.residual(g) ** 2))
+    assert np.mean(squares) == pytest.approx(1.0, abs=0.02)
 
 
 def test_phase_wraps_do_not_matter(tx90l, poses, synthesise):

@@ -16,17 +16,19 @@ from flexcal.design.response_noise import (
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 from flexcal.model import RobotModel
-from flexcal.model.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
+from flexcal.model.arm_sensor import mounting_names, sensitivity_name, sensor_delay_name
 from flexcal.model.declared import (
     FRICTION_LOG_STD,
     FRICTION_TOLERANCE,
     declared,
     elastic_inertials,
+    sensor_parameters,
     springs_and_rotors,
 )
 from flexcal.model.linearisation import linearise
 from flexcal.model.motor_impedance import KNOT_OCTAVES, friction_shifts
 from flexcal.model.names import GEOMETRY
+from flexcal.model.sensor_flatness import flatness_shifts
 from flexcal.model.transfer import transfer_matrix
 from flexcal.progress import Progress, silent
 
@@ -101,23 +103,10 @@ def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
     )
     inertials = elastic_inertials(model, loaded=plan.payload != 0)
     errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
-    sensors = (item for sensor in model.sensors.values() for item in _sensor_parameters(sensor, plan))
-    return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors, *sensors))
-
-
-def _sensor_parameters(sensor: ArmSensor, plan: MultisinePlan) -> list[Parameter]:
-    name, config = sensor.name, sensor.config
-    mounting = zip(
-        mounting_names(name),
-        ("m",) * 3 + ("rad",) * 2,
-        (config.position_std,) * 3 + (config.direction_std,) * 2,
-        strict=True,
+    sensors = (
+        item for sensor in model.sensors.values() for item in sensor_parameters(sensor, 1 / plan.rate_hz)
     )
-    return [
-        Parameter(sensitivity_name(name), "1", 1.0, prior_std=config.sensitivity_std, scale="log"),
-        Parameter(sensor_delay_name(name), "s", 0.0, prior_std=1 / plan.rate_hz),
-        *(Parameter(key, unit, 0.0, prior_std=std) for key, unit, std in mounting if std > 0),
-    ]
+    return Parameters((*springs_and_rotors(model), *inertials, *delays, *errors, *sensors))
 
 
 def response_sensitivity(
@@ -197,10 +186,17 @@ def pose_response(
             columns.append(by[item.name] * (item.value if item.scale == "log" else 1.0))
     loss = [by[name] * value * FRICTION_LOG_STD for name, value in zip(rubbing, viscous, strict=True)]
     strange = friction_shifts(response, frequencies, FRICTION_TOLERANCE * viscous, KNOT_OCTAVES)
+    uneven = flatness_shifts(
+        response,
+        frequencies,
+        arm_sensors,
+        every=tuple(sensor.name for sensor in arm_sensors),
+        grid=frequencies,
+    )
     return PoseResponse(
         response,
         np.stack(columns, axis=-1),
-        np.concatenate([np.stack(loss, axis=-1), strange], axis=-1),
+        np.concatenate([np.stack(loss, axis=-1), strange, uneven], axis=-1),
         friction,
         sensors,
         tuple(sensor.order for sensor in arm_sensors),
@@ -258,9 +254,9 @@ def _of_sensors(
         by_gain[:, row] = response[:, row]
         by_delay[:, row] = -2j * np.pi * plan.frequencies_hz[:, None] * response[:, row]
         changes |= {sensitivity_name(sensor.name): by_gain, sensor_delay_name(sensor.name): by_delay}
-        stds = (sensor.config.position_std,) * 3 + (sensor.config.direction_std,) * 2
-        for name, misplaced, std in zip(mounting_names(sensor.name), sensor.misplaced(), stds, strict=True):
+        for k, (name, std) in enumerate(zip(mounting_names(sensor.name), sensor.mounting_std, strict=True)):
             if std > 0:
+                misplaced = sensor.misplaced(std * np.eye(5)[k])
                 moved = tuple(misplaced if s is sensor else s for s in sensors)
                 system = linearise(robot, q, plan.payload, sensors=moved)
                 changes[name] = (transfer_matrix(system, plan.frequencies_hz).response - response) / std

@@ -50,10 +50,11 @@ def _effect(
     axes = [joint.index for joint in robot.driven]
     excess = np.maximum(robot.viscous - np.nan_to_num(model.robot.viscous), 0.0)
     strength = np.where(model.robot.coulomb > 0, excess, 0.0)[axes]
-    system = linearise(robot, pose.q, payload, sensors=pose.sensors)
+    sensors = pose.placed(natural)
+    system = linearise(robot, pose.q, payload, sensors=sensors)
     pulses = FrictionPulses.of(system, pose.frequencies_hz, reference, strength)
     ratio = pose.stiffness_ratio(natural)
     opening = 1.0 - ratio / ratio.mean(axis=0)
-    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening, pose.sensors)
+    moving = reference_shift(robot, pose.q, payload, pose.frequencies_hz, reference, opening, sensors)
     factor = pose.measured(natural)
     return ExperimentEffect((moving + pulses.shift) * factor, pulses.shift_by_form() * factor[..., None])

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from flexcal.model.declared import (
 )
 from flexcal.model.motor_impedance import KNOT_OCTAVES, friction_shifts, over_frequency
 from flexcal.model.names import GEOMETRY
+from flexcal.model.sensor_flatness import flatness_shifts
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,8 @@ class Tolerances:
     coefficient, relative to that; `backlash`: deviation of a gap's effect from the softening of its drive, relative to that; these two
     are complex random functions of frequency in every pose, with knots every `octave`. `distortion` is the share of the stochastic
     nonlinear distortion that all realisations have in common, for reference motion and friction are the same in all: averaging over
-    realisations does not lower it.
+    realisations does not lower it. With `flatness`, sensors on the arm are not flat over frequency, each as its `flatness_std` says: in
+    common in all poses and half as much in each, where the reference motion turns them.
     """
 
     length: float = LENGTH_TOLERANCE
@@ -42,11 +44,12 @@ class Tolerances:
     backlash: float = 0.3
     distortion: float = SHARED_DISTORTION
     octave: float = KNOT_OCTAVES
+    flatness: bool = True
 
     @classmethod
     def none(cls) -> Tolerances:
         """The model is exact."""
-        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, flatness=False)
 
     @property
     def any(self) -> bool:
@@ -105,10 +108,11 @@ class ModelError:
         blocks, columns = [], []
         predictions = model.predict(x)
         shifts = geometric_shifts(model, x, tolerances)
-        mounted = mounting_shifts(model, x)
         natural = model.parameters.natural(x)
         values = dict(zip(model.parameters.names, natural, strict=True))
         labels = pose_labels(responses)
+        every = tuple(dict.fromkeys(sensor.name for pose in model.poses for sensor in pose.sensors))
+        grid = np.concatenate([response.frequencies_hz for response in responses])
         for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
             nominal = predictions[k].response
             viscous = np.array([values[viscous_name(joint, label)] for joint in response.joints])
@@ -124,9 +128,20 @@ class ModelError:
             none = np.empty(0, dtype=int)
             half = effects[k].by_friction.shape[-1] // 2
             form = effects[k].by_friction * np.repeat([tolerances.strength, tolerances.width], half)
-            change = np.concatenate([change, 0.5 * form], axis=-1)
+            uneven = np.zeros((*nominal.shape, 0))
+            if tolerances.flatness:
+                sensors = model.poses[k].sensors
+                uneven = flatness_shifts(
+                    nominal,
+                    response.frequencies_hz,
+                    sensors,
+                    every=every,
+                    grid=grid,
+                    octave=tolerances.octave,
+                )
+            change = np.concatenate([change, 0.5 * form, 0.5 * uneven], axis=-1)
             blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
-            shared = np.concatenate([shifts[k], mounted[k], form], axis=-1)
+            shared = np.concatenate([shifts[k], uneven, form], axis=-1)
             columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shared, none))))
         return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
 
@@ -154,24 +169,3 @@ def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances
             for k, response in enumerate(moved.responses(x)):
                 shifts[k].append(response - base[k])
     return [np.stack(columns, axis=-1) for columns in shifts]
-
-
-def mounting_shifts(model: ResponseModel, x: np.ndarray) -> list[np.ndarray]:
-    """∂G (lines, E + S, E, 5 sensors) of every pose by one standard deviation of each sensor's position and direction, by forward
-    differences."""
-    base = model.responses(x)
-    shifts: list[list[np.ndarray]] = [[] for _ in base]
-    for sensor in {s.name: s for pose in model.poses for s in pose.sensors}.values():
-        for misplaced in sensor.misplaced():
-            poses = tuple(
-                replace(
-                    pose, sensors=tuple(misplaced if s.name == misplaced.name else s for s in pose.sensors)
-                )
-                for pose in model.poses
-            )
-            for k, response in enumerate(replace(model, poses=poses).responses(x)):
-                shifts[k].append(response - base[k])
-    return [
-        np.stack(columns, axis=-1) if columns else np.zeros((*still.shape, 0))
-        for columns, still in zip(shifts, base, strict=True)
-    ]

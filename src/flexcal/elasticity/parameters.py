@@ -17,8 +17,12 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.arm_sensor import sensitivity_name, sensor_delay_name
-from flexcal.model.declared import FRICTION_LOG_STD, elastic_inertials, springs_and_rotors
+from flexcal.model.declared import (
+    FRICTION_LOG_STD,
+    elastic_inertials,
+    sensor_parameters,
+    springs_and_rotors,
+)
 from flexcal.model.linearisation import linearise
 from flexcal.model.names import unit_of
 from flexcal.model.transfer import transfer_matrix
@@ -45,21 +49,23 @@ def stage_one_parameters(
 
     Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
     in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
-    prior 0 ± the sample time. Rotor inertias have the prior of robot.yaml; so have mass and centre of mass of every link that an
-    elastic joint moves, and the payload's mass, unless `inertias_known`. With `gaps`, a drive with backlash has its half gap: while it
-    stands open, the drive appears softer. With `hardening`, every drive may be stiffer where it carries more torque. Raises
-    `FlexcalError` where responses do not fit the robot.
+    prior 0 ± the sample time; a sensor on the arm has its sensitivity, delay and errors of mounting. Rotor inertias have the prior
+    of robot.yaml; so have mass and centre of mass of every link that an elastic joint moves, and the payload's mass, unless
+    `inertias_known`. With `gaps`, a drive with backlash has its half gap: while it stands open, the drive appears softer. With
+    `hardening`, every drive may be stiffer where it carries more torque. Raises `FlexcalError` where responses do not fit the robot.
     """
     check_responses(model, responses)
     loaded = any(r.payload != 0 for r in responses)
+    late = max(r.sample_time for r in responses)
     items = [*springs_and_rotors(model)]
     if not inertias_known:
         items += elastic_inertials(model, loaded=loaded)
     items += held_inertias(model)
     for joint in model.driven:
         name = f"{joint.name}.delay"
-        items.append(Parameter(name, "s", 0.0, prior_std=max(r.sample_time for r in responses)))
-    items += sensor_parameters(model, responses)
+        items.append(Parameter(name, "s", 0.0, prior_std=late))
+    for name in dict.fromkeys(name for response in responses for name in response.sensors):
+        items += sensor_parameters(model.sensors[name], late)
     for response, label in zip(responses, pose_labels(responses), strict=True):
         loss = apparent_viscous(response)
         items += [
@@ -102,19 +108,6 @@ def held_inertias(model: RobotModel) -> list[Parameter]:
         rotor = float(model.rotor_inertia[joint.index])
         if joint.index in model.braked and rotor > 0:
             items.append(Parameter(held_inertia_name(joint.name), "kg m²", 0.0, lower=0.0, prior_std=rotor))
-    return items
-
-
-def sensor_parameters(model: RobotModel, responses: Sequence[FrequencyResponse]) -> list[Parameter]:
-    """Sensitivity of every sensor on the arm that recorded, about that stated, and the delay of its readings, 0 ± the sample time."""
-    late = max(response.sample_time for response in responses)
-    items = []
-    for name in dict.fromkeys(name for response in responses for name in response.sensors):
-        std = model.sensors[name].config.sensitivity_std
-        items += [
-            Parameter(sensitivity_name(name), "1", 1.0, prior_std=std, scale="log"),
-            Parameter(sensor_delay_name(name), "s", 0.0, prior_std=late),
-        ]
     return items
 
 

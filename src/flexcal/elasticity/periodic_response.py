@@ -13,6 +13,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from flexcal.elasticity.moving_sensors import MovingSensor, harmonics
 from flexcal.elasticity.reference_motion import ArmState, ReferenceMotion
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
@@ -42,8 +43,7 @@ def reference_shift(
 ) -> np.ndarray:
     """G under the reference motion less G at rest, (L, E + S, E), for motors about `q` (n,) with `payload` kg and `sensors` on the arm.
 
-    Rows are rad/s² per N m, then the sensors' readings. Their rows of the Jacobian are those at rest: what changes of them along the motion
-    is of the first order in its amplitude, and so are the sidebands that it multiplies.
+    Rows are rad/s² per N m, then the sensors' readings.
 
     `opening` (phases, E) of the stiffness and damping of every drive of `robot` is missing at that phase of the motion, with their mean
     put back: the drives of `robot` have their mean softness. The arm follows its motors rigidly.
@@ -60,7 +60,7 @@ def reference_shift(
     stiffness[2 * sidebands] += rest.stiffness
     if opening is not None:
         pull = drive_pull(robot, rest)
-        released = np.einsum("kg,dg,eg->kgde", _harmonics(opening, 2 * sidebands), pull, pull)
+        released = np.einsum("kg,dg,eg->kgde", harmonics(opening, 2 * sidebands), pull, pull)
         released[2 * sidebands] = 0.0
         stiffness -= np.einsum("g,kgde->kde", [drive.stiffness[2] for drive in robot.driven], released)
         damping -= np.einsum("g,kgde->kde", [drive.damping[2] for drive in robot.driven], released)
@@ -78,10 +78,13 @@ def reference_shift(
     forces = np.zeros((width, count))
     forces[middle : middle + count] = np.eye(count)
     moved = np.linalg.solve(system.reshape(-1, width, width), np.broadcast_to(forces, (len(s), width, count)))
-    at_line, s = moved[:, middle : middle + size], s[:, sidebands]
-    moving = s[:, None, None] ** 2 * at_line[:, :count]
-    if rest.sensed is not None:
-        moving = np.concatenate([moving, rest.sensed.at(s) @ at_line], axis=1)
+    moving = s[:, sidebands, None, None] ** 2 * moved[:, middle : middle + count]
+    if sensors:
+        arm = ElasticArm(robot, payload)
+        cycle = [state.configuration for state in motion.states(robot, arm, q, ARM_PHASES)]
+        elastic = moved.reshape(len(s), len(orders), size, count)[:, :, size - len(arm.elastic) :]
+        read = [MovingSensor.of(arm, x, cycle, motion.frequency_hz).reading(elastic, s) for x in sensors]
+        moving = np.concatenate([moving, np.stack(read, axis=1)], axis=1)
     return moving - still
 
 
@@ -101,17 +104,10 @@ def _arm_changes(
     changes = []
     for rest, sampled in zip(still, zip(*moving, strict=True), strict=True):
         change = np.zeros((4 * sidebands + 1, size, size), dtype=complex)
-        harmonics = slice(2 * sidebands - ARM_HARMONICS, 2 * sidebands + ARM_HARMONICS + 1)
-        change[harmonics, first:, first:] = _harmonics(np.array(sampled) - rest, ARM_HARMONICS)
+        middle = slice(2 * sidebands - ARM_HARMONICS, 2 * sidebands + ARM_HARMONICS + 1)
+        change[middle, first:, first:] = harmonics(np.array(sampled) - rest, ARM_HARMONICS)
         changes.append(change)
     return changes[0], changes[1], changes[2]
-
-
-def _harmonics(sampled: np.ndarray, highest: int) -> np.ndarray:
-    """Fourier coefficients (2 highest + 1, ...) over one cycle of what is `sampled` (phases, ...), from order -highest."""
-    angles = 2 * np.pi * np.arange(len(sampled)) / len(sampled)
-    turn = np.exp(-1j * np.outer(np.arange(-highest, highest + 1), angles)) / len(sampled)
-    return np.tensordot(turn, sampled, axes=1)
 
 
 def _arm_matrices(arm: ElasticArm, state: ArmState) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

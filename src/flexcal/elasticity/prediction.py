@@ -18,9 +18,12 @@ from flexcal.elasticity.naming import (
 from flexcal.estimation import Parameters
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.arm_sensor import ArmSensor, sensitivity_name, sensor_delay_name
+from flexcal.model.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
+
+_MOUNTING_STEP = 1e-6
+"""m or rad, of the difference quotients by errors of mounting, in which readings are linear but for the length of the direction."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +43,8 @@ class PoseModel:
     half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` maps
     the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,)
     are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
-    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,).
+    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at
+    `mounting` (S, 5), -1 where there is none.
     """
 
     frequencies_hz: np.ndarray
@@ -55,6 +59,16 @@ class PoseModel:
     sensors: tuple[ArmSensor, ...]
     sensitivities: np.ndarray
     late: np.ndarray
+    mounting: np.ndarray
+
+    def placed(self, natural: np.ndarray) -> tuple[ArmSensor, ...]:
+        """The sensors on the arm as they are mounted."""
+        errors = self.mounting_errors(natural)
+        return tuple(sensor.misplaced(e) for sensor, e in zip(self.sensors, errors, strict=True))
+
+    def mounting_errors(self, natural: np.ndarray) -> np.ndarray:
+        """Errors of mounting (S, 5) in m and rad."""
+        return np.where(self.mounting >= 0, natural[self.mounting], 0.0)
 
     def measured(self, natural: np.ndarray) -> np.ndarray:
         """What G is multiplied by (L, E + S, E): the delays of torques and readings, the sensitivities of sensors."""
@@ -153,17 +167,21 @@ class ResponseModel:
             for axis, joint in enumerate(robot.driven)
             if hardening_name(joint.name) in parameters
         }
+
+        def number(name: str) -> int:
+            return parameters.index(name) if name in parameters else -1
+
         poses = []
         for response, label in zip(responses, labels, strict=True):
             names: dict[str, int] = {}
-            for number, name in enumerate(parameters.names):
+            for k, name in enumerate(parameters.names):
                 target, only = own.get(name, (name, label))
                 if only == label and target in robot.values and not name.endswith((".delay", ".hardening")):
-                    names[target] = number
+                    names[target] = k
             if response.payload == 0:
                 names.pop("payload.mass", None)
             delays = [f"{joint.name}.delay" for joint in robot.driven]
-            at = np.array([parameters.index(d) if d in parameters else -1 for d in delays])
+            at = np.array([number(name) for name in delays])
             sensors = tuple(robot.sensors[name] for name in response.sensors)
             poses.append(
                 PoseModel(
@@ -179,6 +197,9 @@ class ResponseModel:
                     sensors,
                     np.array([parameters.index(sensitivity_name(s.name)) for s in sensors], dtype=int),
                     np.array([parameters.index(sensor_delay_name(s.name)) for s in sensors], dtype=int),
+                    np.array(
+                        [[number(name) for name in mounting_names(s.name)] for s in sensors], dtype=int
+                    ).reshape(-1, 5),
                 )
             )
         return cls(robot, parameters, tuple(poses))
@@ -212,7 +233,8 @@ class ResponseModel:
         robot = self.robot.with_values(known)
         softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
         names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
-        system = linearise(robot, pose.q, payload, derivatives=names, sensors=pose.sensors)
+        sensors = pose.placed(values)
+        system = linearise(robot, pose.q, payload, derivatives=names, sensors=sensors)
         s = 2j * np.pi * pose.frequencies_hz
         moved = transfer_matrix(system, pose.frequencies_hz)
         response, change = moved.response, moved.derivatives
@@ -243,6 +265,14 @@ class ResponseModel:
             blocks[int(sensitivity)], blocks[int(late)] = np.zeros_like(response), np.zeros_like(response)
             blocks[int(sensitivity)][:, row] = response[:, row] * slopes[sensitivity] / values[sensitivity]
             blocks[int(late)][:, row] = -s[:, None] * response[:, row] * slopes[late]
+        for row, way in np.argwhere(pose.mounting >= 0):
+            errors = pose.mounting_errors(values)[row] + _MOUNTING_STEP * np.eye(5)[way]
+            moved = pose.sensors[row].misplaced(errors)
+            nearby = transfer_matrix(linearise(robot, pose.q, payload, sensors=[moved]), pose.frequencies_hz)
+            number, at = int(pose.mounting[row, way]), response.shape[2] + row
+            blocks[number] = np.zeros_like(response)
+            change = nearby.response[:, -1] * factor[:, at] - response[:, at]
+            blocks[number][:, at] = change / _MOUNTING_STEP * slopes[number]
         return Prediction(response, np.stack(list(blocks.values()), axis=-1), np.array(list(blocks)))
 
 

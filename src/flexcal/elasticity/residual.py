@@ -14,6 +14,10 @@ from flexcal.frequency import FrequencyResponse
 LOGARITHM_LIMIT = 0.1
 """Largest relative standard deviation of an element whose logarithm is compared; near a zero log Ĝ is biased."""
 
+LOGARITHM_CURVATURE = 0.3
+"""Largest second-order term of a logarithm, Δ²/2 at one standard deviation, relative to how well the element is known beside the others:
+what a sensor reads is known from the motors to a thousandth though friction scatters both by a twentieth."""
+
 CLUSTER_LINES = 4
 """Neighbouring lines of one pose that make one cluster of the sandwich covariance."""
 
@@ -38,10 +42,13 @@ class PoseResidual:
         """Choose logarithmic or linear errors by their standard deviation, and weigh them."""
         measured = response.stacked
         scale = element_scale(measured)
-        logarithmic = response.stacked_std < LOGARITHM_LIMIT * np.abs(measured)
-        unit = _vec(np.where(logarithmic, measured, scale))
-        covariance = response.stacked_covariance / (unit[:, :, None] * unit[:, None, :].conj())
-        return cls(measured, logarithmic, scale, weighting.factor(response, covariance))
+        relative = response.stacked_std / np.maximum(np.abs(measured), np.finfo(float).tiny)
+        small = relative < LOGARITHM_LIMIT
+        apart = 1.0 / np.linalg.norm(_factor(response, weighting, measured, scale, small), axis=1)
+        logarithmic = small & (_vec(relative) ** 2 / 2 < LOGARITHM_CURVATURE * apart).reshape(
+            len(measured), measured.shape[2], -1
+        ).swapaxes(1, 2)
+        return cls(measured, logarithmic, scale, _factor(response, weighting, measured, scale, logarithmic))
 
     def errors(self, predicted: np.ndarray) -> np.ndarray:
         """Complex errors Δ (L, m, n): the phase of a logarithm is in (-π, π] because it is that of the ratio."""
@@ -115,6 +122,20 @@ def element_scale(stacked: np.ndarray) -> np.ndarray:
     scale = np.sqrt(diagonal[:, :, None] * diagonal[:, None, :])
     rows = np.linalg.norm(stacked[:, axes:], axis=2, keepdims=True)
     return np.concatenate([scale, np.repeat(rows, axes, axis=2)], axis=1)
+
+
+def _factor(
+    response: FrequencyResponse,
+    weighting: Weighting,
+    measured: np.ndarray,
+    scale: np.ndarray,
+    logarithmic: np.ndarray,
+) -> np.ndarray:
+    """Factor (L, m n, m n) of the weight of the errors, of which some are logarithms."""
+    unit = _vec(np.where(logarithmic, measured, scale))
+    return weighting.factor(
+        response, response.stacked_covariance / (unit[:, :, None] * unit[:, None, :].conj())
+    )
 
 
 def _vec(matrix: np.ndarray) -> np.ndarray:

@@ -31,15 +31,17 @@ class ArmSensor:
         """Whether its tilt changes the reading: an accelerometer that turns with the link."""
         return self.moves and self.order == 2
 
-    def misplaced(self) -> tuple[ArmSensor, ...]:
-        """This sensor one standard deviation off in each of its five ways: three of its position, two of its direction."""
-        off = [replace(self, xyz=self.xyz + self.config.position_std * unit) for unit in np.eye(3)]
+    @property
+    def mounting_std(self) -> np.ndarray:
+        """1σ (5,) of its errors of mounting, in the order of `mounting_names`."""
+        return np.repeat([self.config.position_std, self.config.direction_std], [3, 2])
+
+    def misplaced(self, errors: np.ndarray) -> ArmSensor:
+        """This sensor with `errors` (5,) of mounting: three of its position in m, two of its direction in rad."""
         first = np.cross(self.direction, np.eye(3)[np.argmin(np.abs(self.direction))])
         first /= np.linalg.norm(first)
-        for normal in (first, np.cross(self.direction, first)):
-            turned = self.direction + np.tan(self.config.direction_std) * normal
-            off.append(replace(self, direction=turned / np.linalg.norm(turned)))
-        return tuple(off)
+        turned = self.direction + errors[3] * first + errors[4] * np.cross(self.direction, first)
+        return replace(self, xyz=self.xyz + errors[:3], direction=turned / np.linalg.norm(turned))
 
     @property
     def column(self) -> str:
@@ -63,6 +65,6 @@ def sensor_delay_name(sensor: str) -> str:
 
 
 def mounting_names(sensor: str) -> tuple[str, ...]:
-    """Names of the five errors of mounting of a sensor on the arm, in the order of `ArmSensor.misplaced`."""
+    """Names of the five errors of mounting of a sensor on the arm, in the order that `ArmSensor.misplaced` takes."""
     keys = ("position_x", "position_y", "position_z", "direction_1", "direction_2")
     return tuple(f"sensor.{sensor}.{key}" for key in keys)

@@ -41,7 +41,8 @@ class ArmSensorConfig:
 
     `direction` in which it measures: of an accelerometer in the axes of `frame`, with which it moves; of a vibrometer, which stands still,
     in the robot's base frame. `quantity` is what the log holds, in m/s², m/s or m: without it the acceleration of an accelerometer and the
-    velocity of a vibrometer. 1σ: `sensitivity_std` relative, `position_std` m, `direction_std` rad.
+    velocity of a vibrometer. 1σ: `sensitivity_std` relative, `position_std` m, `direction_std` rad, and `flatness_std`, by which the
+    sensitivity departs from a constant over frequency, relative.
     """
 
     frame: str
@@ -52,13 +53,14 @@ class ArmSensorConfig:
     sensitivity_std: float = 0.02
     position_std: float = 0.003
     direction_std: float = 0.02
+    flatness_std: float = 0.01
 
     def __post_init__(self) -> None:
         if not any(self.direction):
             raise FlexcalError("a sensor's direction has three numbers, not all zero.")
-        if not self.sensitivity_std > 0 or min(self.position_std, self.direction_std) < 0:
+        if not self.sensitivity_std > 0 or min(self.position_std, self.direction_std, self.flatness_std) < 0:
             raise FlexcalError(
-                "a sensor's sensitivity_std must be positive, its position_std and direction_std not negative."
+                "a sensor's sensitivity_std must be positive, its position_std, direction_std and flatness_std not negative."
             )
 
 

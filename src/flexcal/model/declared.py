@@ -8,6 +8,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter
+from flexcal.model.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
 from flexcal.model.names import GEOMETRY, spring_names, unit_in, unit_of
 from flexcal.model.robot_model import RobotModel
 
@@ -52,6 +53,19 @@ def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
     names = ("payload.mass", "payload.com_x", "payload.com_y", "payload.com_z")
     found = tuple(name for name in names if model.posterior.determines(name))
     return found or (("payload.mass",) if held.mass_std > 0 else ())
+
+
+def sensor_parameters(sensor: ArmSensor, sample_time: float) -> tuple[Parameter, ...]:
+    """Of a sensor on the arm: its sensitivity, about that stated, the delay of its readings, 0 ± the sample time in s, and its errors of
+    mounting."""
+    mounting = zip(mounting_names(sensor.name), sensor.mounting_std, strict=True)
+    return (
+        Parameter(
+            sensitivity_name(sensor.name), "1", 1.0, prior_std=sensor.config.sensitivity_std, scale="log"
+        ),
+        Parameter(sensor_delay_name(sensor.name), "s", 0.0, prior_std=sample_time),
+        *(Parameter(name, unit_of(name), 0.0, prior_std=std) for name, std in mounting if std > 0),
+    )
 
 
 def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:

@@ -33,6 +33,7 @@ _UNITS = {
     "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
     "warm_up": "N m s/rad", "coulomb_warm_up": "N m", "cable_stiffness": "N m/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
+    **dict.fromkeys(("position_x", "position_y", "position_z"), "m"), "direction_1": "rad", "direction_2": "rad",
     "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad",
 }  # fmt: skip
 

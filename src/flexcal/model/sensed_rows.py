@@ -54,10 +54,8 @@ def sensed_rows(
     motion, tilt = np.zeros((len(sensors), rotors + d)), np.zeros((len(sensors), rotors + d))
     moved = {name: (np.zeros_like(motion), np.zeros_like(tilt)) for name in motions}
     for row, sensor in enumerate(sensors):
-        point, turn = arm.place(at, sensor.joint, sensor.xyz)
-        direction = turn @ sensor.direction if sensor.moves else sensor.direction
-        origins, axes, carries = arm.elastic_axes_at(sensor.joint)
-        columns = np.cross(axes, point - origins) * carries[:, None]
+        _, direction, columns, turned = sensor_frame(arm, at, sensor)
+        _, axes, carries = arm.elastic_axes_at(sensor.joint)
         motion[row, rotors:] = columns @ direction
         # ∂(a_k × (p − o_k))/∂q_l = a_min × column_max: the nearer of both to the base turns the other's column
         order = arm.nearer()
@@ -65,11 +63,10 @@ def sensed_rows(
         near = np.where(order[..., None], axes[:, None], axes[None, :])  # of k and l
         far = np.where(order[..., None], columns[None, :], columns[:, None])
         by = np.cross(near, far) @ direction
-        if sensor.moves:  # the direction turns with every coordinate that carries the link
-            by += columns @ np.cross(axes, direction).T
+        if sensor.moves:
+            by += columns @ turned.T
         by = np.where(both, by, 0.0)
         if sensor.feels_gravity:
-            turned = np.cross(axes, direction) * carries[:, None]
             tilt[row, rotors:] = -turned @ arm.robot.gravity
             far = np.where(order[..., None], turned[None, :], turned[:, None])
             by_tilt = np.where(both, -np.cross(near, far) @ arm.robot.gravity, 0.0)
@@ -78,3 +75,16 @@ def sensed_rows(
             if sensor.feels_gravity:
                 moved[name][1][row, rotors:] = by_tilt @ shift
     return SensedRows(motion, tilt, np.array([s.order for s in sensors], dtype=int), moved)
+
+
+def sensor_frame(
+    arm: ElasticArm, at: np.ndarray, sensor: ArmSensor
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Point (3,) m and direction (3,) of a sensor in the base frame, and how both change (d, 3) with the elastic coordinates: of a sensor
+    that moves with the link the direction turns with every coordinate that carries it."""
+    point, turn = arm.place(at, sensor.joint, sensor.xyz)
+    origins, axes, carries = arm.elastic_axes_at(sensor.joint)
+    columns = np.cross(axes, point - origins) * carries[:, None]
+    direction = turn @ sensor.direction if sensor.moves else sensor.direction
+    turned = np.cross(axes, direction) * carries[:, None] if sensor.moves else np.zeros_like(columns)
+    return point, direction, columns, turned

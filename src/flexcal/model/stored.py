@@ -27,6 +27,7 @@ BEARINGS = "option.bearings"
 NUISANCE = re.compile(
     r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|(drive|bearing_x|bearing_y)\.torque_offset"
     r"|drive\.gap_torque|drive\.(stiffness|damping)_at_.+)|force_sensor\.[fm][xyz]_offset"
+    r"|sensor\..+\.(sensitivity|delay|position_[xyz]|direction_[12])"
 )
 """Names of what was estimated for an experiment, and of what the flexible model tells apart: not the robot's own here."""
 
