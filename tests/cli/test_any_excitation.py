@@ -62,6 +62,7 @@ def test_a_three_mass_axis_from_a_swept_sine_in_degrees(
     assert {item["unit"] for item in masses["parameters"].values()} == {"kg m²", "N m/rad", "N m s/rad"}
     said = capsys.readouterr().out
     assert "there is one record only" in said and "next:" in said
+    assert "[deg]" in said and "\\[" not in said  # names are printed as they are
     assert (tmp_path / "out" / "report.html").is_file()
     header, first = (tmp_path / "out" / "response.csv").read_text().splitlines()[:2]
     assert header.split(",")[0] == "frequency_hz" and float(first.split(",")[0]) > 0.1

@@ -7,6 +7,7 @@ import pytest
 
 from flexcal.importing import guess_columns, reasons_of
 from flexcal.importing.column_names import parse_name
+from flexcal.model import RobotModel
 
 SIX = range(1, 7)
 XYZ = ["x", "y", "z"]
@@ -135,3 +136,44 @@ def test_without_a_header_order_tells(ur5, made, rng) -> None:
 def test_names_taken_apart(column, words, number, unit) -> None:
     name = parse_name(column)
     assert (name.words, name.number, name.unit) == (words, number, unit)
+
+
+_LINK = '<link name="{0}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial></link>'
+_JOINT = (
+    '<joint name="{0}" type="{1}"><parent link="{2}"/><child link="{3}"/><origin xyz="0.4 0 0"/><axis xyz="0 0 1"/>'
+    '<limit lower="-2" upper="2" velocity="1" effort="9"/></joint>'
+)
+
+
+@pytest.fixture(scope="module")
+def scara(tmp_path_factory: pytest.TempPathFactory) -> RobotModel:
+    """Three joints that turn, and the third that slides."""
+    folder = tmp_path_factory.mktemp("scara")
+    joints = [("arm 1", "revolute"), ("arm 2", "revolute"), ("lift", "prismatic"), ("hand", "revolute")]
+    links = "".join(_LINK.format(f"l{k}") for k in range(5))
+    parts = "".join(_JOINT.format(name, kind, f"l{k}", f"l{k + 1}") for k, (name, kind) in enumerate(joints))
+    (folder / "scara.urdf").write_text(f'<robot name="scara">{links}{parts}</robot>')
+    (folder / "robot.yaml").write_text("robot: scara.urdf\n")
+    return RobotModel.from_yaml(folder / "robot.yaml")
+
+
+@pytest.mark.parametrize(
+    "header",
+    [
+        "t|arm 1 Winkel [°]|arm 2 Winkel [°]|lift Weg [mm]|hand Winkel [°]|"
+        "arm 1 Moment [Nm]|arm 2 Moment [Nm]|lift Kraft [N]|hand Moment [Nm]",
+        "t|J1 [deg]|J2 [deg]|J3 [mm]|J4 [deg]|T1 [Nm]|T2 [Nm]|F3 [N]|T4 [Nm]",
+        "t|arm 1|arm 2|lift|hand|arm 1 torque|arm 2 torque|lift force|hand torque",
+    ],
+)
+def test_a_joint_that_slides_has_a_stroke_and_a_force(scara, made, rng, header) -> None:
+    names = header.split("|")
+    guess = guess_columns(made({name: rng.normal(size=50) for name in names}), scara)
+    assert guess.placed["q"].columns == tuple(names[1:5])
+    assert guess.placed["tau"].columns == tuple(names[5:])
+    assert guess.left_out == ()
+
+
+def test_forces_of_a_sensor_are_no_torques(ur5, made, rng) -> None:
+    names = written_out("t|J*|F* [N]")
+    assert "tau" not in guess_columns(made({name: rng.normal(size=50) for name in names}), ur5).placed

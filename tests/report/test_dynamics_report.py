@@ -7,19 +7,22 @@ import json
 import shutil
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import polars as pl
 import pytest
 from outline import Outline
 
+from flexcal.dynamics import TorquePrediction
 from flexcal.estimates_file import read_estimates
 from flexcal.report import DynamicsStudy
 from flexcal.report.dynamics import dynamics_checks, dynamics_verdict
+from flexcal.report.figures.torque_traces import torque_traces
 from flexcal.report.notation import significant
 from flexcal.report.sections.base_parameters import base_correlation
 from flexcal.report.sections.friction import friction_section
+from flexcal.report.sections.signals import signals_table
 from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 from flexcal.workflow.report_folder import report_folder
 
@@ -88,6 +91,28 @@ def test_figures_have_traces_for_every_joint(outline: Outline) -> None:
         ),
         6,
     )
+
+
+def test_a_sentence_in_the_table_of_signals_wraps() -> None:
+    signals = {
+        "cutoff_hz": 10.0,
+        "decimation": 80,
+        "proposed": [],
+        "time_stamps": {"log.csv": "divided at 2 gaps " * 9},
+    }
+    assert set(signals_table(signals).text_columns) == {1, 2}
+
+
+def test_no_line_is_drawn_across_a_gap() -> None:
+    time = np.concatenate([np.arange(0.0, 2.0, 0.1), np.arange(4.0, 5.0, 0.1)])
+    torque = np.column_stack([time, -time])
+    none = np.zeros((0, 2))
+    log = TorquePrediction("log", 1, time, torque, torque, 4.5, np.zeros(0), none, none)
+    figure = torque_traces({"a": "N m", "b": "N m"}, {"log": log})
+    measured, fitted, unseen = (cast(Any, figure.data[k]) for k in (0, 2, 4))
+    assert [int(np.isnan(trace.y).sum()) for trace in (measured, fitted, unseen)] == [1, 1, 0]
+    at = int(np.flatnonzero(np.isnan(measured.y))[0])
+    assert measured.x[at - 1] == pytest.approx(1.9) and measured.x[at + 1] == pytest.approx(4.0)
 
 
 def test_recordings_are_chosen_by_name(folder: Path, tmp_path: Path) -> None:

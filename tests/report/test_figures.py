@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from importlib.resources import files
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -11,7 +14,7 @@ from flexcal.design.skeleton import joint_origins
 from flexcal.model import RobotModel
 from flexcal.report import TwoStageStudy
 from flexcal.report.figures.arm_poses import skeletons
-from flexcal.report.figures.canvas import decades
+from flexcal.report.figures.canvas import canvas, decades
 from flexcal.report.figures.error_components import error_components
 from flexcal.report.figures.predicted_quantiles import expected_quantiles, predicted_quantiles
 from flexcal.report.figures.response_fit import response_fit
@@ -19,6 +22,7 @@ from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.figures.spring_intervals import spring_intervals
 from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
+from flexcal.report.palette import INK, PAGE
 from flexcal.report.sections.geometry import exaggeration
 
 
@@ -48,6 +52,17 @@ def test_levels_show_response_noise_and_distortion(study: TwoStageStudy) -> None
     assert len(figure.data) == 27
     np.testing.assert_allclose(figure.data[0].y, np.abs(response.response[:, 0, 0]), rtol=1e-6)
     np.testing.assert_allclose(figure.data[3 * 5 + 2].y, response.noise_std[:, 1, 2], rtol=1e-6)
+
+
+def test_hover_labels_hide_what_is_behind_them() -> None:
+    """Ink on the page's colour, which the dark scheme knows too; a translucent label is read through the curves behind it."""
+    label = cast(Any, canvas(300).layout).hoverlabel
+    assert (label.bgcolor, label.font.color) == (PAGE, INK)
+    style = files("flexcal.report").joinpath("templates", "report.css").read_text("utf-8")
+    opacity = [rule for rule in style.splitlines() if "hovertext" in rule]
+    assert opacity and not any(
+        re.search(r"opacity:\s*0?\.", rule) or "hovertext path" in rule for rule in opacity
+    )
 
 
 def test_fit_shows_one_pose_at_first(study: TwoStageStudy) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from rich.markup import escape
 from rich.table import Table
 
 from flexcal.report.notation import NOTHING, to_half_width
@@ -25,7 +24,7 @@ def element_table(document: Mapping[str, Any]) -> Table:
         table.add_column(heading, justify="right")
     for item in document["elements"]:
         table.add_row(
-            *(escape(item[key]) for key in ("output", "input", "unit")),
+            *(item[key] for key in ("output", "input", "unit")),
             f"{item['coherence']:.4f}",
             f"{item['lowest_coherence']:.3f}",
             f"{item['lowest_coherence_hz']:.3g}",
@@ -46,9 +45,9 @@ def resonance_table(document: Mapping[str, Any]) -> Table:
     for element in document["elements"]:
         of = f" of {element['output']} to {element['input']}" if several else ""
         for item in element["antiresonances"]:
-            table.add_row(escape(f"antiresonance{of}"), *_cells(item))
+            table.add_row(f"antiresonance{of}", *_cells(item))
         for item in element["peaks"]:
-            table.add_row(escape(f"peak of the magnitude{of}"), *_pair(item["frequency_hz"]), "", "")
+            table.add_row(f"peak of the magnitude{of}", *_pair(item["frequency_hz"]), "", "")
     return table
 
 
@@ -78,5 +77,5 @@ def masses_table(masses: Mapping[str, Any]) -> Table:
         table.add_column(heading, justify="right")
     table.add_column("unit")
     for name, item in masses["parameters"].items():
-        table.add_row(name, *_pair(item), escape(item["unit"]))
+        table.add_row(name, *_pair(item), item["unit"])
     return table

@@ -23,6 +23,8 @@ _UNITS = {
     "mm/s": ("mm/s",),
     "rad/s^2": ("rad/s^2", "rad/s²", "rad/s2"),
     "deg/s^2": ("deg/s^2", "deg/s²", "deg/s2", "°/s²", "°/s^2"),
+    "m/s^2": ("m/s^2", "m/s²", "m/s2"),
+    "mm/s^2": ("mm/s^2", "mm/s²", "mm/s2"),
     "N m": ("nm", "n m", "n*m", "n·m", "newtonmeter"),
     "N": ("n",),
     "A": ("a", "amp", "amps", "ampere"),

@@ -14,20 +14,29 @@ JOINT |= _words(
 JOINT |= _words("os gewricht ось оси 軸 轴 軸角度 轴角度 关节 關節 関節 关节角 关节角度 関節角度 축 관절")
 """Of joint positions, whatever stands beside them; the others of `POSITION` are so only with one of these, or a joint's name."""
 POSITION = JOINT | _words(
-    "a position positions pos posicion posicao posizione state states value values encoder"
+    "a lage weg hub stroke position positions pos posicion posicao posizione state states value values encoder"
 )
 CARTESIAN = _words("tcp cartesian")
 """Of the tool, so of no joint."""
 NO_JOINT = _words("pose error err dev deviation force voltage limit mode offset digital analog")
 NO_JOINT |= _words("residual correction delta status")
 KINDS = (
-    ("ddq", _words("ddq qdd acceleration accelerations acc accel")),
-    ("dq", _words("dq qd velocity velocities vel speed qdot rate vitesse velocidad velocidade velocita")),
+    ("ddq", _words("ddq qdd acceleration accelerations acc accel beschleunigung")),
+    (
+        "dq",
+        _words(
+            "dq qd velocity velocities vel speed qdot rate vitesse velocidad velocidade velocita geschwindigkeit drehzahl"
+        ),
+    ),
     ("tau", _words("tau τ torque torques effort efforts moment drehmoment couple coppia par")),
     ("current", _words("current currents i iq strom amp amps")),
     ("q", POSITION),
 )
 """What one column a joint can be, the most telling words first."""
+FORCE = _words("force forces kraft fuerza forza forca effort")
+"""Of what drives a joint that slides; elsewhere of a sensor."""
+SLIDING = ("N", "m/s", "mm/s", "m/s^2", "mm/s^2")
+"""Units of joints that slide alone."""
 MEASURED = _words(
     "actual act ist measured meas feedback fb tracker lt smr mesure mesuree medido medida misurato misurata"
 )

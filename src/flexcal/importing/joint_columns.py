@@ -9,6 +9,7 @@ from flexcal.data.signals import JOINT_QUANTITIES
 from flexcal.importing.column_names import ColumnName, parse_name
 from flexcal.importing.column_words import (
     CARTESIAN,
+    FORCE,
     JOINT,
     KINDS,
     NEUTRAL,
@@ -16,6 +17,7 @@ from flexcal.importing.column_words import (
     POSITION,
     SIGMA,
     SINGLE,
+    SLIDING,
     TURN,
     rank,
 )
@@ -25,21 +27,25 @@ if TYPE_CHECKING:
 
 _BY_UNIT = {
     "current": ("A", "mA"),
-    "tau": ("N m",),
-    "dq": ("rad/s", "deg/s", "rpm"),
-    "ddq": ("rad/s^2", "deg/s^2"),
+    "tau": ("N m", "N"),
+    "dq": ("rad/s", "deg/s", "rpm", "m/s", "mm/s"),
+    "ddq": ("rad/s^2", "deg/s^2", "m/s^2", "mm/s^2"),
 }
+_Groups = dict[tuple[str, tuple[str, ...]], dict[int, str]]
+"""Columns by number of joint, of every quantity and wording."""
 
 
 def joint_quantities(
     names: Sequence[ColumnName], model: RobotModel, reasons: dict[str, str]
 ) -> dict[str, tuple[str, ...]]:
     """Columns of every quantity with one a joint; `reasons` gets those that are like them and not used."""
-    groups: dict[tuple[str, tuple[str, ...]], dict[int, str]] = {}
-    numbered: dict[tuple[str, tuple[str, ...]], dict[int, str]] = {}
+    groups: _Groups = {}
+    numbered: _Groups = {}
+    sliding = [joint.kind == "prismatic" for joint in model.joints]
     for name in names:
         joint, words = _joint_of(name, model)
-        quantity = _kind(words, named=joint is not None, unit=name.unit)
+        slides = any(sliding) if joint is None else sliding[joint]
+        quantity = _kind(words, named=joint is not None, unit=name.unit, slides=slides)
         if quantity is None or set(words) & (TURN | SIGMA | SINGLE["temperature"]):
             continue
         if joint is not None:
@@ -49,7 +55,9 @@ def joint_quantities(
         locked = [held for held in model.config.locked if _says(name, held) is not None]
         if joint is None and locked:
             reasons[name.column] = f"{locked[0]} is locked"
-    for key, columns in numbered.items():
+    groups = _completed(groups, (set(range(model.n)),))
+    ranges = (set(range(model.n)), set(range(1, model.n + 1)))
+    for key, columns in _completed(numbered, ranges).items():
         numbers = sorted(columns)
         if numbers in (list(range(model.n)), list(range(1, model.n + 1))):
             groups.setdefault(key, {i - numbers[0]: columns[i] for i in numbers})
@@ -57,6 +65,27 @@ def joint_quantities(
             why = f"there are {len(numbers)} of them, but {model.n} joints"
             reasons |= {column: why for column in columns.values() if column not in reasons}
     return _best(groups, model.n, reasons)
+
+
+def _completed(groups: _Groups, wholes: Sequence[set[int]]) -> _Groups:
+    """Wordings that complete each other to one of the `wholes`, as the angles of some joints and the strokes of others, are one group."""
+    found = dict(groups)
+    for quantity in dict.fromkeys(key[0] for key in groups):
+        for standing in range(3):
+            parts = [
+                key
+                for key in groups
+                if key[0] == quantity
+                and rank(key[1]) == standing
+                and not any(set(groups[key]) == w for w in wholes)
+            ]
+            columns = {number: column for key in parts for number, column in groups[key].items()}
+            apart = len(columns) == sum(len(groups[key]) for key in parts)
+            if len(parts) > 1 and apart and any(set(columns) == whole for whole in wholes):
+                for key in parts:
+                    del found[key]
+                found[parts[0]] = columns
+    return found
 
 
 def _best(
@@ -113,16 +142,18 @@ def _run_together(text: str) -> str:
     return "_".join("".join(c.lower() if c.isalnum() else " " for c in text).split())
 
 
-def _kind(words: Sequence[str], *, named: bool, unit: str | None) -> str | None:
-    """The quantity that words speak of; with a joint's name and no word it is its position."""
+def _kind(words: Sequence[str], *, named: bool, unit: str | None, slides: bool) -> str | None:
+    """The quantity that words speak of; with a joint's name and no word it is its position. What `slides` is driven by a force."""
     telling = [word for word in words if word not in NEUTRAL]
     if not named and set(words) & CARTESIAN:
         return None
     if "_".join(words) in JOINT_QUANTITIES:
         return "_".join(words)
     by_unit = next((quantity for quantity, units in _BY_UNIT.items() if unit in units), None)
-    if by_unit is not None:
+    if by_unit is not None and (slides or unit not in SLIDING):
         return by_unit
+    if named and slides and set(telling) & FORCE:
+        return "tau"
     for quantity, spoken in KINDS:
         if set(telling) & spoken:
             others = {word for word in telling if word not in spoken | POSITION and len(word) > 1}

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 from plotly.subplots import make_subplots
 
-from flexcal.report.palette import AXIS, GRID, INK, QUIET
+from flexcal.report.palette import AXIS, GRID, INK, PAGE, QUIET
 
 FONT = "system-ui, -apple-system, 'Segoe UI', Roboto, 'Helvetica Neue', sans-serif"
 
@@ -94,7 +94,7 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
             "bgcolor": "rgba(0,0,0,0)",
         },
         modebar={"bgcolor": "rgba(0,0,0,0)", "color": AXIS, "activecolor": QUIET},
-        hoverlabel={"font": {"family": FONT, "size": 12}},
+        hoverlabel={"bgcolor": PAGE, "bordercolor": AXIS, "font": {"family": FONT, "size": 12, "color": INK}},
         hovermode="closest",
     )
     figure.update_xaxes(**axis, zeroline=False)

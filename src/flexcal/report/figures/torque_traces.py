@@ -11,11 +11,15 @@ from flexcal.dynamics import TorquePrediction
 from flexcal.report.figures.canvas import panels, single
 from flexcal.report.palette import ELASTIC, NOMINAL, RIGID
 
+_APART = 1.5
+"""Steps from one row to the next, at least, across a gap."""
+
 
 def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> go.Figure:
     """Measured and predicted torque of every joint against time (s), one log shown at a time; `units` are N m, or N, by joint.
 
-    What the fit never saw is predicted in a colour of its own. Traces carry `meta = {"log": label}`, by which the page chooses.
+    What the fit never saw is predicted in a colour of its own; lines end at
+    the gaps of a log. Traces carry `meta = {"log": label}`, by which the page chooses.
     """
     n = len(units)
     figure = panels(n, 1, 150 * n + 90, labelled(units), row_gap=0.28 / n)
@@ -29,11 +33,12 @@ def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]
         for kind, torque, part, colour, width in curves:
             if not part.any():
                 continue
+            time, values = _interrupted(log.time[part], torque[part])
             for joint, unit in enumerate(units.values()):
                 figure.add_trace(
                     go.Scatter(
-                        x=single(log.time[part]),
-                        y=single(torque[part, joint]),
+                        x=single(time),
+                        y=single(values[:, joint]),
                         name=kind,
                         legendgroup=kind,
                         showlegend=joint == 0,
@@ -51,6 +56,13 @@ def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]
     figure.update_yaxes(nticks=5)
     figure.update_yaxes(title_text=axis_title(units), row=(n + 1) // 2, col=1)
     return figure
+
+
+def _interrupted(time: np.ndarray, torque: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """`time` (N,) and `torque` (N, n) with a row of NaN in every gap of a recording, across which no line is drawn."""
+    steps = np.diff(time)
+    gaps = 1 + np.flatnonzero(steps > _APART * np.median(steps)) if len(steps) else []
+    return np.insert(time, gaps, np.nan), np.insert(torque, gaps, np.nan, axis=0)
 
 
 def labelled(units: Mapping[str, str]) -> tuple[str, ...]:

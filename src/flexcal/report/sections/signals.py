@@ -23,4 +23,4 @@ def signals_table(signals: Mapping[str, Any]) -> Table:
             for log, words in signals.get("time_stamps", {}).items()
         ),
     )
-    return Table("table-signals", "Signals used", ("what", "value", "from"), rows, text_columns=(2,))
+    return Table("table-signals", "Signals used", ("what", "value", "from"), rows, text_columns=(1, 2))
