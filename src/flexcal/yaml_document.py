@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from flexcal.errors import InputError
-from flexcal.structuring import Keys
+from flexcal.plain_data.keys import Keys
 
 if TYPE_CHECKING:
     from yaml import CSafeLoader, Event, ScalarEvent

@@ -1,7 +1,7 @@
 """A strict reader of YAML 1.2 into frozen dataclasses, whose errors name the file and the line.
 
 Numbers are the numbers of YAML 1.2 (`143.7e3`, `143.7e+3` and `1e3` alike), keys are texts and stand once;
-what fits a dataclass and what does not is in `flexcal.structuring`.
+what fits a dataclass and what does not is in `flexcal.plain_data`.
 """
 
 from __future__ import annotations
@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 from flexcal.errors import InputError
+from flexcal.plain_data import MisfitError, structure
+from flexcal.plain_data.keys import Keys
 from flexcal.publication import current
-from flexcal.structuring import Keys, MisfitError, structure
 from flexcal.yaml_document import parse_document
 from flexcal.yaml_writer import write_yaml
 

@@ -13,7 +13,8 @@ import numpy as np
 
 from flexcal.atomic import write_text
 from flexcal.errors import FlexcalError
-from flexcal.structuring import Keys, dotted, file_key
+from flexcal.plain_data import dotted, file_key
+from flexcal.plain_data.keys import Keys
 
 if TYPE_CHECKING:
     from yaml import ScalarNode

@@ -21,7 +21,7 @@ from flexcal.frequency import FrequencyResponse
 from flexcal.importing import read_foreign
 from flexcal.model.config import RobotConfig
 from flexcal.model.urdf import read_urdf
-from flexcal.structuring import MisfitError, structure
+from flexcal.plain_data import MisfitError, structure
 from flexcal.workflow.results import read_results
 from flexcal.yaml_reader import read_yaml, read_yaml_file
 

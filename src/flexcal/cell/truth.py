@@ -13,7 +13,8 @@ from flexcal.estimates_file import BLOCKS, Block
 from flexcal.model import RobotModel
 from flexcal.model.names import GEOMETRY, SPRINGS, STATION, unit_of
 from flexcal.model.stored import NUISANCE
-from flexcal.structuring import Keys, suggestion
+from flexcal.plain_data import suggestion
+from flexcal.plain_data.keys import Keys
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 from flexcal.yaml_writer import write_yaml
 

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from flexcal.cli.verb_options import options_of
 from flexcal.cli.verbs import Verb
 from flexcal.errors import InputError
-from flexcal.structuring import suggestion
+from flexcal.plain_data import suggestion
 
 _RULE = re.compile(r"^\s*[─━-]{3,}\s*$")
 _FRAME = str.maketrans("│|", "  ")

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.data.signals import Signal
 from flexcal.data.table import Table, TableFile
-from flexcal.structuring import suggestion
+from flexcal.plain_data import suggestion
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel

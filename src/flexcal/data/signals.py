@@ -13,8 +13,8 @@ import numpy as np
 
 from flexcal.data.table import Table, TableFile
 from flexcal.errors import InputError
+from flexcal.plain_data import suggestion
 from flexcal.publication import current
-from flexcal.structuring import suggestion
 from flexcal.units import DEGREE, MILLIMETRE
 from flexcal.yaml_reader import read_yaml_file
 

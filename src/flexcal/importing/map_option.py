@@ -12,7 +12,7 @@ from flexcal.importing.column_guess import Guess, LeftOut, place
 from flexcal.importing.column_names import parse_name, unit_of
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.placed_columns import NUMBERED, PlacedColumns
-from flexcal.structuring import suggestion
+from flexcal.plain_data import suggestion
 
 if TYPE_CHECKING:
     from flexcal.model import RobotModel

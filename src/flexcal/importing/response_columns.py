@@ -14,7 +14,7 @@ from flexcal.frequency.excitation import Channel
 from flexcal.importing.column_names import ColumnName, parse_name
 from flexcal.importing.column_words import KINDS, SINGLE, rank
 from flexcal.importing.foreign_table import ForeignTable
-from flexcal.structuring import suggestion
+from flexcal.plain_data import suggestion
 
 KIND_NAMES = {"position": 0, "velocity": 1, "acceleration": 2}
 _FORCE = frozenset(["force", "kraft", "thrust"])

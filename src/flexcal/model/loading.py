@@ -17,8 +17,8 @@ from flexcal.model.point import ForceSensor, Payload, Point
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
 from flexcal.model.urdf import Description, Frame, read_urdf
+from flexcal.plain_data import suggestion
 from flexcal.publication import current
-from flexcal.structuring import suggestion
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 
 HARMONICS = (1, 2, 3)

@@ -10,8 +10,8 @@ from pathlib import Path
 from flexcal.errors import InputError
 from flexcal.model.urdf_checks import carried_links
 from flexcal.model.urdf_xml import Element, read_elements
+from flexcal.plain_data import suggestion
 from flexcal.publication import current
-from flexcal.structuring import suggestion
 
 _GRIPPER = re.compile(
     r"gripper|finger|knuckle|jaw|thumb|(?<![a-z])(hand|claw|suction|vacuum)(?![a-z])", re.IGNORECASE
