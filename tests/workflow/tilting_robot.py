@@ -6,6 +6,7 @@ series; the motors follow from the torques in the drives.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import mujoco
@@ -28,16 +29,36 @@ _RATE, _PERIOD = 1000.0, 10.0
 _HIGHEST = 12.0
 """Hz, to which the tilts are followed: far beyond the motion, below their resonances."""
 
-_LINK = """<link name="{0}"><inertial><origin xyz="{1}"/><mass value="{2}"/>
-<inertia ixx="{3}" iyy="{4}" izz="{5}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
-URDF = f"""<robot name="tilting"><link name="base"/>
-{_LINK.format("column", "0.05 0.02 0.3", 18, 0.8, 0.7, 0.3)}{_LINK.format("forearm", "0.28 0.02 0.01", 9, 0.05, 0.3, 0.3)}
+_LINK = """<link name="{0}"><inertial><origin xyz="{1} {2} {3}"/><mass value="{4}"/>
+<inertia ixx="{5}" iyy="{6}" izz="{7}" ixy="0" ixz="0" iyz="0"/></inertial></link>"""
+TRUE_LINKS = ((0.04, 0.03, 0.3, 20, 0.9, 0.8, 0.35), (0.3, 0.03, 0.02, 10, 0.05, 0.34, 0.33))
+"""Centre of mass, mass and principal moments of inertia of column and forearm, as they are."""
+CAD_LINKS = ((0.05, 0.02, 0.3, 18, 0.8, 0.7, 0.3), (0.28, 0.02, 0.01, 9, 0.05, 0.3, 0.3))
+
+
+def urdf(column: Sequence[float], forearm: Sequence[float]) -> str:
+    links = _LINK.format("column", *column) + _LINK.format("forearm", *forearm)
+    return f"""<robot name="tilting"><link name="base"/>{links}
 <link name="tip"/>
 <joint name="turn" type="revolute"><parent link="base"/><child link="column"/><origin xyz="0 0 0.2"/><axis xyz="0 0 1"/>
 <limit lower="-3" upper="3" effort="400" velocity="4"/></joint>
 <joint name="elbow" type="revolute"><parent link="column"/><child link="forearm"/><origin xyz="0.2 0 0.5"/><axis xyz="0 1 0"/>
 <limit lower="-3" upper="3" effort="300" velocity="5"/></joint>
 <joint name="fixed" type="fixed"><parent link="forearm"/><child link="tip"/><origin xyz="0.5 0 0"/></joint></robot>"""
+
+
+def drawn_links(rng: np.random.Generator) -> list[list[float]]:
+    """CAD that is off: masses and moments of inertia by 7 %, centres of mass by 10 mm."""
+    return [
+        [
+            *(np.array(link[:3]) + rng.uniform(-0.0173, 0.0173, 3)),
+            link[3] * (share := np.exp(0.07 * rng.normal())),
+            *(np.array(link[4:]) * share * np.exp(0.07 * rng.normal())),
+        ]
+        for link in TRUE_LINKS
+    ]
+
+
 ROBOT = """robot: tilting.urdf
 bearings: {bearings}
 points: {{smr: {{frame: tip, xyz: [0, 0, 0]}}}}

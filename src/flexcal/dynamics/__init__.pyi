@@ -44,6 +44,7 @@ from .learned_residual_file import (
 from .log_faults import LogFaults
 from .motion import Motion
 from .noisy_columns import column_errors, noisy_logs
+from .nominal_spread import with_nominal_spread
 from .observation import Observation
 from .ols import ordinary_least_squares
 from .payload_equations import PayloadEquations
@@ -158,6 +159,7 @@ __all__ = [
     "total_least_squares",
     "trajectory_error",
     "weighted_least_squares",
+    "with_nominal_spread",
     "with_play",
     "write_learned_residual",
 ]

@@ -264,19 +264,22 @@ class _Filters:
         self._at = slice(self._beyond + border, self._beyond + count - border, self._factor)
         self._torque = self._thinned(np.fft.rfft(self._continued(piece.torque), axis=0))
         self.rows = len(self._torque)
-        self._slope = (1j * np.sin(2 * np.pi * self._frequency * self._step) / self._step)[:, None]
+        angle = 2 * np.pi * self._frequency * self._step
+        slope = 1j * (8 * np.sin(angle) - np.sin(2 * angle)) / (6 * self._step)
+        curvature = (16 * np.cos(angle) - np.cos(2 * angle) - 15) / (6 * self._step**2)
+        self._differences = tuple(factor[:, None] for factor in (np.ones_like(angle), slope, curvature))
         self.highest_signs = self.signs(highest_hz)
 
     def signs(self, cutoff_hz: float) -> np.ndarray:
         """Signs of the filtered velocities, decimated (M, n)."""
-        speed = np.fft.irfft(self._passed(cutoff_hz) * self._slope, self._length, axis=0)
+        speed = np.fft.irfft(self._passed(cutoff_hz) * self._differences[1], self._length, axis=0)
         signs = np.where(np.abs(speed) < AT_REST, 0.0, np.sign(speed))
         return self._thinned(np.fft.rfft(signs, axis=0))
 
     def motion(self, cutoff_hz: float) -> Motion:
         """Rows of the motion, filtered at `cutoff_hz` and decimated."""
         passed = self._passed(cutoff_hz)
-        q, dq, ddq = (self._thinned(passed * self._slope**order) for order in range(3))
+        q, dq, ddq = (self._thinned(passed * factor) for factor in self._differences)
         time = self._step * self._factor * np.arange(len(q))
         return Motion(time, q, dq, ddq, self._torque)
 

@@ -19,12 +19,14 @@ TorqueLog = Literal["held", "instantaneous", "mean"]
 
 AT_REST = 1e-3
 """rad/s or m/s, below which a joint is at rest: there it is noise that seems to move it."""
+_REVERSES = 0.1
+"""rad/s² or m/s², from which it is not at rest but reverses: it is that slow for less than 20 ms then, and friction changes sign."""
 _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
 _APART = 1.5
 """Steps from one sample to the next, at least, across a gap."""
 _BESIDE = 2
-"""Samples on either side that the second difference of first differences takes."""
+"""Samples on either side that differences of fourth order take."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,8 +137,11 @@ class FilteredPositions:
         time = self.start + self.time_step * np.arange(len(self))
         n = self.torque.shape[1]
         q, dq, ddq = differences(self.q, self.time_step)
-        turning = dq[:, : 2 * n]  # tilts are slow, and have no friction
-        turning[np.abs(turning) < AT_REST] = 0.0
+        turning, reversing = (
+            dq[:, : 2 * n],
+            np.abs(ddq[:, : 2 * n]) > _REVERSES,
+        )  # tilts are slow, and have no friction
+        turning[(np.abs(turning) < AT_REST) & ~reversing] = 0.0
         at = [slice(first, first + n) for first in range(n, q.shape[1], n)]
         sides = [ArmSide(q[:, own], dq[:, own], ddq[:, own]) for own in at]
         arm = None if not sides else sides[0]
@@ -270,9 +275,16 @@ def smoothed(
 
 
 def differences(x: np.ndarray, step: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Of values (N + 4, k) every `step` (s) the inner ones, and their first and second central differences, (N, k) each."""
-    dx = (x[2:] - x[:-2]) / (2 * step)
-    return x[_BESIDE:-_BESIDE], dx[1:-1], (dx[2:] - dx[:-2]) / (2 * step)
+    """Of values (N + 4, k) every `step` h (s) the inner ones, and their first and second central differences, (N, k) each.
+
+    They are of fourth order: of a frequency ω they are too small by (ωh)⁴/30 and (ωh)⁴/90, where the difference of first differences lacks
+    (ωh)²/3, which all stiffnesses would lack with the accelerations.
+    """
+    before2, before, at, after, after2 = (x[k : len(x) - 4 + k] for k in range(5))
+    first = (8.0 * (after - before) - (after2 - before2)) / (12.0 * step)
+    near, far = (after - at) - (at - before), (after2 - at) - (at - before2)
+    second = (16.0 * near - far) / (12.0 * step**2)
+    return at, first, second
 
 
 def _extended(blocks: Iterable[np.ndarray], low_pass: LowPass) -> Iterator[np.ndarray]:

@@ -18,6 +18,7 @@ from flexcal.dynamics import (
     external_share,
     require_scikit_learn,
     select_friction,
+    with_nominal_spread,
     with_play,
 )
 from flexcal.errors import InputError
@@ -109,7 +110,7 @@ def identify_robot_dynamics(
         if divided.unseen:
             held_out = RegressionData.of(observation, base, divided.unseen_equations(observation))
         rows = divided.rows(observation, base)
-        estimate = ESTIMATORS[estimator](train, rows)
+        estimate = with_nominal_spread(train, ESTIMATORS[estimator](train, rows))
         essential = essential_parameters(train, estimate)
         if friction.spread is not None:
             estimate = friction.spread.widened(estimate)
