@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
-from flexcal.model.arm_sensor import sensitivity_name
+from flexcal.model.arm_sensor import mounting_names, sensitivity_name
 from flexcal.report.responses_check import misfit_sentences
 from flexcal.report.sections.springs import hardening_sentence
 from flexcal.workflow.bearing_remarks import response_bearings_remarks
@@ -71,6 +71,17 @@ def sensor_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...
         if abs(np.log(float(found["estimate"] or np.nan))) > _ODD * stated:
             remarks.append(
                 f"that is more than {_ODD:g} times its sensitivity_std of {stated:g}: check the sensitivity, xyz and direction of {name}"
+            )
+        config = model.sensors[name].config
+        shift = [float(result.estimate.values.get(key, 0.0)) for key in mounting_names(name)]
+        far, turned = np.linalg.norm(shift[:3]), np.linalg.norm(shift[3:])
+        if (
+            max(np.abs(shift[:3])) > _ODD * config.position_std
+            or max(np.abs(shift[3:])) > _ODD * config.direction_std
+        ):
+            remarks.append(
+                f"the sensor {name} seems to be {1000 * far:.2g} mm and {np.degrees(turned):.2g} degrees from where robot.yaml has it, more "
+                f"than {_ODD:g} times its position_std or direction_std: measure its xyz and direction again, or check its frame"
             )
     return tuple(remarks)
 
