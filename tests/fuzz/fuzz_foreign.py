@@ -17,6 +17,11 @@ def write_foreign(folder: Path, columns: dict[str, np.ndarray], log: dict[str, n
     pl.DataFrame(columns).write_parquet(folder / "measured.parquet")
     _write_mat(folder, columns)
     _write_excel(folder, columns)
+    write_recordings(folder, log)
+
+
+def write_recordings(folder: Path, log: dict[str, np.ndarray]) -> None:
+    """Universal files and recordings of ROS of a log: t (N,), q and tau (N, 3)."""
     _write_universal(folder, log)
     _write_bags(folder, log)
     _write_bag_of_ros_1(folder, log)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzz_foreign import write_recordings
 from fuzz_seeds import CELL, PLAN, ROBOT, URDF
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
@@ -190,3 +191,39 @@ def test_npz(tmp_path: Path, changes: list[tuple[int, int]], length: int) -> Non
     path = tmp_path / "response.npz"
     path.write_bytes(bytes(content[:length] if length % 3 else content))
     ends_well(FrequencyResponse.load, path)
+
+
+LOG = {"t": np.arange(12) / 100, "q": np.ones((12, 3)), "tau": np.zeros((12, 3))}
+RECORDINGS = ("measured.uff", "measured_binary.uff", "recorded.bag", "recorded.mcap", "recorded.db3")
+
+
+@pytest.fixture(scope="module")
+def recordings(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """Recordings of a dozen rows, those whose packages are there."""
+    folder = tmp_path_factory.mktemp("recordings")
+    write_recordings(folder, LOG)
+    return {name: (folder / name).read_bytes() for name in RECORDINGS if (folder / name).is_file()}
+
+
+@pytest.mark.parametrize("name", RECORDINGS)
+@thorough
+@given(
+    st.lists(st.tuples(st.floats(0, 1), st.integers(0, 30), st.binary(max_size=12)), max_size=4),
+    st.floats(0, 1.5),
+)
+def test_recordings(
+    name: str,
+    recordings: dict[str, bytes],
+    tmp_path: Path,
+    edits: list[tuple[float, int, bytes]],
+    length: float,
+) -> None:
+    """Parts of them cut out, repeated or replaced, and their end cut off."""
+    content = recordings.get(name, b"")
+    assume(content)
+    for share, gone, new in edits:
+        at = int(share * len(content))
+        content = content[:at] + new + content[at + gone :]
+    path = tmp_path / name
+    path.write_bytes(content[: int(length * len(content))])
+    ends_well(read_foreign, path, ["axis_1", "axis_2", "axis_3"])
