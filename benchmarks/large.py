@@ -358,6 +358,14 @@ CASES: dict[str, Case] = {
         ("identify", "dynamics", "robot.yaml", "log_1.csv", *_OUT),
         "out/report.html",
     ),
+    **{
+        f"identify dynamics, {name}": Case(
+            functools.partial(_log, held=(0.0,)),
+            ("identify", "dynamics", "robot.yaml", "log_1.csv", "--estimator", name, *_OUT),
+            "out/report.html",
+        )
+        for name in ("sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf")
+    },
     "learn residual": Case(
         functools.partial(_log, held=(0.0,)),
         ("identify", "dynamics", "robot.yaml", "log_1.csv", "--learn-residual", *_OUT),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from flexcal.calibration import EvenSample, repeatability
@@ -75,3 +77,23 @@ def test_commands_are_told_as_by_comparing_each_with_all_before() -> None:
     expected = [np.flatnonzero(label == k) for k in range(len(leaders))]
     found = repeatability(poses_of(q, np.arange(600)))
     assert [pose.rows.tolist() for pose in found] == [rows.tolist() for rows in expected if len(rows) > 1]
+
+
+def test_a_payload_measured_at_every_pose_is_no_stratum() -> None:
+    """As from a load cell; a declared set of payloads is one."""
+    rng = np.random.default_rng(5)
+    poses = poses_of(rng.uniform(-2, 2, (50_000, 6)), np.arange(50_000))
+    measured = EvenSample.of(replace(poses, payload=rng.normal(5.0, 0.1, 50_000)), 1000)
+    assert measured is not None and len(measured.rows) == 1000
+    changed = EvenSample.of(replace(poses, payload=np.where(np.arange(50_000) < 500, 5.0, 0.0)), 1000)
+    assert changed is not None and (changed.rows < 500).sum() == 100
+
+
+def test_many_stations_take_no_more_visits_than_others() -> None:
+    rng = np.random.default_rng(6)
+    command = np.tile(np.arange(2000), 20)
+    station = np.array([f"s{k}" for k in range(40)])[command % 40]
+    poses = poses_of(rng.uniform(-2, 2, (2000, 6))[command], np.arange(40_000), station=station)
+    found = EvenSample.of(poses, 4000)
+    assert found is not None and len(found.rows) <= 4400
+    assert len(np.unique(station[found.rows])) == 40

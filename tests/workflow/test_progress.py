@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import shutil
 from pathlib import Path
 
+import polars as pl
 import pytest
 
 from flexcal.workflow.design_poses import plan_calibration_poses
+from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
 
 @pytest.mark.parametrize("criterion", ["c", "E"])
@@ -24,3 +27,24 @@ def test_design_of_poses(examples: Path, tmp_path: Path, criterion: str) -> None
     for stage, shares in told.items():
         assert shares[0] == 0.0 and shares[-1] == 1.0 and shares == sorted(shares), stage
     assert sum(0 < share < 1 for share in told["choosing"]) >= 2
+
+
+def test_every_pass_over_the_logs(examples: Path, tmp_path: Path) -> None:
+    """An estimator that goes through the logs again tells of each pass how much of all logs it has seen."""
+    robot = Path(shutil.copytree(examples / "tx40", tmp_path / "tx40")) / "robot.yaml"
+    robot.write_text(robot.read_text().replace("decimation: 100", "decimation: 100, friction: classic"))
+    log = robot.parent / "exciting.parquet"
+    other = robot.parent / "other.parquet"
+    pl.read_parquet(log).head(-1).write_parquet(other)
+    told: list[float] = []
+
+    def progress(stage: str, share: float) -> None:
+        if stage == "estimating":
+            told.append(share)
+
+    identify_robot_dynamics(robot, [log, other], estimator="irls", progress=progress)
+    ends = [k for k, share in enumerate(told) if share == 1.0]
+    assert len(ends) >= 2 and ends[-1] == len(told) - 1
+    for first, last in zip([0, *(k + 1 for k in ends)], ends, strict=False):
+        own = told[first : last + 1]
+        assert own == sorted(own) and 0.5 in own

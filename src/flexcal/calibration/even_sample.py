@@ -18,7 +18,9 @@ MOST = 10_000
 _COMMANDS = 400
 """Positions of which several visits are kept."""
 _LEAST = 100
-"""Positions of every station and payload, as far as there are any."""
+"""Positions of every station and payload, as far as there are any and all together are no more than the others."""
+_PAYLOADS = 20
+"""Of a station; more are no payloads that are changed, but what is measured at every pose."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,8 +43,11 @@ class EvenSample:
         first = np.unique(visit, return_index=True)[1]
         command = distinct(np.round(poses.q[first] / SAME_COMMAND))
         _, station = np.unique(poses.station[first], return_inverse=True)
-        held = np.zeros(len(first)) if poses.payload is None else poses.payload[first]
-        kept = _kept_visits(command, distinct(station, held), most * len(first) // len(poses))
+        stratum = station
+        if poses.payload is not None:
+            own = distinct(station, poses.payload[first])
+            stratum = own if own.max() < _PAYLOADS * (station.max() + 1) else station
+        kept = _kept_visits(command, stratum, most * len(first) // len(poses))
         return cls(np.flatnonzero(np.isin(visit, kept)), len(poses))
 
 
@@ -57,9 +62,11 @@ def _kept_visits(command: np.ndarray, stratum: np.ndarray, budget: int) -> np.nd
     each = max(1, budget // wanted) if again else 1
     chosen = []
     own = stratum[order[starts]]
-    for one in np.unique(own):
+    strata = np.unique(own)
+    least = min(_LEAST, max(1, wanted // len(strata)))
+    for one in strata:
         members = np.flatnonzero(own == one)
-        share = max(min(len(members), _LEAST), wanted * len(members) // len(starts))
+        share = max(min(len(members), least), wanted * len(members) // len(starts))
         chosen.append(rng.permutation(members)[:share])
     kept = []
     for k in np.concatenate(chosen):

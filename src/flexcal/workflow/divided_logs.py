@@ -26,6 +26,7 @@ from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
 from flexcal.workflow.log_torques import require_joint_torques
 from flexcal.workflow.log_wrenches import require_wrenches
 from flexcal.workflow.treatment import Treatment
+from flexcal.workflow.watched_log import WatchedLog, onward
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +90,7 @@ class DividedLogs:
         return self._systems(self.unseen, observation, 1)
 
     def rows(self, observation: Observation, base: BaseParameters) -> RecordedRows:
-        """Of what is fitted, log after log in this process."""
+        """Of what is fitted, log after log in this process; every pass over them is told anew."""
         return self._rows(self.fitted, observation, base)
 
     def unseen_rows(self, observation: Observation, base: BaseParameters) -> RecordedRows | None:
@@ -109,6 +110,10 @@ class DividedLogs:
         )
 
     def _rows(self, parts: Sequence[LogPart], observation: Observation, base: BaseParameters) -> RecordedRows:
-        logs, windows = [part.log for part in parts], [part.window for part in parts]
+        logs = [
+            WatchedLog(part.log, "estimating", onward(self.progress, number, len(parts)))
+            for number, part in enumerate(parts)
+        ]
+        windows = [part.window for part in parts]
         treatment = self.treatment
         return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

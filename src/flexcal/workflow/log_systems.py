@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from flexcal.dynamics import ExperimentSystem, JointLog, Motion, Observation, Window, experiment_system
+from flexcal.dynamics import ExperimentSystem, JointLog, Observation, Window, experiment_system
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.workflow.treatment import Treatment
+from flexcal.workflow.watched_log import WatchedLog, onward
 from flexcal.workflow.workers import WorkerTask, start_workers
 
 
@@ -58,7 +59,7 @@ def log_systems(
     """
     if jobs == 1:
         return [
-            _log_system(part, observation, treatment, batches, _onward(progress, number, len(parts)))
+            _log_system(part, observation, treatment, batches, onward(progress, number, len(parts)))
             for number, part in enumerate(parts)
         ]
     from joblib import Parallel, delayed
@@ -72,11 +73,6 @@ def log_systems(
         found.append(system)
         progress("reading", len(found) / len(parts))
     return found
-
-
-def _onward(progress: Progress, number: int, parts: int) -> Progress:
-    """Tells how much of all parts is done from how much of this one is."""
-    return lambda stage, share: progress(stage, (number + share) / parts)
 
 
 def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window, Window | None]:
@@ -94,7 +90,7 @@ def _log_system(
     progress("reading", 0.0)
     found = experiment_system(
         observation,
-        _Watched(part.log, progress),
+        WatchedLog(part.log, "reading", progress),
         treatment.decimation,
         part.window,
         mask_standstill=treatment.mask_standstill,
@@ -102,30 +98,3 @@ def _log_system(
     )
     progress("reading", 1.0)
     return found
-
-
-@dataclass(frozen=True, eq=False)
-class _Watched:
-    """A log that says how much of it is read."""
-
-    log: JointLog
-    progress: Progress
-
-    @property
-    def name(self) -> str:
-        return self.log.name
-
-    @property
-    def samples(self) -> int:
-        return self.log.samples
-
-    @property
-    def top_speed(self) -> np.ndarray:
-        return self.log.top_speed
-
-    def blocks(self) -> Iterator[Motion]:
-        seen = 0
-        for motion in self.log.blocks():
-            yield motion
-            seen += len(motion)
-            self.progress("reading", min(1.0, seen / max(1, self.samples)))
