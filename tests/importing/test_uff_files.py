@@ -116,16 +116,22 @@ def test_a_file_that_was_cut_off(tmp_path: Path, rng: np.random.Generator) -> No
         read_foreign(cut, ())
 
 
-def test_binary_histories_with_padding(tmp_path: Path, rng: np.random.Generator) -> None:
-    """Values end where the header says so: writers fill the last record of their file."""
+@pytest.mark.parametrize("between", [b"", b"\n", bytes(40) + b"\r\n"])
+def test_binary_histories(tmp_path: Path, rng: np.random.Generator, between: bytes) -> None:
+    """Values end where the header says so: some writers fill the last record of their file, and some end no line."""
     data = rng.normal(size=(2, 25))
     path = written(
-        tmp_path / "a.uff", *(history(item, 0.01, binary=1, id1=f"q{k}") for k, item in enumerate(data))
+        tmp_path / "a.uff",
+        *(history(item, 0.01, binary=1, id1=f"q{k}") for k, item in enumerate(data)),
     )
     content = path.read_bytes()
-    path.write_bytes(
-        content.replace(data[0, -1].astype("<f8").tobytes(), data[0, -1].astype("<f8").tobytes() + bytes(40))
-    )
-    assert path.read_bytes() != content
+    for values in data:
+        head, last, tail = content.partition(values.astype("<f8").tobytes())
+        assert last and tail.lstrip(b"\n").startswith(b"    -1\n")
+        content = head + last + between + tail.lstrip(b"\n")
+    path.write_bytes(content)
     foreign = read_foreign(path, ())
     np.testing.assert_array_equal(np.array([foreign.numbers["q0"], foreign.numbers["q1"]]), data)
+    path.write_bytes(content[:-20])
+    with pytest.raises(InputError, match="its last data set has no end"):
+        read_foreign(path, ())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,8 @@ from flexcal.importing.foreign_table import ForeignTable
 
 _FUNCTION, _TIME_RESPONSE = 58, 1
 _DIRECTIONS = ("", "X", "Y", "Z", "RX", "RY", "RZ")
-_DELIMITER = b"    -1"
+_DELIMITER = re.compile(rb"    -1(?=[\r\n]|\Z| {74})")
+"""As pyuff finds it: after binary values it does not begin a line."""
 _SAME_CLOCK = 1e-6
 """Share of a step by which two histories may be sampled apart."""
 
@@ -67,7 +69,7 @@ def _require_whole(path: Path) -> None:
     except OSError as problem:
         reason = problem.strerror or str(problem)
         raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
-    if sum(line.rstrip() == _DELIMITER for line in content.splitlines()) % 2:
+    if len(_DELIMITER.findall(content)) % 2:
         raise InputError(f"{path}: its last data set has no end, so the file was cut off; export it again.")
 
 
