@@ -58,7 +58,7 @@ def read_ros(path: Path, joints: Sequence[str], topic: str | None) -> ForeignTab
         raise
     except Exception as problem:  # whatever a reader of a foreign, perhaps broken file may raise
         raise InputError(
-            f"{path}: not a readable recording of ROS ({_reason(problem)}); record it again."
+            f"{path}: not a readable recording of ROS ({_reason(problem)}); record it again, with joint states and points alone."
         ) from problem
     if not states:
         raise InputError(f"{path}: {_without_states(kinds, notes)}")
