@@ -98,15 +98,18 @@ def test_feedback_biases_without_a_reference_and_not_with_it(tmp_path: Path) -> 
         tmp_path / "loop.csv",
         {"t": STEP * np.arange(20000), "asked": asked, "torque [Nm]": torque, "motor angle [rad]": q[:, 0]},
     )
-    error = {}
+    error, square = {}, {}
     for name, more in (("plain", []), ("reference", ["--reference", "asked"])):
         assert run([file, "--band", 3, 30, *more, "--out", tmp_path / name]) == 0
         with np.load(tmp_path / name / "response.npz") as stored:
             truth = axis.response(stored["frequencies_hz"])[:, 0]
-            ratio = stored["response"][:, 0, 0] / truth
+            ratio, std = stored["response"][:, 0, 0] / truth, stored["std"][:, 0, 0] / abs(truth)
             error[name] = abs(np.median(ratio.real) - 1)
-    assert error["plain"] > 0.1
-    assert error["reference"] < 0.3 * error["plain"]
+            square[name] = np.mean(np.abs(ratio - 1) ** 2 / std**2)  # 1 of errors that the covariance tells
+    assert error["plain"] > 0.1 and error["reference"] < 0.5 * error["plain"]
+    assert square["plain"] > 2.5 and square["reference"] < 1.3
+    bias = results(tmp_path / "plain")["feedback"]["bias"]
+    assert 0.1 < bias < 0.4
 
 
 def test_the_tip_is_no_motor(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -55,7 +55,9 @@ class IdentifyResponse:
     """Without a plan: torque, force, current or command that drives the axis, as COLUMN or COLUMN[unit]; several for several axes."""
     output: Annotated[Texts, arg(metavar="COLUMN...", help_behavior_hint=_RECOGNISED)] = ()
     """What moves, as COLUMN, COLUMN[unit] or COLUMN=position, =velocity or =acceleration; the motor's own first."""
-    reference: Annotated[Texts, arg(metavar="COLUMN...", help_behavior_hint="(default: none)")] = ()
+    reference: Annotated[
+        Texts, arg(metavar="COLUMN...", help_behavior_hint="(default: recognised where a controller acts)")
+    ] = ()
     """What the controller was asked for, where one acts on the output: noise in its feedback then does not bias the response."""
     rate: Annotated[
         MaybeNumber, arg(metavar="HZ", help_behavior_hint="(default: from the column of time)")

@@ -146,7 +146,8 @@ def identify_modes(
     most = MOST_MODES if modes is None else modes
     response, fit = measured, None
     for turn in range(_ROUNDS):
-        data = thinned(BandData(spectra, _sigma(spectra, response)), _FOR_CHOICE)
+        cleaned = _cleaned(spectra, response if fit is None else fit.model)
+        data = thinned(BandData(cleaned, _sigma(spectra, response)), _FOR_CHOICE)
         before = 0 if fit is None else len(fit.model.natural)
         fit = _fitted(data, _FIRST if fit is None else _nonlinear(fit))
         while len(fit.model.natural) < most:
@@ -163,10 +164,26 @@ def identify_modes(
         if len(fit.model.natural) == before:
             break
     assert fit is not None
-    data = thinned(BandData(spectra, _sigma(spectra, response)), _FOR_FIT)
+    data = thinned(BandData(_cleaned(spectra, fit.model), _sigma(spectra, response)), _FOR_FIT)
     fit = _fitted(data, _nonlinear(fit))
     progress("modes", 1.0)
     return IdentifiedModes(fit, about(spectra, fit.model, _sigma(spectra, response)))
+
+
+def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> RecordSpectra:
+    """The spectra with the instruments as inputs, and outputs without what the rest of the inputs brings by a first guess of the response.
+
+    What a controller feeds back of the noise then is no error of the fit, which would look like modes.
+    """
+    if isinstance(guess, ModalModel):
+        response = guess.response(spectra.frequencies_hz)
+    else:
+        lines = guess.response.reshape(len(guess.frequencies_hz), -1).T
+        response = np.stack(
+            [np.interp(spectra.frequencies_hz, guess.frequencies_hz, one) for one in lines], -1
+        ).reshape(-1, *guess.response.shape[1:])
+    rest = np.einsum("kyu,rku->rky", response, spectra.inputs - spectra.instruments)
+    return replace(spectra, inputs=spectra.instruments, outputs=spectra.outputs - rest)
 
 
 def about(spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray) -> LocalResponse:

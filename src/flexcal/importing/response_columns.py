@@ -12,13 +12,17 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.frequency.excitation import Channel
 from flexcal.importing.column_names import ColumnName, parse_name
-from flexcal.importing.column_words import KINDS, SINGLE, rank
+from flexcal.importing.column_words import COMMANDED, KINDS, SINGLE, rank
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.plain_data import suggestion
 
 KIND_NAMES = {"position": 0, "velocity": 1, "acceleration": 2}
 _FORCE = frozenset(["force", "kraft", "thrust"])
 _DRIVE = frozenset(["u", "input", "excitation"])
+_ADDED = frozenset(
+    ["excitation", "injection", "injected", "dither", "perturbation", "multisine", "chirp", "sweep", "prbs"]
+)
+"""Words of a signal that is added somewhere in a loop. A commanded position is one too; commanded velocities and torques are fed back."""
 _NO_OUTPUT = frozenset(["error", "err", "following", "deviation", "temperature", "temp", "voltage", "status"])
 _SI: dict[str, tuple[float, str, int]] = {
     "rad": (1.0, "rad", 0),
@@ -68,13 +72,17 @@ class ResponseColumn:
 
 @dataclass(frozen=True)
 class ResponseColumns:
-    """Time (None where rows are counted), inputs, outputs and references of a file, and why they were taken, a sentence each."""
+    """Time (None where rows are counted), inputs, outputs and references of a file, and why they were taken, a sentence each.
+
+    `guessed` tells that the references were recognised, not named.
+    """
 
     time: str | None
     inputs: tuple[ResponseColumn, ...]
     outputs: tuple[ResponseColumn, ...]
     references: tuple[ResponseColumn, ...]
     remarks: tuple[str, ...]
+    guessed: bool = False
 
 
 def response_columns(
@@ -120,12 +128,19 @@ def response_columns(
         raise InputError(
             f"{foreign.table.file.path}: no column was recognised as {lacking}; say which with {option}; there are {listed}."
         )
+    guessed = [] if chosen_references else _guessed_references(foreign, free, len(chosen_inputs))
+    free = {column: name for column, name in free.items() if column not in {c.channel.name for c in guessed}}
     if free:
         remarks.append(
             f"left out: {', '.join(free)} (name them with --input or --output where they belong to the experiment)"
         )
     return ResponseColumns(
-        time, tuple(chosen_inputs), tuple(chosen_outputs), tuple(chosen_references), tuple(remarks)
+        time,
+        tuple(chosen_inputs),
+        tuple(chosen_outputs),
+        (*chosen_references, *guessed),
+        tuple(remarks),
+        bool(guessed),
     )
 
 
@@ -241,6 +256,26 @@ def _guessed_inputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> li
             factor, unit = _input_unit(free[column].unit or _own_unit(column))
             result.append(ResponseColumn(Channel(column, unit), factor))
         return result
+    return []
+
+
+def _guessed_references(
+    foreign: ForeignTable, free: Mapping[str, ColumnName], inputs: int
+) -> list[ResponseColumn]:
+    """Signals that were added in a loop, else commanded positions, that move; none unless there is one for every input."""
+    moving = {column: name for column, name in free.items() if float(np.nanstd(foreign.numbers[column])) > 0}
+    added = [column for column, name in moving.items() if set(name.words) & _ADDED]
+    commanded = [
+        column
+        for column, name in moving.items()
+        if set(name.words) & COMMANDED
+        and not set(name.words) & (_NO_OUTPUT | _FORCE | dict(KINDS)["tau"] | dict(KINDS)["current"])
+        and (item := _output(column, name)) is not None
+        and item.channel.derivative == 0
+    ]
+    for found in (added, commanded):
+        if len(found) == inputs:
+            return [ResponseColumn(Channel(column)) for column in found]
     return []
 
 

@@ -25,13 +25,23 @@ _SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
 
 @dataclass(frozen=True, eq=False)
 class ResponseRecords:
-    """Records with the channels of their columns, and what was done to read them, a sentence each."""
+    """Records with the channels of their columns, and what was done to read them, a sentence each.
+
+    `guessed` tells that the references were recognised, not named.
+    """
 
     records: tuple[ExcitationRecord, ...]
     inputs: tuple[Channel, ...]
     outputs: tuple[Channel, ...]
     references: tuple[Channel, ...]
     remarks: tuple[str, ...]
+    guessed: bool = False
+
+    def without_references(self, remark: str = "") -> ResponseRecords:
+        """The same of inputs and outputs alone, and why."""
+        records = tuple(replace(record, references=record.references[:, :0]) for record in self.records)
+        remarks = (*self.remarks, remark) if remark else self.remarks
+        return replace(self, records=records, references=(), remarks=remarks, guessed=False)
 
 
 def read_response_records(
@@ -49,6 +59,8 @@ def read_response_records(
     """
     tables = [read_foreign(file, ()) for file in files]
     columns = response_columns(tables[0], inputs=inputs, outputs=outputs, references=references)
+    if columns.guessed and not all(_is_whole(table, columns) for table in tables):
+        columns = replace(columns, references=(), guessed=False)
     records: list[ExcitationRecord] = []
     remarks = list(columns.remarks)
     for file, table in zip(files, tables, strict=True):
@@ -65,7 +77,14 @@ def read_response_records(
         tuple(c.channel for c in columns.outputs),
         tuple(c.channel for c in columns.references),
         _merged(remarks, len(files)),
+        columns.guessed,
     )
+
+
+def _is_whole(table: ForeignTable, columns: ResponseColumns) -> bool:
+    """Whether a file has all references, without a hole."""
+    names = [column.channel.name for column in columns.references]
+    return all(name in table.numbers and bool(np.isfinite(table.numbers[name]).all()) for name in names)
 
 
 def _merged(remarks: Sequence[str], files: int) -> tuple[str, ...]:

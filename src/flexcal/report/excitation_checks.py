@@ -14,7 +14,8 @@ _CHANCE, _UNLIKE, _MATTERS = 1.5, 3.0, 0.03
 from which it matters."""
 _MISSED = 0.1
 """Relative difference of measured response and masses from which the masses are no description of the axis."""
-_FREEDOM = 12
+_UNBIASED, _BIASED = 0.01, 0.05
+"""Bias by feedback, relative, up to which it does not matter at 19 of 20 lines, and from which it is bad at the median one."""
 
 
 def excitation_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
@@ -22,6 +23,7 @@ def excitation_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     return (
         _check_halves(results["halves"]).named("half_responses", independent=True),
         _check_coherence(results["elements"]).named("coherence"),
+        _check_feedback(results.get("feedback")).named("feedback"),
         _check_resonances(results["resonances"]).named("resonances"),
         _check_masses(results["masses"]).named("masses"),
     )
@@ -53,6 +55,26 @@ def _check_coherence(elements: Any) -> Check:
     if worst["coherence"] < _COHERENT:
         return Check(question, f"Not well. {answer} {cure}", "care")
     return Check(question, f"Yes. {answer}", "good")
+
+
+def _check_feedback(feedback: Mapping[str, Any] | None) -> Check:
+    question = "Is the response free of what a controller feeds back?"
+    if feedback is not None and feedback["reference"]:
+        return Check(question, f"Yes: {feedback['reference']} tells the excitation from it.", "good")
+    if feedback is None or feedback["acts"] is None:
+        return Check(question, "Cannot be judged: the records are too short.", "unknown")
+    if not feedback["acts"]:
+        return Check(question, "Yes. No controller is seen to act on the output.", "good")
+    answer = (
+        f"A controller seems to act on the output; the noise that it feeds back biases the response by {percent(feedback['bias'])} "
+        f"(median), and by {percent(feedback['worst_bias'])} or more at one line in twenty, the most near "
+        f"{significant(feedback['worst_hz'], 3)} Hz."
+    )
+    if feedback["worst_bias"] < _UNBIASED:
+        return Check(question, f"Yes. {answer}", "good")
+    cure = "Name what the controller was asked for with --reference, or excite more strongly; intervals do not contain this. "
+    cure += "Friction and backlash in repeated sweeps can look like a controller."
+    return Check(question, f"No. {answer} {cure}", "bad" if feedback["bias"] > _BIASED else "care")
 
 
 def _check_resonances(found: Any) -> Check:

@@ -217,6 +217,11 @@ PHRASES: dict[str, dict[str, str]] = {
         "good": "the input explains the output",
         "else": "the coherence is low",
     },
+    "feedback": {
+        "good": "no feedback biases the response",
+        "unknown": "feedback cannot be judged",
+        "else": "noise that a controller feeds back biases the response",
+    },
     "resonances": {
         "good": "all resonances are determined",
         "unknown": "there is no resonance in the band",

@@ -18,15 +18,23 @@ from flexcal.errors import FlexcalError, InputError
 from flexcal.estimates_file import provenance
 from flexcal.frequency.excitation import Channel, equal_pieces
 from flexcal.frequency.excited_band import excited_band
+from flexcal.frequency.feedback import feedback
 from flexcal.frequency.instruments import with_reference
 from flexcal.frequency.local_response import LocalResponse, local_response
 from flexcal.frequency.period import find_period
 from flexcal.frequency.record_spectra import Hold, RecordSpectra, record_spectra
 from flexcal.frequency.repeatable import HalfDifference, half_difference
+from flexcal.frequency.tones import Tones, tones
 from flexcal.importing.response_records import ResponseRecords, read_response_records
 from flexcal.progress import Progress, silent
 from flexcal.report.excitation_checks import excitation_checks
 from flexcal.report.trust import Trust
+from flexcal.workflow.excitation_feedback import (
+    MOSTLY,
+    BandFeedback,
+    is_free_of_feedback,
+    share_of_lines,
+)
 from flexcal.workflow.excitation_files import write_response_arrays
 from flexcal.workflow.results import write_results
 
@@ -57,6 +65,7 @@ class IdentifiedExcitation:
     identified: IdentifiedModes
     masses: AxisMasses
     halves: HalfDifference | None
+    fed: BandFeedback
     period_s: float | None
     provenance: Mapping[str, str]
     files: tuple[Path, ...]
@@ -98,6 +107,7 @@ class IdentifiedExcitation:
                 "references": [_channel(channel) for channel in self.measured.references],
             },
             "elements": [self._element(y, u) for y in range(len(outputs)) for u in range(len(inputs))],
+            "feedback": self.fed.document(),
             "resonances": [_quantities(item) for item in resonances(fit)],
             "masses": self._masses(),
             "halves": None if self.halves is None else asdict(self.halves),
@@ -160,12 +170,7 @@ class IdentifiedExcitation:
             said.append(
                 "the excitation is not periodic; the transients of every record are estimated with the response"
             )
-        if not self.measured.references:
-            loss = 1.0 - float(np.median(self.response.coherence))
-            said.append(
-                "the input is taken to be independent of the output's noise; if a controller acts on that output, the response is biased "
-                f"by up to 1 − coherence (median {100 * loss:.2g} %), and --reference COLUMN (what the controller was asked for) avoids it"
-            )
+        said.append(self.fed.remark)
         return said
 
 
@@ -241,15 +246,29 @@ def _identified(
     progress: Progress,
 ) -> IdentifiedExcitation:
     pieces = equal_pieces(measured.records)
+    at_once = [channel.derivative == 2 for channel in measured.outputs]
+    loop = feedback(pieces, at_once)
+    if measured.guessed and loop is not None and loop.acts and not is_free_of_feedback(pieces, at_once):
+        names = " and ".join(channel.name for channel in measured.references)
+        measured = measured.without_references(
+            f"{names} is named as a reference, but seems to carry noise of the output, and is left out; --reference uses it"
+        )
+        pieces = equal_pieces(measured.records)
+    elif measured.guessed and not (loop is not None and loop.acts):
+        measured = measured.without_references()
+        pieces = equal_pieces(measured.records)
     periodic = [find_period(r.references if r.references.size else r.inputs) for r in pieces]
     period = periodic[0] if len(set(periodic)) == 1 else None
     whole, references = record_spectra(
         pieces, measured.inputs, measured.outputs, hold=options.hold, period=period
     )
-    spectra = _in_band(whole, options.band, files)
-    if references.shape[2]:
-        kept = np.isin(whole.frequencies_hz, spectra.frequencies_hz)
-        spectra = with_reference(spectra, references[:, kept])
+    if measured.references:
+        whole, usable = with_reference(whole, references)
+    else:
+        usable = None
+        if loop is not None and loop.acts:
+            usable = share_of_lines(loop.share_at(whole.frequencies_hz), whole.periods) < MOSTLY
+    spectra = _in_band(whole, usable, options.band, files, tones(pieces))
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
     masses = identify_masses(identified.fit, identified.response, options.masses)
     return IdentifiedExcitation(
@@ -259,6 +278,13 @@ def _identified(
         identified=identified,
         masses=masses,
         halves=_halves(spectra, identified),
+        fed=BandFeedback.of(
+            loop,
+            identified.response,
+            spectra.periods,
+            [channel.name for channel in measured.references],
+            guessed=measured.guessed,
+        ),
         period_s=None if period is None else period * spectra.time_step,
         provenance=provenance(list(files), {"method": identified.response.method}),
         files=tuple(files),
@@ -266,7 +292,13 @@ def _identified(
     )
 
 
-def _in_band(whole: RecordSpectra, band: tuple[float, ...], files: Sequence[Path]) -> RecordSpectra:
+def _in_band(
+    whole: RecordSpectra,
+    usable: np.ndarray | None,
+    band: tuple[float, ...],
+    files: Sequence[Path],
+    few: Tones | None,
+) -> RecordSpectra:
     if band:
         if len(band) != 2 or not 0 < band[0] < band[1]:
             raise InputError("--band needs two frequencies in Hz, the lower one first.")
@@ -277,7 +309,11 @@ def _in_band(whole: RecordSpectra, band: tuple[float, ...], files: Sequence[Path
                 f"{whole.frequencies_hz[-1]:.3g} Hz."
             )
         return kept
-    found = excited_band(whole, local_response(whole))
+    if few is not None and few.alone:
+        raise InputError(f"{files[0]}: {few.sentence}")
+    found = excited_band(whole, local_response(whole), usable)
+    if found is None and few is not None:
+        raise InputError(f"{files[0]}: {few.sentence}")
     if found is None:
         raise InputError(
             f"{files[0]}: at hardly any frequency does the output follow the input; check that the columns belong together (--input, "
