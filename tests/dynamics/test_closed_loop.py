@@ -24,6 +24,7 @@ from flexcal.dynamics import (
     simulated_iteration,
     weighted_least_squares,
 )
+from flexcal.dynamics.friction_library import CoulombWarmUp
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
@@ -55,6 +56,16 @@ def noisy(clean: Motion, rng: np.random.Generator) -> Motion:
     shape = clean.q.shape
     q, torque = clean.q + ENCODER * rng.normal(size=shape), clean.torque + TORQUE * rng.normal(size=shape)
     return Motion.of(Recording(1 / RATE, q, torque), 20.0)
+
+
+def divided(whole: Motion, parts: list[Motion]) -> Motion:
+    """An experiment with gaps between its parts."""
+
+    class Divided(Motion):
+        def blocks(self) -> Iterator[Motion]:
+            yield from parts
+
+    return Divided(whole.time, whole.q, whole.dq, whole.ddq, whole.torque)
 
 
 def test_a_linear_loop_answers_as_its_transfer_function(tmp_path: Path) -> None:
@@ -223,3 +234,39 @@ def test_it_starts_from_cad_where_no_robot_can_be_built_of_the_data(
 
     monkeypatch.setattr(simulated_iteration, "feasible_least_squares", refuse)
     assert instrumental_variables(data, rows).parameters.coordinates() == pytest.approx(usual, abs=1e-8)
+
+
+def test_short_parts_between_gaps_are_simulated_too(unknown: Observation, clean: Motion) -> None:
+    """Of 1.5 s, where the low-pass of the path takes 2.3 s: noisy velocities bias least squares, and not instrumental variables."""
+    truth, rng = true_values(unknown), np.random.default_rng(5)
+    linear, free = [], []
+    for _ in range(4):
+        motion = noisy(clean, rng)
+        parts = [motion.part(first, first + 150) for first in range(0, len(motion) - 150, 160)]
+        log = divided(Motion.joined(parts), parts)
+        rows = recorded(unknown, log, 2)
+        data = observe(unknown, rows.base, [log], Decimation(2))
+        for found, kept in (
+            (weighted_least_squares(data), linear),
+            (instrumental_variables(data, rows), free),
+        ):
+            error, std = errors(found, unknown, truth)
+            kept.append(error / std)
+    assert np.abs(np.mean(linear, axis=0)).max() > 2.5
+    assert np.abs(np.mean(free, axis=0)).max() < 1.2
+    assert np.mean(np.abs(free) < 2.0) > 0.9
+
+
+def test_friction_that_warms_up_does_not_begin_anew_after_a_gap(declared: Observation, clean: Motion) -> None:
+    """The controller is given the torque of a warm robot beforehand; one that were cold again would stay behind its path."""
+    warming = Observation(declared.model, (*CLASSIC, CoulombWarmUp(0.5)))
+    size = {"shoulder.coulomb_warm_up": 8.0, "elbow.coulomb_warm_up": 8.0}
+    known = dict(zip(declared.names, true_values(declared), strict=True)) | size
+    truth = np.array([known[name] for name in warming.names])
+    moved = recovery.driven(warming, clean, truth)
+    parts = [moved.part(0, 700), moved.part(750, len(moved))]
+    whole = Motion.joined(parts)
+    log = divided(whole, parts)
+    found = Motion.joined(SimulatedExperiment(warming, truth, log, Decimation(2)).blocks())
+    after = (found.time > parts[1].time[0] + 0.3) & (found.time < parts[1].time[0] + 1.0)
+    assert np.abs(found.q - whole.q)[after].max() < 1.5e-3

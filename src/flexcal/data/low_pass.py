@@ -11,8 +11,6 @@ import numpy as np
 from flexcal.errors import FlexcalError
 
 _ORDER = 4
-_SMALLEST = 1e-12
-"""What the impulse response falls below, relative to its start, is cut off."""
 _SHORTEST_TRANSFORM = 8192
 
 
@@ -25,11 +23,12 @@ class LowPass:
     """A fourth-order Butterworth filter forwards and backwards, at samples `time_step` (s) apart: -6 dB at `cutoff_hz`.
 
     Its response to frequency is |B|² of the bilinear transform, in closed form. The impulse response ends where its slowest mode has
-    fallen to 1e-12, `support` samples to either side. Raises `FlexcalError` where the cut-off is not below half the sampling rate.
+    fallen to the share `tail`, `support` samples to either side. Raises `FlexcalError` where the cut-off is not below half the rate.
     """
 
     time_step: float
     cutoff_hz: float
+    tail: float = 1e-12
 
     def __post_init__(self) -> None:
         if not 0 < self.cutoff_hz < 0.5 / self.time_step:
@@ -48,7 +47,7 @@ class LowPass:
         angles = math.pi * (2 * np.arange(_ORDER) + _ORDER + 1) / (2 * _ORDER)
         poles = self._corner * np.exp(1j * angles)
         slowest = np.abs((1 + poles) / (1 - poles)).max()
-        return math.ceil(math.log(_SMALLEST) / math.log(slowest))
+        return math.ceil(math.log(self.tail) / math.log(slowest))
 
     @cached_property
     def _response(self) -> tuple[int, np.ndarray]:
@@ -61,13 +60,17 @@ class LowPass:
         impulse[2 * self.support + 1 :] = 0.0
         return length, np.fft.rfft(impulse / impulse.sum())
 
+    def fits(self, samples: int, beyond: int = 0) -> bool:
+        """Whether so many samples are enough for `before`."""
+        return samples > self.support + beyond
+
     def before(self, values: np.ndarray, beyond: int = 0) -> np.ndarray:
         """The samples that precede `values` (N, n) when they go on as they begin, turned about the first by half a turn.
 
         There are `support` of them, and so many `beyond`. Raises `TooFewSamples` where N is not above their number.
         """
         count = self.support + beyond
-        if len(values) <= count:
+        if not self.fits(len(values), beyond):
             raise TooFewSamples(
                 f"{len(values)} samples are too few for a cut-off of {self.cutoff_hz:g} Hz; {count + 1} are needed."
             )

@@ -25,7 +25,7 @@ _BORDER_PERIODS = 1.0
 """What is cut from either end, in periods of the cut-off."""
 _APART = 1.5
 """Steps from one sample to the next, at least, across a gap."""
-_BESIDE = 2
+BESIDE = 2
 """Samples on either side that differences of fourth order take."""
 
 
@@ -265,7 +265,7 @@ def smoothed(
     for values in _extended(watched(), low_pass):
         held = values if held is None else np.concatenate([held, values])
         x = low_pass.apply(held)
-        count = len(x) - 2 * _BESIDE
+        count = len(x) - 2 * BESIDE
         if count <= 0:
             continue
         beside = np.concatenate(waiting)
@@ -295,9 +295,9 @@ def _extended(blocks: Iterable[np.ndarray], low_pass: LowPass) -> Iterator[np.nd
         end = np.concatenate([end, values]) if end.size else values
         if begun:
             yield values
-        elif len(end) > low_pass.support + _BESIDE:
+        elif len(end) > low_pass.support + BESIDE:
             begun = True
-            yield np.concatenate([low_pass.before(end, _BESIDE), end])
+            yield np.concatenate([low_pass.before(end, BESIDE), end])
         if begun:
-            end = end[-low_pass.support - _BESIDE - 1 :]
-    yield low_pass.before(end[::-1], _BESIDE)[::-1]
+            end = end[-low_pass.support - BESIDE - 1 :]
+    yield low_pass.before(end[::-1], BESIDE)[::-1]

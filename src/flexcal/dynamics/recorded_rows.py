@@ -15,6 +15,7 @@ from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData, batches_each
 from flexcal.dynamics.rows import Experiment, Rows, Window, rows
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
+from flexcal.errors import FlexcalError
 
 _Join = Callable[[Rows, Rows], Rows]
 """Of the same rows as recorded and as simulated."""
@@ -107,11 +108,20 @@ class RecordedRows:
         parameters: np.ndarray,
         join: _Join,
     ) -> Iterator[Rows]:
-        """Rows that are joined of the measured and the simulated ones."""
+        """Rows that are joined of the measured and the simulated ones, where the simulation is reliable."""
         simulated = SimulatedExperiment(self.observation, parameters, experiment, self.decimation)
         pairs = (rows(self.observation, e, self.decimation, window) for e in (experiment, simulated))
+        empty = True
         for measured, model in zip(*pairs, strict=True):
-            yield join(measured, model)
+            joined = join(measured, model).where(simulated.reliable(measured.time))
+            if len(joined):
+                empty = False
+                yield joined
+        if empty:
+            raise FlexcalError(
+                f"{experiment.name}: it is too short, or its parts between gaps are, for the simulation that this estimator needs; use "
+                "--estimator wls, or record it without gaps."
+            )
 
 
 def _beside(measured: Rows, simulated: Rows) -> Rows:
