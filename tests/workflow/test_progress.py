@@ -9,6 +9,7 @@ import polars as pl
 import pytest
 
 from flexcal.workflow.design_poses import plan_calibration_poses
+from flexcal.workflow.estimators import EstimatorName
 from flexcal.workflow.identify_dynamics import identify_robot_dynamics
 
 
@@ -29,7 +30,10 @@ def test_design_of_poses(examples: Path, tmp_path: Path, criterion: str) -> None
     assert sum(0 < share < 1 for share in told["choosing"]) >= 2
 
 
-def test_every_pass_over_the_logs(examples: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("estimator", "passes"), [("irls", 2), ("tls", 1)])
+def test_every_pass_over_the_logs(
+    examples: Path, tmp_path: Path, estimator: EstimatorName, passes: int
+) -> None:
     """An estimator that goes through the logs again tells of each pass how much of all logs it has seen."""
     robot = Path(shutil.copytree(examples / "tx40", tmp_path / "tx40")) / "robot.yaml"
     robot.write_text(robot.read_text().replace("decimation: 100", "decimation: 100, friction: classic"))
@@ -42,9 +46,9 @@ def test_every_pass_over_the_logs(examples: Path, tmp_path: Path) -> None:
         if stage == "estimating":
             told.append(share)
 
-    identify_robot_dynamics(robot, [log, other], estimator="irls", progress=progress)
+    identify_robot_dynamics(robot, [log, other], estimator=estimator, progress=progress)
     ends = [k for k, share in enumerate(told) if share == 1.0]
-    assert len(ends) >= 2 and ends[-1] == len(told) - 1
+    assert len(ends) >= passes and ends[-1] == len(told) - 1
     for first, last in zip([0, *(k + 1 for k in ends)], ends, strict=False):
         own = told[first : last + 1]
         assert own == sorted(own) and 0.5 in own

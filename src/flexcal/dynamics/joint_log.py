@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from functools import reduce
 from operator import add
@@ -31,7 +31,8 @@ class JointLog:
     The motion has so many `samples`, every `time_step` (s). `top_speed` (n,) is the largest |q̇| of every joint, `spans` are the
     times of the first and the last sample before, between and after the gaps of the log itself, s; `time_stamps` says what was done with
     its time stamps, empty where they were uniform. `payload` is kg, as the column `payload` says, None where there is
-    none; `weight` is what its torques carry; `wrench` tells whether it has a force sensor's columns. A joint that never moves has no
+    none; `weight` is what its torques carry; `wrench` tells whether it has a force sensor's columns; `watch` is told the share of
+    the samples that a pass has gone through. A joint that never moves has no
     velocity and no acceleration: what its encoder shows of them is noise, of which friction would take the sign.
     """
 
@@ -48,6 +49,7 @@ class JointLog:
     payload: float | None
     weight: CarriedWeight
     wrench: bool = False
+    watch: Callable[[float], None] | None = None
 
     @classmethod
     def read(cls, path: Path, model: RobotModel, cutoff_hz: float, scratch: Path) -> JointLog:
@@ -148,10 +150,14 @@ class JointLog:
 
     def blocks(self) -> Iterator[Motion]:
         """The filtered motion in parts that follow each other."""
+        seen = 0
         with self.filtered.open("rb") as stream:
             for start in self.starts:
                 q, torque, external = (np.load(stream).T for _ in range(3))
                 yield self.settled(FilteredPositions(start, self.time_step, q, torque, external).motion())
+                seen += len(torque)
+                if self.watch is not None:
+                    self.watch(min(1.0, seen / max(1, self.samples)))
 
     def settled(self, motion: Motion) -> Motion:
         """A motion of this log, with the joints that never move at rest."""

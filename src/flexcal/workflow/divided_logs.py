@@ -22,11 +22,10 @@ from flexcal.model import RobotModel
 from flexcal.progress import Progress
 from flexcal.workflow.log_payloads import require_unloaded
 from flexcal.workflow.log_predictions import log_predictions
-from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
+from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split, watched
 from flexcal.workflow.log_torques import require_joint_torques
 from flexcal.workflow.log_wrenches import require_wrenches
 from flexcal.workflow.treatment import Treatment
-from flexcal.workflow.watched_log import WatchedLog, onward
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,10 +109,7 @@ class DividedLogs:
         )
 
     def _rows(self, parts: Sequence[LogPart], observation: Observation, base: BaseParameters) -> RecordedRows:
-        logs = [
-            WatchedLog(part.log, "estimating", onward(self.progress, number, len(parts)))
-            for number, part in enumerate(parts)
-        ]
+        logs = [part.log for part in watched(parts, "estimating", self.progress)]
         windows = [part.window for part in parts]
         treatment = self.treatment
         return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +12,12 @@ import numpy as np
 
 from flexcal.dynamics import ExperimentSystem, JointLog, Observation, Window, experiment_system
 from flexcal.model import RobotModel
-from flexcal.progress import Progress, silent
+from flexcal.progress import Progress
 from flexcal.workflow.treatment import Treatment
-from flexcal.workflow.watched_log import WatchedLog, onward
 from flexcal.workflow.workers import WorkerTask, start_workers
+
+_LEAST = 1e-6
+"""Share of a log that is fitted, at least, when it is told how much of that is done."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,14 +60,16 @@ def log_systems(
     Each part has at most about so many `batches`. Raises `FlexcalError` as `experiment_system` does.
     """
     if jobs == 1:
-        return [
-            _log_system(part, observation, treatment, batches, onward(progress, number, len(parts)))
-            for number, part in enumerate(parts)
+        progress("reading", 0.0)
+        found = [
+            _log_system(part, observation, treatment, batches) for part in watched(parts, "reading", progress)
         ]
+        progress("reading", 1.0)
+        return found
     from joblib import Parallel, delayed
 
     systems = Parallel(n_jobs=jobs, return_as="generator")(
-        delayed(WorkerTask(_log_system))(part, observation, treatment, batches, silent) for part in parts
+        delayed(WorkerTask(_log_system))(part, observation, treatment, batches) for part in parts
     )
     progress("reading", 0.0)
     found = []
@@ -84,17 +88,28 @@ def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window,
     return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
 
 
+def watched(parts: Sequence[LogPart], stage: str, progress: Progress) -> list[LogPart]:
+    """The parts, of which every pass over all of them is told to `progress` as a `stage`."""
+
+    def told(number: int, until: float) -> Callable[[float], None]:
+        return lambda share: progress(stage, (number + min(1.0, share / until)) / len(parts))
+
+    found = []
+    for number, part in enumerate(parts):
+        start, end = part.log.span
+        until = max((min(end, part.window.end) - start) / (end - start), _LEAST)
+        found.append(replace(part, log=replace(part.log, watch=told(number, until))))
+    return found
+
+
 def _log_system(
-    part: LogPart, observation: Observation, treatment: Treatment, batches: int, progress: Progress
+    part: LogPart, observation: Observation, treatment: Treatment, batches: int
 ) -> ExperimentSystem:
-    progress("reading", 0.0)
-    found = experiment_system(
+    return experiment_system(
         observation,
-        WatchedLog(part.log, "reading", progress),
+        part.log,
         treatment.decimation,
         part.window,
         mask_standstill=treatment.mask_standstill,
         batches=batches,
     )
-    progress("reading", 1.0)
-    return found
