@@ -73,6 +73,20 @@ def test_in_open_loop_no_controller_is_seen(tmp_path: Path, capsys: pytest.Captu
     assert found["excitation"]["high_hz"] < 60
 
 
+def test_a_commanded_position_that_excites_nothing_is_left_out(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """The log has the path of the axis, but not the noise that was put on the torque."""
+    rng = np.random.default_rng(5)
+    torque, angle = controlled(TWO, PD, excitation("noise", 8000, rng), rng, encoder=2e-6, load=0.3)
+    file = write_log(tmp_path / "log.csv", torque, angle, np.sin(2 * np.pi * np.arange(8000) / RATE))
+    file.write_text(file.read_text().replace("excitation", "position setpoint"))
+    found = respond(file, tmp_path / "out")
+    said = " ".join(capsys.readouterr().out.split())
+    assert "position setpoint is called like a reference, but explains the input in a small part" in said
+    assert found["excitation"]["references"] == [] and found["masses"]["count"] == 2
+
+
 @pytest.mark.parametrize(
     ("sines", "gains", "sentence"),
     [

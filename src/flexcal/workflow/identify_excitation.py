@@ -16,26 +16,19 @@ from flexcal.elasticity.modal_fit import IdentifiedModes, about_at, identify_mod
 from flexcal.elasticity.resonances import Peak, Resonance, antiresonances, peaks, resonances
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimates_file import provenance
-from flexcal.frequency.excitation import Channel, equal_pieces
+from flexcal.frequency.excitation import Channel
 from flexcal.frequency.excited_band import excited_band
-from flexcal.frequency.feedback import feedback
-from flexcal.frequency.instruments import with_reference
 from flexcal.frequency.local_response import LocalResponse, local_response
-from flexcal.frequency.period import find_period
-from flexcal.frequency.record_spectra import Hold, RecordSpectra, record_spectra
+from flexcal.frequency.record_spectra import Hold, RecordSpectra
 from flexcal.frequency.repeatable import HalfDifference, half_difference
 from flexcal.frequency.tones import Tones, tones
 from flexcal.importing.response_records import ResponseRecords, read_response_records
 from flexcal.progress import Progress, silent
 from flexcal.report.excitation_checks import excitation_checks
 from flexcal.report.trust import Trust
-from flexcal.workflow.excitation_feedback import (
-    MOSTLY,
-    BandFeedback,
-    is_free_of_feedback,
-    share_of_lines,
-)
+from flexcal.workflow.excitation_feedback import BandFeedback
 from flexcal.workflow.excitation_files import write_response_arrays
+from flexcal.workflow.excitation_spectra import excited_spectra
 from flexcal.workflow.results import write_results
 
 RESPONSE_TABLE = "response.csv"
@@ -245,30 +238,9 @@ def _identified(
     command: str,
     progress: Progress,
 ) -> IdentifiedExcitation:
-    pieces = equal_pieces(measured.records)
-    at_once = [channel.derivative == 2 for channel in measured.outputs]
-    loop = feedback(pieces, at_once)
-    if measured.guessed and loop is not None and loop.acts and not is_free_of_feedback(pieces, at_once):
-        names = " and ".join(channel.name for channel in measured.references)
-        measured = measured.without_references(
-            f"{names} is named as a reference, but seems to carry noise of the output, and is left out; --reference uses it"
-        )
-        pieces = equal_pieces(measured.records)
-    elif measured.guessed and not (loop is not None and loop.acts):
-        measured = measured.without_references()
-        pieces = equal_pieces(measured.records)
-    periodic = [find_period(r.references if r.references.size else r.inputs) for r in pieces]
-    period = periodic[0] if len(set(periodic)) == 1 else None
-    whole, references = record_spectra(
-        pieces, measured.inputs, measured.outputs, hold=options.hold, period=period
-    )
-    if measured.references:
-        whole, usable = with_reference(whole, references)
-    else:
-        usable = None
-        if loop is not None and loop.acts:
-            usable = share_of_lines(loop.share_at(whole.frequencies_hz), whole.periods) < MOSTLY
-    spectra = _in_band(whole, usable, options.band, files, tones(pieces))
+    found = excited_spectra(measured, options.hold)
+    measured, period = found.measured, found.period
+    spectra = _in_band(found.whole, found.usable, options.band, files, tones(found.pieces))
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
     masses = identify_masses(identified.fit, identified.response, options.masses)
     return IdentifiedExcitation(
@@ -279,7 +251,7 @@ def _identified(
         masses=masses,
         halves=_halves(spectra, identified),
         fed=BandFeedback.of(
-            loop,
+            found.loop,
             identified.response,
             spectra.periods,
             [channel.name for channel in measured.references],
