@@ -17,7 +17,7 @@ from flexcal.report.figures.arm_poses import skeletons
 from flexcal.report.figures.canvas import canvas, decades
 from flexcal.report.figures.error_components import error_components
 from flexcal.report.figures.predicted_quantiles import expected_quantiles, predicted_quantiles
-from flexcal.report.figures.response_fit import response_fit
+from flexcal.report.figures.response_fit import response_fit, sensor_fit
 from flexcal.report.figures.response_levels import response_levels
 from flexcal.report.figures.singular_values import singular_values
 from flexcal.report.figures.spring_intervals import spring_intervals
@@ -123,3 +123,16 @@ def test_ticks_keep_their_size() -> None:
 def test_arrows_are_round_and_short() -> None:
     assert exaggeration(np.array([[1e-4, 0.0, 0.0]]), 0.25) == 2000
     assert exaggeration(np.array([[0.0, 5e-3, 0.0]]), 0.25) == 50
+
+
+def test_readings_of_sensors_are_drawn_by_sensor_and_motor(study: TwoStageStudy) -> None:
+    lines, n = study.responses[0].response.shape[:2]
+    read = np.arange(1.0, 1 + lines * 2 * n).reshape(lines, 2, n) + 0j
+    response = replace(
+        study.responses[0], sensors=("hand", "beam"), sensor_units=("m/s²", "m/s"), sensor_response=read, sensor_predicted=2 * read
+    )  # fmt: skip
+    figure = sensor_fit([response], ["Pose 1"])
+    drawn = {(trace.name, trace.yaxis): trace for trace in figure.data}
+    assert len(drawn) == 2 * 2 * n
+    np.testing.assert_allclose(drawn["fitted model", f"y{n + 2}"].y, 2 * read[:, 1, 1].real)
+    assert figure.layout[f"yaxis{n + 1}"].title.text == "m/s per N m"

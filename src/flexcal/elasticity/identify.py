@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -57,13 +57,19 @@ class StiffnessResult:
 
     def sensor_difference(self, name: str) -> float:
         """Median over lines and poses of how far a sensor's readings are from those predicted, relative to their size."""
-        shares = []
-        for response, predicted in zip(self.responses, self.sensed, strict=True):
-            if response.sensor_response is not None and name in response.sensors:
-                row = response.sensors.index(name)
-                error = np.linalg.norm(response.sensor_response[:, row] - predicted[:, row], axis=1)
-                shares.append(error / np.linalg.norm(predicted[:, row], axis=1))
-        return float(np.median(np.concatenate(shares)))
+        return _median_difference(
+            (response.sensor_response[:, [row := response.sensors.index(name)]], predicted[:, [row]])
+            for response, predicted in zip(self.responses, self.sensed, strict=True)
+            if response.sensor_response is not None and name in response.sensors
+        )
+
+    @property
+    def motor_difference(self) -> float:
+        """The same of the motors' accelerations."""
+        return _median_difference(
+            (response.response, predicted)
+            for response, predicted in zip(self.responses, self.predicted, strict=True)
+        )
 
     def robot(self, model: RobotModel) -> RobotModel:
         """`model` with what was found: its springs, and the bearing axes that they belong to."""
@@ -74,6 +80,15 @@ class StiffnessResult:
     def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
         """One estimated quantity as every results file has it."""
         return self.estimate.quantity(name, truth)
+
+
+def _median_difference(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Of measured and predicted rows (L, k, n): the difference of a row over its size, the median over lines, rows and pairs."""
+    shares = [
+        np.linalg.norm(measured - predicted, axis=2) / np.linalg.norm(predicted, axis=2)
+        for measured, predicted in pairs
+    ]
+    return float(np.median(np.concatenate(shares, axis=None)))
 
 
 def identify_stiffness(

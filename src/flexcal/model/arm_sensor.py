@@ -27,6 +27,11 @@ class ArmSensor:
     config: ArmSensorConfig
 
     @property
+    def unit(self) -> str:
+        """SI unit of its readings."""
+        return ("m", "m/s", "m/s²")[self.order]
+
+    @property
     def feels_gravity(self) -> bool:
         """Whether its tilt changes the reading: an accelerometer that turns with the link."""
         return self.moves and self.order == 2

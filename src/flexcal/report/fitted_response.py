@@ -16,6 +16,7 @@ class FittedResponse:
 
     `frequencies_hz` (L,); `response` measured and `predicted` by the model (L, n, n) complex; `std`, and of it `noise_std` and
     `distortion_std`, (L, n, n), 1σ of the measured one, with so many `degrees_of_freedom`; `misfit` (n, n) as in `StiffnessResult`.
+    Of S `sensors` on the arm, which read in `sensor_units`: `sensor_response` measured and `sensor_predicted` (L, S, n).
     """
 
     pose: int
@@ -30,6 +31,10 @@ class FittedResponse:
     distortion_std: np.ndarray
     misfit: np.ndarray
     degrees_of_freedom: float
+    sensors: tuple[str, ...]
+    sensor_units: tuple[str, ...]
+    sensor_response: np.ndarray
+    sensor_predicted: np.ndarray
 
 
 def fitted_responses(result: StiffnessResult, robot: RobotModel) -> tuple[FittedResponse, ...]:
@@ -49,6 +54,12 @@ def fitted_responses(result: StiffnessResult, robot: RobotModel) -> tuple[Fitted
             distortion_std=measured.distortion_std,
             misfit=misfit,
             degrees_of_freedom=measured.degrees_of_freedom,
+            sensors=measured.sensors,
+            sensor_units=tuple(robot.sensors[name].unit for name in measured.sensors),
+            sensor_response=measured.stacked[:, len(measured.joints) :],
+            sensor_predicted=sensed,
         )
-        for measured, predicted, misfit in zip(result.responses, result.predicted, result.misfit, strict=True)
+        for measured, predicted, misfit, sensed in zip(
+            result.responses, result.predicted, result.misfit, result.sensed, strict=True
+        )
     )

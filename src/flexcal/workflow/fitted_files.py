@@ -21,11 +21,12 @@ _SINGLE = {"complex128": np.complex64, "float64": np.float32}
 
 def write_fitted(folder: Path, responses: Sequence[FittedResponse]) -> None:
     """Leave `responses` as fitted_responses.npz in `folder`, atomically: the fields of `FittedResponse` as `<name>_<pose>`, poses from 1,
-    (L, n, n) arrays in single precision."""
+    (L, n, n) and (L, S, n) arrays in single precision."""
     arrays: dict[str, np.ndarray] = {"pose": np.array([item.pose + 1 for item in responses])}
     for item in responses:
         for field in fields(item)[1:]:
-            array = np.asarray(getattr(item, field.name))
+            value = getattr(item, field.name)
+            array = np.array(value, dtype=str) if isinstance(value, tuple) else np.asarray(value)
             small = array.astype(_SINGLE[array.dtype.name]) if array.ndim == 3 else array
             arrays[f"{field.name}_{item.pose + 1}"] = small
     with atomic_path(folder / FITTED) as temporary, temporary.open("wb") as stream:
@@ -45,6 +46,8 @@ def _response(file: NpzFile, pose: int) -> FittedResponse:
     return FittedResponse(
         pose=pose - 1,
         joints=tuple(values.pop("joints").tolist()),
+        sensors=tuple(values.pop("sensors").tolist()),
+        sensor_units=tuple(values.pop("sensor_units").tolist()),
         payload=float(values.pop("payload")),
         degrees_of_freedom=float(values.pop("degrees_of_freedom")),
         **values,
@@ -52,7 +55,7 @@ def _response(file: NpzFile, pose: int) -> FittedResponse:
 
 
 def _forms(pose: int) -> dict[str, ArrayForm]:
-    lines, axes = f"lines {pose}", f"axes {pose}"
+    lines, axes, sensors = f"lines {pose}", f"axes {pose}", f"sensors {pose}"
     matrices, sizes = ArrayForm("complex", (lines, axes, axes)), ArrayForm("real", (lines, axes, axes))
     return {
         "joints": ArrayForm("text", (axes,)),
@@ -66,4 +69,8 @@ def _forms(pose: int) -> dict[str, ArrayForm]:
         "distortion_std": sizes,
         "misfit": ArrayForm("real", (axes, axes)),
         "degrees_of_freedom": ArrayForm("real"),
+        "sensors": ArrayForm("text", (sensors,)),
+        "sensor_units": ArrayForm("text", (sensors,)),
+        "sensor_response": ArrayForm("complex", (lines, sensors, axes)),
+        "sensor_predicted": ArrayForm("complex", (lines, sensors, axes)),
     }

@@ -65,7 +65,8 @@ def sensor_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...
         std = "" if found["std"] is None else f" ± {found['std']:.2g}"
         remarks.append(
             f"the sensor {name} on the arm reads {found['estimate']:.4g}{std} times what robot.yaml says of it; with that its readings are "
-            f"{100 * result.sensor_difference(name):.2g} % off the model's at the median line"
+            f"{100 * result.sensor_difference(name):.2g} % off the model's at the median line, as the motors' accelerations are "
+            f"{100 * result.motor_difference:.2g} %"
         )
         stated = model.sensors[name].config.sensitivity_std
         if abs(np.log(float(found["estimate"] or np.nan))) > _ODD * stated:
@@ -80,8 +81,9 @@ def sensor_remarks(result: StiffnessResult, model: RobotModel) -> tuple[str, ...
             or max(np.abs(shift[3:])) > _ODD * config.direction_std
         ):
             remarks.append(
-                f"the sensor {name} seems to be {1000 * far:.2g} mm and {np.degrees(turned):.2g} degrees from where robot.yaml has it, more "
-                f"than {_ODD:g} times its position_std or direction_std: measure its xyz and direction again, or check its frame"
+                f"the sensor {name} seems to be {1000 * far:.2g} mm and {np.degrees(turned):.2g} degrees from where robot.yaml has "
+                f"it, more than {_ODD:g} times its position_std or direction_std: measure its xyz and direction again, or check its "
+                "frame"
             )
     return tuple(remarks)
 

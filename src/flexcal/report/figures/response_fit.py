@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.report.figures.canvas import panels, positive, single
+from flexcal.report.figures.canvas import decades, panels, positive, single
 from flexcal.report.figures.response_levels import FREQUENCY_TICKS, frequency_axes
 from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.palette import ELASTIC, INK
@@ -48,6 +48,41 @@ def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> 
     figure.update_yaxes(matches=None, row=n + 1, col=1)
     figure.update_yaxes(title_text="degrees", row=n + 1, col=1)
     figure.update_xaxes(tickvals=FREQUENCY_TICKS)
+    return figure
+
+
+def sensor_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go.Figure:
+    """Magnitude of what every sensor on the arm (row) reads per torque on each motor (column): dots measured, lines the model, one pose
+    shown at a time as in `response_fit`."""
+    units = {name: unit for r in responses for name, unit in zip(r.sensors, r.sensor_units, strict=True)}
+    names, joints = list(units), responses[0].joints
+    figure = panels(
+        len(names),
+        len(joints),
+        190 * len(names) + 90,
+        [f"{name}, {joint}" for name in names for joint in joints],
+    )
+    for number, (response, label) in enumerate(zip(responses, labels, strict=True)):
+        pairs = ((response.sensor_response, "measured"), (response.sensor_predicted, "model"))
+        for at, name in enumerate(response.sensors):
+            row = names.index(name) + 1
+            for column in range(len(joints)):
+                for values, kind in pairs:
+                    trace = _trace(response.frequencies_hz, positive(abs(values[:, at, column])), kind, label)
+                    trace.update(showlegend=row == column + 1 == 1, visible=number == 0)
+                    trace.update(hovertemplate=f"%{{x:.2f}} Hz<br>%{{y:.3g}} {units[name]} per N m")
+                    figure.add_trace(trace, row=row, col=column + 1)
+    figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
+    figure.update_yaxes({"type": "log", "showticklabels": False} | decades(-9, 6))
+    for column in range(len(joints)):
+        figure.update_xaxes(showticklabels=True, title_text="Hz", row=len(names), col=column + 1)
+    for row, name in enumerate(names, start=1):
+        for column in range(len(joints)):
+            first = (row - 1) * len(joints) + 1
+            figure.update_yaxes(matches=f"y{first}" if first > 1 else "y", row=row, col=column + 1)
+        figure.update_yaxes(
+            matches=None, showticklabels=True, title_text=f"{units[name]} per N m", row=row, col=1
+        )
     return figure
 
 

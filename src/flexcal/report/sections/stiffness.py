@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.estimation import Estimate
-from flexcal.report.figures.response_fit import response_fit
+from flexcal.report.figures.response_fit import response_fit, sensor_fit
 from flexcal.report.figures.spring_intervals import spring_intervals
 from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.notation import percent, significant
@@ -75,7 +75,27 @@ def response_blocks(responses: Sequence[FittedResponse], estimate: Estimate) -> 
             f"Magnitudes of all elements and phases of the diagonal ones in {len(labels)} poses; the table below says how well they fit.",
             (Selector("Pose", "pose", labels),),
         ),
+        *sensor_blocks(responses, labels),
         _fit_table(responses, estimate, labels),
+    )
+
+
+def sensor_blocks(responses: Sequence[FittedResponse], labels: tuple[str, ...]) -> tuple[FigureBlock, ...]:
+    """Readings of sensors on the arm against the fitted model; none without sensors."""
+    names = tuple(dict.fromkeys(name for response in responses for name in response.sensors))
+    if not names:
+        return ()
+    return (
+        FigureBlock(
+            "figure-sensors",
+            "Sensors on the arm against the fitted model",
+            sensor_fit(responses, labels),
+            "Readings of every sensor on the arm (row) for a torque on each motor (column). Dots: measured. Lines: the model with the "
+            "sensor's estimated sensitivity, delay and mounting. Friction scatters the readings together with the motors' accelerations: "
+            "dots that lie off the line in both say nothing against the sensor.",
+            f"Magnitudes of the readings of {', '.join(names)} in {len(labels)} poses, measured and of the model.",
+            (Selector("Pose", "pose", labels),) if len(labels) > 1 else (),
+        ),
     )
 
 
