@@ -90,23 +90,43 @@ class Arm:
         (folder / "robot.yaml").write_text("robot: arm.urdf\ngravity: [0, 0, -9.81]\n")
         return RobotModel.from_yaml(folder / "robot.yaml")
 
-    def error(self, model: RobotModel, folder: Path, cutoff_hz: float, decimation: Decimation) -> float:
-        """Of the torques of another motion, whose states are known exactly."""
+    def truth(self) -> dict[str, float]:
+        """Of the parameters, by their names."""
+        tensor = ("Ixx", "Ixy", "Iyy", "Ixz", "Iyz", "Izz")
+        found = {}
+        for k in range(7):
+            body = self.model.inertias[k + 1].toDynamicParameters()
+            keys = ("mass", "mc_x", "mc_y", "mc_z", *tensor)
+            found |= {f"l{k + 1}.{key}": float(value) for key, value in zip(keys, body, strict=True)}
+            keys = ("rotor_inertia", "viscous", "coulomb", "torque_offset")
+            found |= {f"j{k + 1}.{key}": float(v) for key, v in zip(keys, self.drives[:, k], strict=True)}
+        return found
+
+    def error(
+        self, model: RobotModel, folder: Path, cutoff_hz: float, decimation: Decimation
+    ) -> tuple[float, np.ndarray, np.ndarray]:
+        """Of the torques of another motion, whose states are known exactly; errors (k,) of the base parameters, and their standard
+        deviations."""
         observation = Observation(model, CLASSIC)
         base = BaseParameters.of(observation)
         log = JointLog.read(folder / "log.parquet", model, cutoff_hz, folder)
-        found = weighted_least_squares(observe(observation, base, [log], decimation)).parameters.coordinates()
+        estimate = weighted_least_squares(observe(observation, base, [log], decimation))
+        found = estimate.parameters.coordinates()
         time = 0.02 * np.arange(1000)
         q, dq, ddq = self.states(time)
         torque = self.torque(q, dq, ddq)
         columns = observation.columns(Motion(time, q, dq, ddq, torque))
         pairs = zip(columns, observation.members, strict=True)
         predicted = np.transpose([found[members] @ own for own, members in pairs])
-        return float(np.linalg.norm(predicted - torque) / np.linalg.norm(torque))
+        truth = self.truth()
+        beside = base.found.regrouping @ (found - [truth[name] for name in base.found.names])
+        std = np.sqrt(np.diag(estimate.covariance))[list(base.found.kept)]
+        return float(np.linalg.norm(predicted - torque) / np.linalg.norm(torque)), beside, std
 
 
-def check(folder: Path, seed: int, position_noise: float, torque_noise: float, most: float) -> None:
-    """The default, beside the best of a scan over two and a half octaves."""
+def ratios(folder: Path, seed: int, position_noise: float, torque_noise: float) -> tuple[float, float]:
+    """Errors with the default, over the smallest of a scan over three octaves: of torques, and of base parameters by the standard
+    deviations of the best fit."""
     arm = Arm(folder, seed)
     model = arm.write(folder, position_noise, torque_noise)
     treatment = treatment_of(model, [folder / "log.parquet"])
@@ -116,11 +136,14 @@ def check(folder: Path, seed: int, position_noise: float, torque_noise: float, m
         arm.error(model, folder, cutoff, Decimation.near(RATE / (4 * cutoff)))
         for cutoff in (3.0, 4.0, 5.0, 6.5, 8.5, 11.0, 15.0, 25.0)
     ]
-    assert own < most * min(others), (treatment, own, others)
+    best = min(others, key=lambda error: error[0])
+    distances = [float(np.linalg.norm(beside / best[2])) for _, beside, _ in (own, *others)]
+    print(f"{treatment.cutoff_hz} Hz: {own[0] / best[0]:.2f}, {distances[0] / min(distances[1:]):.2f}")
+    return own[0] / best[0], distances[0] / min(distances[1:])
 
 
 def test_positions_whose_noise_looks_like_motion(tmp_path: Path) -> None:
-    check(tmp_path, 1, 1e-4, 0.05, 1.15)
+    assert ratios(tmp_path, 1, 1e-4, 0.05)[0] < 1.15
 
 
 @pytest.mark.slow
@@ -129,7 +152,20 @@ def test_positions_whose_noise_looks_like_motion(tmp_path: Path) -> None:
 def test_other_robots_and_noise(
     tmp_path: Path, seed: int, position_noise: float, torque_noise: float
 ) -> None:
-    check(tmp_path, seed, position_noise, torque_noise, 1.15)
+    assert ratios(tmp_path, seed, position_noise, torque_noise)[0] < 1.15
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("position_noise", "torque_noise"),
+    [(1e-4, 0.05), (5e-4, 0.1), (2e-5, 0.03), (2e-5, 0.2), (5e-6, 0.03)],
+)
+def test_torques_and_base_parameters_of_many_logs(
+    tmp_path: Path, position_noise: float, torque_noise: float
+) -> None:
+    """On average: the best cut-off of one log is the best of its noise too; one that is fixed by the truth of all logs is up to 1.21."""
+    each = np.array([ratios(tmp_path, seed, position_noise, torque_noise) for seed in range(40, 45)])
+    assert np.all(each.mean(axis=0) < 1.15)
 
 
 def test_positions_without_noise_keep_the_cutoff_of_their_spectrum(tmp_path: Path) -> None:

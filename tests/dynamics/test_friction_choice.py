@@ -24,6 +24,7 @@ from flexcal.dynamics import (
     weighted_least_squares,
 )
 from flexcal.dynamics.cross_validation import folds, prediction_errors
+from flexcal.dynamics.friction_choice import Candidate, FrictionChoice, Trial
 from flexcal.dynamics.friction_library import LoadCoulomb, WarmUp
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, inertial_parameters
@@ -156,3 +157,23 @@ def test_a_column_that_the_data_leave_at_zero_is_named(tx40: RobotModel, swing: 
     remarks = dynamics_remarks(data, weighted_least_squares(data), "wls")
     named = "rotor_inertia, viscous, coulomb, sublinear_viscous"
     assert f"joint_3: {named} keep their values: these recordings do not excite them" in remarks
+
+
+def test_rivals_predict_as_well() -> None:
+    """As many terms nearly so, or one more really so, whatever its significance; neither fewer nor two more."""
+    chosen = Candidate("cable_stiffness", "", SublinearViscous())
+    trials = (
+        Trial((), 0.2),
+        Trial(("cable_stiffness",), 0.100),
+        Trial(("warm_up",), 0.1009),
+        Trial(("stribeck",), 0.1011),
+        Trial(("cable_stiffness", "stribeck"), 0.0995),
+        Trial(("cable_stiffness", "warm_up"), 0.09, 0.2),
+        Trial(("cable_stiffness", "presliding"), 0.1001),
+    )
+    rivals = FrictionChoice((chosen,), trials).rivals
+    assert rivals == (
+        ("warm_up",),
+        ("cable_stiffness", "stribeck"),
+        ("cable_stiffness", "warm_up"),
+    )

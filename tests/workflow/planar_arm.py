@@ -76,9 +76,17 @@ def remembering(shape: tuple[int, int], rate: float, memory: float, rng: np.rand
     return np.asarray(lfilter([np.sqrt(1 - decay**2)], [1, -decay], white, axis=0))[begun:]
 
 
+def stribeck(dq: np.ndarray, size: float, velocity: float) -> np.ndarray:
+    """Friction (N, 2), N m, that falls off above a `velocity` (rad/s) from its `size` (N m) at the first joint."""
+    return size * np.array([1.0, 0.4]) * np.sign(dq) * np.exp(-((dq / velocity) ** 2))
+
+
 @dataclass(frozen=True)
 class Log:
-    """A log as it is recorded: noise of positions (rad, white) and of torques (N m at the first joint), with its `memory` (s)."""
+    """A log as it is recorded: noise of positions (rad, white) and of torques (N m at the first joint), with its `memory` (s).
+
+    `stribeck` is the size (N m) of that friction, with its `velocity` (rad/s).
+    """
 
     duration: float = 20.0
     rate: float = 500.0
@@ -86,12 +94,14 @@ class Log:
     position_noise: float = 0.0
     torque_noise: float = 0.0
     memory: float = 0.0
+    stribeck: float = 0.0
+    velocity: float = 0.5
 
     def write(self, folder: Path, seed: int, friction: str = "classic") -> tuple[Path, Path]:
         """robot.yaml, with a CAD that is not the truth, and the log of one motion."""
         rng = np.random.default_rng(seed)
         time, q, dq, ddq = swings(self.duration, self.rate, self.fundamental, rng)
-        acted = torque(q, dq, ddq)
+        acted = torque(q, dq, ddq) + stribeck(dq, self.stribeck, self.velocity)
         acted += self.torque_noise * np.array([1.0, 0.4]) * remembering(q.shape, self.rate, self.memory, rng)
         read = q + self.position_noise * rng.normal(size=q.shape)
         (folder / "arm.urdf").write_text(URDF)

@@ -36,14 +36,12 @@ _FEWEST = 10
 """Rows of a block, at least, without those."""
 _MORE = 3.0
 """Equations over the unknowns, at least."""
-_WORTH = 0.01
-"""Share of the squared error that another cut-off must save."""
 _SURE = 2.0
-"""Standard errors, over the blocks, of what it saves."""
+"""Standard errors, over the blocks, of the squared error that another cut-off must save."""
 _RISEN = 1.5
 """Times the smallest squared error, at which lower cut-offs are not tried any more."""
 _ALIKE = 0.03
-"""Share of the smallest squared error by which that of the cut-off that is taken may be larger: too low a one attenuates motion itself."""
+"""Share of the smallest squared error by which that of the cut-off may be larger whose signs are taken for the true ones."""
 _RANK = 1e-10
 
 
@@ -96,9 +94,10 @@ def choose_cutoff(
 
     Every one of the `loads`, recordings with the same load, has parameters of its own. The rows are those of the proposed cut-off, at most
     100 a second, whichever is tried. Ten blocks of time are predicted from the others, every joint weighted by its error at the proposed
-    cut-off. A lower one must save a hundredth of the squared error, and twice the standard error of that over the blocks, while the signs
-    of friction are those of the proposed one: then q̈ is not signal up to there. Where it does, the highest cut-off is taken that is within
-    3 % of the best, signs included.
+    cut-off. A lower one must save twice the standard error of the saving over the blocks, while the signs of friction are those of the
+    proposed one: then q̈ is not signal up to there. Where it does, the signs are those of the highest cut-off within 3 % of the smallest
+    squared error, signs included. With these the highest cut-off is taken whose squared error is within a standard error of the smallest
+    one (Breiman et al. 1984): wrong signs beside reversals would hide what accelerations tell.
     """
     highest = min(proposed_hz, _ROWS_HZ)
     observation = Observation(model, CLASSIC)
@@ -107,41 +106,27 @@ def choose_cutoff(
     tables = [table for table in tables if table.enough]
     if not tables:
         return None
-    same_signs = _Losses(tables, highest, own_signs=False)
-    same_signs.search()
-    if not same_signs.lower_is_better:
+    if not _Losses(tables, highest, signs_of=0).lower_is_better:
         return None
-    losses = _Losses(tables, highest, own_signs=True)
-    losses.search()
-    best = losses.highest_good
+    own_signs = _Losses(tables, highest, signs_of=None)
+    best = _Losses(tables, highest, signs_of=own_signs.highest_alike).highest_good
     if best == 0:
         return None
     size = sum(table.size for table in tables)
-    errors = (math.sqrt(losses.total(number) / size) for number in (best, 0))
+    errors = (math.sqrt(own_signs.total(number) / size) for number in (best, 0))
     return CutoffChoice(highest / _RATIO**best, *errors)
 
 
 class _Losses:
-    """Squared errors in left-out blocks, by the number of the cut-off: highest · 1.25^-number, Hz."""
+    """Squared errors in left-out blocks, by the number of the cut-off: highest · 1.25^-number, Hz.
 
-    def __init__(self, tables: Sequence[_Tables], highest_hz: float, *, own_signs: bool) -> None:
-        self._tables, self._highest, self._own_signs = tables, highest_hz, own_signs
+    Signs of velocities are those behind the cut-off with the number `signs_of`, or each one's own (None). Every other cut-off has been
+    tried until errors had risen, and those beside the best one.
+    """
+
+    def __init__(self, tables: Sequence[_Tables], highest_hz: float, signs_of: int | None) -> None:
+        self._tables, self._highest, self._signs_of = tables, highest_hz, signs_of
         self._found: dict[int, np.ndarray] = {}
-
-    def blocks(self, number: int) -> np.ndarray:
-        """Of all blocks of all tables (B,)."""
-        if number not in self._found:
-            cutoff = self._highest / _RATIO**number
-            each = [table.losses(cutoff, own_signs=self._own_signs) for table in self._tables]
-            self._found[number] = np.concatenate(each)
-        return self._found[number]
-
-    def total(self, number: int) -> float:
-        """Of all blocks together."""
-        return float(self.blocks(number).sum())
-
-    def search(self) -> None:
-        """Try every other cut-off until errors have risen, and those beside the best one."""
         number = 0
         while (
             self.total(number) <= _RISEN * self.total(self._lowest)
@@ -153,6 +138,19 @@ class _Losses:
             if beside > 0:
                 self.blocks(beside)
 
+    def blocks(self, number: int) -> np.ndarray:
+        """Of all blocks of all tables (B,)."""
+        if number not in self._found:
+            signs_of = number if self._signs_of is None else self._signs_of
+            cutoff, signs = (self._highest / _RATIO**n for n in (number, signs_of))
+            each = [table.losses(cutoff, signs) for table in self._tables]
+            self._found[number] = np.concatenate(each)
+        return self._found[number]
+
+    def total(self, number: int) -> float:
+        """Of all blocks together."""
+        return float(self.blocks(number).sum())
+
     @property
     def _lowest(self) -> int:
         self.blocks(0)
@@ -160,16 +158,26 @@ class _Losses:
 
     @property
     def lower_is_better(self) -> bool:
-        """Whether the best one saves a hundredth, and twice the standard error of that over the blocks."""
+        """Whether the best one saves twice the standard error of the saving."""
         saved = self.blocks(0) - self.blocks(self._lowest)
-        error = float(saved.std(ddof=1)) * math.sqrt(len(saved))
-        return bool(saved.sum() > max(_WORTH * self.total(0), _SURE * error))
+        return bool(saved.sum() > _SURE * _standard_error(saved))
+
+    @property
+    def highest_alike(self) -> int:
+        """The number of the highest cut-off whose squared error is nearly the smallest."""
+        most = (1 + _ALIKE) * self.total(self._lowest)
+        return min(number for number in self._found if self.total(number) <= most)
 
     @property
     def highest_good(self) -> int:
-        """The number of the highest cut-off that is nearly as good as the best one."""
-        most = (1 + _ALIKE) * self.total(self._lowest)
-        return min(number for number in self._found if self.total(number) <= most)
+        """The number of the highest cut-off that is within a standard error of the best one."""
+        lost = {number: blocks - self.blocks(self._lowest) for number, blocks in self._found.items()}
+        return min(number for number, more in lost.items() if more.sum() <= _standard_error(more))
+
+
+def _standard_error(blocks: np.ndarray) -> float:
+    """Of the sum of blocks (B,)."""
+    return float(blocks.std(ddof=1)) * math.sqrt(len(blocks))
 
 
 class _Tables:
@@ -190,12 +198,12 @@ class _Tables:
         rows = sum(f.rows for f in self._filters)
         self.enough = rows // BLOCKS >= 2 * _BORDER + _FEWEST and rows * model.n > _MORE * len(kept)
 
-    def losses(self, cutoff_hz: float, *, own_signs: bool) -> np.ndarray:
+    def losses(self, cutoff_hz: float, signs_hz: float) -> np.ndarray:
         """Squared errors of the blocks (10,), each predicted from the others, over those of the joints at the first cut-off.
 
-        `own_signs`: the signs of velocities are those behind this cut-off, else behind the highest one.
+        The signs of velocities are those behind the cut-off `signs_hz`.
         """
-        inner, whole = self._products(cutoff_hz, own_signs)
+        inner, whole = self._products(cutoff_hz, signs_hz)
         if self._sigma is None:
             missed = np.sum(self._missed(inner, whole, np.ones(self._model.n)), axis=0)
             self._sigma = np.sqrt(np.where(missed > 0, missed, 1.0))
@@ -218,9 +226,9 @@ class _Tables:
             found[block] = np.einsum("k,jkl,l->j", beside, inner[block], beside)
         return found
 
-    def _products(self, cutoff_hz: float, own_signs: bool) -> tuple[np.ndarray, np.ndarray]:
+    def _products(self, cutoff_hz: float, signs_hz: float) -> tuple[np.ndarray, np.ndarray]:
         """[W, Y]ᵀ [W, Y] (10, n, p + 1, p + 1) of every block and joint: of its inner rows, and of all."""
-        table = np.concatenate([self._rows(f, cutoff_hz, own_signs) for f in self._filters], axis=1)
+        table = np.concatenate([self._rows(f, cutoff_hz, signs_hz) for f in self._filters], axis=1)
         edges = np.linspace(0, table.shape[1], BLOCKS + 1).astype(int)
         width = table.shape[2]
         inner, whole = np.zeros((2, BLOCKS, len(table), width, width))
@@ -231,10 +239,10 @@ class _Tables:
                 inner[block, joint] = whole[block, joint] - ends.T @ ends
         return inner, whole
 
-    def _rows(self, filters: _Filters, cutoff_hz: float, own_signs: bool) -> np.ndarray:
+    def _rows(self, filters: _Filters, cutoff_hz: float, signs_hz: float) -> np.ndarray:
         """[W, Y] (n, M, p + 1) of the base parameters; signs of velocities are taken before decimation."""
         motion = filters.motion(cutoff_hz)
-        signs = filters.signs(cutoff_hz) if own_signs else filters.highest_signs
+        signs = filters.signs(signs_hz)
         names, kept = self._observation.names, self._kept
         table = np.zeros((self._model.n, len(motion), len(kept) + 1))
         columns = self._observation.columns(motion)
@@ -268,7 +276,6 @@ class _Filters:
         slope = 1j * (8 * np.sin(angle) - np.sin(2 * angle)) / (6 * self._step)
         curvature = (16 * np.cos(angle) - np.cos(2 * angle) - 15) / (6 * self._step**2)
         self._differences = tuple(factor[:, None] for factor in (np.ones_like(angle), slope, curvature))
-        self.highest_signs = self.signs(highest_hz)
 
     def signs(self, cutoff_hz: float) -> np.ndarray:
         """Signs of the filtered velocities, decimated (M, n)."""

@@ -63,18 +63,15 @@ class FrictionChoice:
 
     @property
     def rivals(self) -> tuple[tuple[str, ...], ...]:
-        """Other terms, by their labels, that predict as well: as many with an error larger by less than a hundredth, or with a smaller
-        error and a last one that is not significant."""
+        """Other terms, by their labels, that predict as well: as many with an error larger by less than a hundredth, or one more with a
+        smaller error, which is not significant or saves less than a hundredth."""
         labels = tuple(candidate.label for candidate in self.chosen)
         (error,) = (trial.error for trial in self.trials if trial.terms == labels)
+        most = {len(labels): (1 + _WORTH) * error, len(labels) + 1: error}
         return tuple(
             trial.terms
             for trial in self.trials
-            if set(trial.terms) != set(labels)
-            and (
-                (len(trial.terms) == len(labels) and trial.error <= (1 + _WORTH) * error)
-                or (trial.p_value is not None and trial.p_value > _LEVEL and trial.error < error)
-            )
+            if set(trial.terms) != set(labels) and trial.error < most.get(len(trial.terms), 0.0)
         )
 
 
