@@ -47,8 +47,8 @@ class StiffnessResult:
     errors: tuple[np.ndarray, ...]
     misfit: np.ndarray
     springs: tuple[str, ...]
-    bearings: ResponseBearings | None = None
-    sensed: tuple[np.ndarray, ...] = ()
+    bearings: ResponseBearings | None
+    sensed: tuple[np.ndarray, ...]
 
     @property
     def sensors(self) -> tuple[str, ...]:
