@@ -58,6 +58,19 @@ def coverage(folder: Path, log: Log, estimator: EstimatorName, seeds: range) -> 
     return float(parameters), float(torques)
 
 
+def test_an_exact_log_gives_the_truth(tmp_path: Path) -> None:
+    """Whatever filter, differences and reversals leave of an error is no noise, and no interval allows for it."""
+    robot, path = Log().write(tmp_path, 3)
+    estimate = identify_robot_dynamics(robot, [path]).estimate
+    expected = estimate.regrouped({name: TRUTH.get(name, 0.0) for name in estimate.parameters.names})
+    missed = [
+        abs(estimate.values[n] - v)
+        for n, v in expected.items()
+        if n not in {d.name for d in estimate.dropped}
+    ]
+    assert max(missed) < 1e-7
+
+
 def test_noise_that_remembers_itself_for_a_second_and_a_half(tmp_path: Path) -> None:
     parameters, torques = coverage(tmp_path, LONG_MEMORY, "wls", range(12))
     assert parameters > 0.9 and torques > 0.9

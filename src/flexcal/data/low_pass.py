@@ -53,9 +53,7 @@ class LowPass:
     def _response(self) -> tuple[int, np.ndarray]:
         """Length of the transforms, and the transform of the finite impulse response, delayed by the support."""
         length = max(_SHORTEST_TRANSFORM, 1 << (8 * self.support).bit_length())
-        half_angle = math.pi * np.arange(length // 2 + 1) / length
-        with np.errstate(over="ignore"):
-            gain = 1.0 / (1.0 + (np.tan(half_angle) / self._corner) ** (2 * _ORDER))
+        gain = self.gain(np.arange(length // 2 + 1) / (length * self.time_step))
         impulse = np.roll(np.fft.irfft(gain, length), self.support)
         impulse[2 * self.support + 1 :] = 0.0
         return length, np.fft.rfft(impulse / impulse.sum())
@@ -63,6 +61,13 @@ class LowPass:
     def fits(self, samples: int, beyond: int = 0) -> bool:
         """Whether so many samples are enough for `before`."""
         return samples > self.support + beyond
+
+    def gain(self, frequency_hz: np.ndarray) -> np.ndarray:
+        """|B|² at frequencies (·,) up to half the sampling rate."""
+        with np.errstate(over="ignore"):
+            return 1.0 / (
+                1.0 + (np.tan(math.pi * frequency_hz * self.time_step) / self._corner) ** (2 * _ORDER)
+            )
 
     def before(self, values: np.ndarray, beyond: int = 0) -> np.ndarray:
         """The samples that precede `values` (N, n) when they go on as they begin, turned about the first by half a turn.

@@ -125,11 +125,15 @@ def covariance_of_scores(
             freedom = max(1.0, min(freedom, 0.5 * batches / memory))
             spread = root @ (given + slow) @ root.T
             std = np.maximum(std, np.sqrt(np.diag(spread)))
-    nominal = root @ root.T
-    share = size / (size + freedom)
+    return BatchCovariance(mixed_covariance(spread, root @ root.T, std, freedom), freedom, window)
+
+
+def mixed_covariance(spread: np.ndarray, nominal: np.ndarray, std: np.ndarray, freedom: float) -> np.ndarray:
+    """Covariance (k, k) of standard deviations `std` (k,), with the correlations of `spread`, of so many degrees of `freedom`, drawn
+    towards those of `nominal` as k + freedom : k."""
+    share = len(std) / (len(std) + freedom)
     correlation = (1.0 - share) * _correlation(spread) + share * _correlation(nominal)
-    mixed = correlation * np.outer(std, std)
-    return BatchCovariance(mixed, freedom, window)
+    return correlation * np.outer(std, std)
 
 
 def _correlation(covariance: np.ndarray) -> np.ndarray:

@@ -21,8 +21,8 @@ AT_REST = 1e-3
 """rad/s or m/s, below which a joint is at rest: there it is noise that seems to move it."""
 _REVERSES = 0.1
 """rad/s² or m/s², from which it is not at rest but reverses: it is that slow for less than 20 ms then, and friction changes sign."""
-_BORDER_PERIODS = 1.0
-"""What is cut from either end, in periods of the cut-off."""
+_BORDER_PERIODS = 3.0
+"""What is cut from either end, in periods of the cut-off: the filter's transient falls to a tenth in each."""
 _APART = 1.5
 """Steps from one sample to the next, at least, across a gap."""
 BESIDE = 2
@@ -62,6 +62,11 @@ class Motion:
     def top_speed(self) -> np.ndarray:
         """The largest |q̇| of every joint (n,)."""
         return np.abs(self.dq).max(axis=0)
+
+    @property
+    def cutoff_hz(self) -> float:
+        """Infinite: as a whole experiment it is taken as it is."""
+        return np.inf
 
     @property
     def net(self) -> np.ndarray:
@@ -167,8 +172,8 @@ def filtered_positions(
     sample is the mean of its own and the one before. Half a sample of delay between torque and twist would count as K T/2 of damping.
 
     `recordings` follow each other as blocks of one log; so do the parts, and they do not depend on where the blocks are cut. What lies
-    between two gaps of the log is filtered by itself, and left out where it is too short for that. Samples nearer to an end than one period
-    of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all the samples are too few for it.
+    between two gaps of the log is filtered by itself, and left out where it is too short for that. Samples nearer to an end than three
+    periods of the cut-off are removed. Raises `FlexcalError` as `LowPass` does, and where all the samples are too few for it.
     """
     short: TooFewSamples | None = None
     long = False

@@ -27,9 +27,9 @@ def remembered(experiments: Sequence[Scores], offsets: np.ndarray) -> tuple[np.n
 
     A column of `offsets` (k, joints) times a score is that of a joint's torque offset: the sum of its residuals in the batch. Its size over
     the root of its information is the noise at low frequency, less what the fit took from there. Level, share and time constant have a
-    posterior with flat priors (of the logarithm of the time constant), from the likelihood of these residuals with the covariance that the
-    projection of the fit leaves (as restricted maximum likelihood, Patterson & Thompson 1971); the covariance is averaged over it, since a
-    recording of a few time constants tells little about them.
+    posterior with flat priors (of the logarithm of the time constant; half of it on white noise), from the likelihood of these residuals
+    with the covariance that the projection of the fit leaves (as restricted maximum likelihood, Patterson & Thompson 1971); the covariance
+    is averaged over it, since a recording of a few time constants tells little about them.
     """
     size = len(offsets)
     total, longest = np.zeros((size, size)), 0.0
@@ -81,6 +81,7 @@ def _own(
         squares.append(float(np.sum(solve_triangular(factor, seen, lower=True) ** 2)))
         evidence.append(-np.sum(np.log(np.diag(factor))) - 0.5 * len(seen) * np.log(squares[-1]))
     weights = np.exp(np.array(evidence) - np.max(evidence))
+    weights[0] *= len(tried) - 1.0
     weights /= weights.sum()
     each = zip(weights, squares, tried, strict=True)
     noise = sum(w * s / (len(seen) - 2.0) * matrix for w, s, (_, matrix) in each)

@@ -104,6 +104,10 @@ class NoisyLog:
     def top_speed(self) -> np.ndarray:
         return self.log.top_speed
 
+    @property
+    def cutoff_hz(self) -> float:
+        return self.log.cutoff_hz
+
     def blocks(self) -> Iterator[Motion]:
         rng = np.random.default_rng(self.seed)
         recordings = log_blocks(self.log.path, self.model)

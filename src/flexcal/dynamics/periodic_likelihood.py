@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from flexcal.dynamics.batch_covariance import mixed_covariance
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.linear_fit import Unknowns
+from flexcal.dynamics.moderated_variance import moderated
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.periodic_motion import real_rows
@@ -38,9 +40,10 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
     Rows are Fourier coefficients up to the band of the decimated rows. The noise of torque and motion acts together in τ − W(q) χ, whose
     scatter between the periods is therefore what likelihood asks for, to first order in the noise; it is read anew with every χ, as
     the noise of the motion goes through the parameters. W is that of the mean motion: averaging takes the noise out before it can bend W.
-    The covariance is that of the weighted rows, raised by their mean squared error where the model misses more than the noise; with noisy
-    motion it is on the safe side, as that error is below one where the mean motion leaves noise out that the scatter has. Standstill is
-    not masked. Raises `FlexcalError` as `RepeatedMotion.of` and `weighted_least_squares` do, and where the steps do not settle.
+    Lines are weighed as if their errors were independent, but noise of the motion at few lines is in many of the torques: the covariance
+    is that of the scores, from their scatter between the periods (`_covariance`), raised by the mean squared error of the weighted rows
+    where the model misses more than the noise. Standstill is not masked. Raises `FlexcalError` as `RepeatedMotion.of` and
+    `weighted_least_squares` do, and where the steps do not settle.
     """
     motions = [
         RepeatedMotion.of(experiment, window)
@@ -50,8 +53,9 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
     means = [_mean_rows(observation, motion, factor) for motion in motions]
     found = weighted_least_squares(data).parameters.coordinates()
     for iteration in range(1, _ITERATIONS + 1):
-        noise = [_scatter(observation, motion, found, factor) for motion in motions]
-        parts = [_whitened(rows, covariance) for rows, covariance in zip(means, noise, strict=True)]
+        missed = [_residuals(observation, motion, found, factor) for motion in motions]
+        roots = [_root(_scatter(own), rows) for own, rows in zip(missed, means, strict=True)]
+        parts = [_whitened(rows, root) for rows, root in zip(means, roots, strict=True)]
         stack = np.concatenate(parts)
         system = Triangle.of(stack[:, :-1], stack[:, -1])
         unknowns = Unknowns.of(data, system)
@@ -61,11 +65,14 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
         found[kept] += scale * np.linalg.solve(triangle[:-1, :-1], triangle[:-1, -1])
         freedom, cost = unknowns.freedom(system), float(triangle[-1, -1] ** 2)
         root = scale[:, None] * np.linalg.solve(triangle[:-1, :-1], np.eye(len(kept)))
-        covariance = max(1.0, cost / freedom) * root @ root.T
-        if np.all(np.abs(found - before)[kept] <= _SETTLED * np.sqrt(np.diag(covariance))):
+        apart = [_whitened(np.moveaxis(own, 0, -1), left) for own, left in zip(missed, roots, strict=True)]
+        scores = [part[:, kept].T @ own for part, own in zip(parts, apart, strict=True)]
+        covariance, known = _covariance(scores, root)
+        level = max(1.0, cost / freedom)
+        if np.all(np.abs(found - before)[kept] <= _SETTLED * np.sqrt(level) * np.linalg.norm(root, axis=1)):
             periods = " + ".join(str(len(motion.periods)) for motion in motions)
             message = f"maximum likelihood from {periods} periods; mean squared error {cost / freedom:.3g} of the noise"
-            return unknowns.estimate(found, covariance, float(freedom), cost, freedom, message, iteration)
+            return unknowns.estimate(found, level * covariance, known, cost, freedom, message, iteration)
     raise FlexcalError(
         f"the noise estimate does not converge in {_ITERATIONS} iterations; use --estimator wls."
     )
@@ -94,12 +101,34 @@ def _rows(values: np.ndarray, factor: int) -> np.ndarray:
     return real_rows(np.fft.rfft(values, axis=0)[:lines] / len(values))
 
 
-def _scatter(
+def _covariance(scores: list[np.ndarray], root: np.ndarray) -> tuple[np.ndarray, float]:
+    """Covariance (k, k) of the parameters and its degrees of freedom, from the `scores` (k, P) of every experiment, period by period.
+
+    `root` (k, k) has root · rootᵀ = (WᵀW)⁻¹ of the whitened rows W. Periods are few: standard deviations are moderated towards those of
+    root · rootᵀ times a common factor, with the freedom that their ratios to these show (`moderated`), and correlations as by
+    `mixed_covariance`.
+    """
+    nominal = root @ root.T
+    apart = [own - own.mean(axis=1, keepdims=True) for own in scores]
+    counts = [own.shape[1] for own in scores]
+    middle = sum(own @ own.T / (count * (count - 1)) for own, count in zip(apart, counts, strict=True))
+    scatter = nominal @ middle @ nominal
+    freedom = float(sum(counts) - len(counts))
+    ratios, known = moderated(np.diag(scatter) / np.diag(nominal), freedom)
+    std = np.sqrt(ratios * np.diag(nominal))
+    return mixed_covariance(scatter, nominal, std, freedom), known
+
+
+def _residuals(
     observation: Observation, motion: RepeatedMotion, parameters: np.ndarray, factor: int
 ) -> np.ndarray:
-    """Covariance (2 K + 1, n, n) of the mean of τ − W χ over the periods, smooth over the lines."""
+    """τ − W χ of every period (P, 2 K + 1, n)."""
     memory: Memory = {}
-    residuals = np.array([_rows(_missed(observation, p, parameters, memory), factor) for p in motion.smooth])
+    return np.array([_rows(_missed(observation, p, parameters, memory), factor) for p in motion.smooth])
+
+
+def _scatter(residuals: np.ndarray) -> np.ndarray:
+    """Covariance (2 K + 1, n, n) of the mean over the periods (P, 2 K + 1, n), smooth over the lines."""
     count = len(residuals)
     apart = residuals - residuals.mean(axis=0)
     above = np.arange(1, apart.shape[1] // 2 + 1)
@@ -139,8 +168,12 @@ def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, me
     return np.concatenate(found, axis=1).T
 
 
-def _whitened(rows: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Equations (n (2 K + 1), p + 1) whose errors are independent and of variance one."""
+def _root(covariance: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """Lower Cholesky factors (2 K + 1, n, n), of no less than a share of the torques, which are the last column of `rows`."""
     floor = (_SMALLEST * np.sqrt(np.mean(rows[:, :, -1] ** 2, axis=0))) ** 2
-    left = np.linalg.cholesky(covariance + np.diag(np.where(floor > 0, floor, 1.0)))
-    return np.linalg.solve(left, rows).reshape(-1, rows.shape[2])
+    return np.linalg.cholesky(covariance + np.diag(np.where(floor > 0, floor, 1.0)))
+
+
+def _whitened(rows: np.ndarray, root: np.ndarray) -> np.ndarray:
+    """Equations (n (2 K + 1), ·) whose errors are independent and of variance one."""
+    return np.linalg.solve(root, rows).reshape(-1, rows.shape[2])

@@ -7,6 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
+from flexcal.data.low_pass import LowPass
 from flexcal.dynamics.motion import Motion, stretches
 from flexcal.dynamics.rows import Experiment, Window, slowest_speeds
 from flexcal.errors import FlexcalError
@@ -25,9 +26,10 @@ _STANDS_OUT = 40.0
 
 @dataclass(frozen=True, eq=False)
 class RepeatedMotion:
-    """`periods` of as many samples that follow each other."""
+    """`periods` of as many samples that follow each other, their positions through a low-pass at `cutoff_hz` (infinite for none)."""
 
     periods: tuple[Motion, ...]
+    cutoff_hz: float
 
     @property
     def mean(self) -> Motion:
@@ -42,13 +44,19 @@ class RepeatedMotion:
     def smooth(self) -> tuple[Motion, ...]:
         """The periods, of their positions those lines that stand out of the scatter between them; the torques are as they are.
 
-        What the other lines hold is noise, of which high derivatives have much, and it would bend the parameters. Derivatives are those of
-        the lines: differences of samples would make accelerations too small, by (ωh)²/3.
+        What the other lines hold is noise, of which high derivatives have much, and it would bend the parameters. What the low-pass took
+        from those that stand out is given back; above its cut-off there is nothing to give back. Derivatives are those of the lines.
         """
         q = np.array([period.q for period in self.periods])
         size, time = q.shape[1], self.periods[0].time
-        lines = np.fft.rfft(q, axis=1) * _standing_out(q)
-        omega = 2j * np.pi * np.fft.rfftfreq(size, (time[-1] - time[0]) / (size - 1))[:, None]
+        step = float(time[-1] - time[0]) / (size - 1)
+        frequency = np.fft.rfftfreq(size, step)
+        share = np.ones_like(frequency)
+        if np.isfinite(self.cutoff_hz):
+            gain = LowPass(step, self.cutoff_hz).gain(frequency)
+            share = np.where(frequency <= self.cutoff_hz, gain, np.inf)
+        lines = np.fft.rfft(q, axis=1) * _standing_out(q) / share[:, None]
+        omega = 2j * np.pi * frequency[:, None]
         moved = zip(*(np.fft.irfft(lines * omega**order, n=size, axis=1) for order in range(3)), strict=True)
         return tuple(
             Motion(p.time, *states, torque=p.net) for p, states in zip(self.periods, moved, strict=True)
@@ -75,7 +83,7 @@ class RepeatedMotion:
                 f"it needs at least {FEWEST}: record more periods, and "
                 "some time for the filters, or take --estimator wls."
             )
-        return cls(tuple(motion.part(size * k, size * (k + 1)) for k in range(count)))
+        return cls(tuple(motion.part(size * k, size * (k + 1)) for k in range(count)), experiment.cutoff_hz)
 
 
 def _moving(whole: Motion, window: Window, slowest: np.ndarray) -> Motion:

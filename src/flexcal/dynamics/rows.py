@@ -38,6 +38,11 @@ class Experiment(Protocol):
         """The largest |q̇| of every joint (n,)."""
         ...
 
+    @property
+    def cutoff_hz(self) -> float:
+        """Of the low-pass that its positions went through, infinite where they went through none."""
+        ...
+
     def blocks(self) -> Iterator[Motion]:
         """The motion in parts that follow each other."""
         ...

@@ -67,6 +67,11 @@ class SimulatedExperiment:
         """Those of the recording (n,)."""
         return self.experiment.top_speed
 
+    @property
+    def cutoff_hz(self) -> float:
+        """That of the recording."""
+        return self.experiment.cutoff_hz
+
     def blocks(self) -> Iterator[Motion]:
         """The simulated motion in parts that follow each other, with the measured torques, the external ones among them."""
         robot = SimulatedRobot(self.observation, self.parameters, self.name)
