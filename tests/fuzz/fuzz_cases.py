@@ -54,8 +54,8 @@ VIRTUAL = "--cell virtual --robot robot.yaml --config cell.yaml --out new"
 _YAML = (by_bytes, by_yaml_text, by_yaml_structure, by_numbers)
 _TABLE = (by_bytes, by_cells)
 _RECORDING = (by_bytes, by_counts, by_names)
-_IMPORT = "import robot.yaml --out new.csv"
-_RESPONSE = "identify response --input tau1 --output q1 --out new"
+IMPORT = "import robot.yaml --out new.csv"
+RESPONSE = "identify response --input tau1 --output q1 --out new"
 
 SUBJECTS = (
     Subject(
@@ -112,7 +112,7 @@ SUBJECTS = (
             "identify payload robot.yaml log.csv --free validation.csv --out new",
             "identify gains robot.yaml log.csv validation.csv --out new",
             "import robot.yaml log.csv --out new.csv",
-            f"{_RESPONSE} log.csv",
+            f"{RESPONSE} log.csv",
         ),
     ),
     Subject(
@@ -127,18 +127,18 @@ SUBJECTS = (
     Subject(
         "measured.uff",
         (by_bytes, by_universal_fields),
-        (f"{_IMPORT} measured.uff", f"{_RESPONSE} measured.uff"),
+        (f"{IMPORT} measured.uff", f"{RESPONSE} measured.uff"),
     ),
     Subject(
         "measured_binary.uff",
         (by_bytes, by_universal_fields, by_values),
-        (f"{_IMPORT} measured_binary.uff", f"{_RESPONSE} measured_binary.uff"),
+        (f"{IMPORT} measured_binary.uff", f"{RESPONSE} measured_binary.uff"),
     ),
-    Subject("recorded.bag", (*_RECORDING, by_values), (f"{_IMPORT} recorded.bag",)),
-    Subject("recorded.mcap", (*_RECORDING, by_values), (f"{_IMPORT} recorded.mcap",)),
-    Subject("recorded.db3", (*_RECORDING, by_statements), (f"{_IMPORT} recorded.db3",)),
+    Subject("recorded.bag", (*_RECORDING, by_values), (f"{IMPORT} recorded.bag",)),
+    Subject("recorded.mcap", (*_RECORDING, by_values), (f"{IMPORT} recorded.mcap",)),
+    Subject("recorded.db3", (*_RECORDING, by_statements), (f"{IMPORT} recorded.db3",)),
     *(
-        Subject(f"bag_{ending}/{file}", ways, (f"{_IMPORT} bag_{ending}",))
+        Subject(f"bag_{ending}/{file}", ways, (f"{IMPORT} bag_{ending}",))
         for ending in ("mcap", "db3")
         for file, ways in (("metadata.yaml", _YAML), (f"bag_{ending}.{ending}", _RECORDING))
     ),

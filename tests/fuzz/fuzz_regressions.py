@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator
 from pathlib import Path
 
-from fuzz_cases import CALIBRATE, SUBJECTS, VIRTUAL, Case
+from fuzz_cases import CALIBRATE, IMPORT, RESPONSE, SUBJECTS, VIRTUAL, Case
 
 _EXPORT = "export urdf robot.yaml --out new.urdf"
 _MEASURE = f"measure plan.yaml {VIRTUAL}"
 _STIFFNESS = "identify stiffness robot.yaml responses --out new"
 _CUSTOMER = "report verification --customer"
 _MAP = "map robot.yaml --verification others.csv --count 20 --out new.html"
-_IMPORT = "import robot.yaml poses.csv --out new.csv"
+_IMPORT_POSES = f"{IMPORT} poses.csv"
 
 REGRESSIONS: tuple[tuple[str, str, str], ...] = (
     ("robot.yaml", "open_lists_100000_deep", _EXPORT),
@@ -37,9 +37,9 @@ REGRESSIONS: tuple[tuple[str, str, str], ...] = (
     ("arm.urdf", "1100_fixed_joints", _EXPORT),
     ("arm.urdf", "link_named_as_joint", _EXPORT),
     ("poses.csv", "cr_only", CALIBRATE),
-    ("poses.csv", "line_1_column_7_comma", _IMPORT),
-    ("poses.csv", "column_0_all_int64", _IMPORT),
-    ("poses.csv", "line_1_column_5_huge", _IMPORT),
+    ("poses.csv", "line_1_column_7_comma", _IMPORT_POSES),
+    ("poses.csv", "column_0_all_int64", _IMPORT_POSES),
+    ("poses.csv", "line_1_column_5_huge", _IMPORT_POSES),
     ("poses.csv", "header_2_megabyte", CALIBRATE),
     ("others.csv", "header_7_escape", "verify robot.yaml others.csv"),
     ("others.csv", "column_0_all_huge", _MAP),
@@ -95,6 +95,18 @@ REGRESSIONS: tuple[tuple[str, str, str], ...] = (
     ("results/gravity_loads.npz", "bytes_2", "report results"),
     ("results/gravity_loads.npz", "along_rigid_empty", "report results"),
     ("results/gravity_loads.npz", "along_calibrated_shorter", "report results"),
+    *(
+        ("measured.uff", label, line)
+        for label in (
+            "last_end_gone",
+            "line_8_field_3_infinite",
+            "line_8_field_4_huge",
+            "line_8_field_1_minus",
+        )
+        for line in (f"{IMPORT} measured.uff", f"{RESPONSE} measured.uff")
+    ),
+    ("log.csv", "line_1_column_4_huge", f"{RESPONSE} log.csv"),
+    ("log.csv", "line_1_column_4_underscore", f"{RESPONSE} log.csv"),
     ("results/.flexcal", "a_program", "calibrate robot.yaml poses.csv --terms kinematic --out results"),
 )
 
