@@ -5,6 +5,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from cli_files import FLEXCAL
 
@@ -134,6 +135,15 @@ def test_a_bug_keeps_its_traceback(run, monkeypatch: pytest.MonkeyPatch) -> None
     monkeypatch.setattr(Verify, "run", lambda self: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         run("verify", "robot.yaml", "poses.csv")
+
+
+def test_too_little_memory_is_said_in_a_sentence(run, monkeypatch: pytest.MonkeyPatch) -> None:
+    from flexcal.cli.verify import Verify
+
+    monkeypatch.setattr(Verify, "run", lambda self: np.empty(2**59))
+    outcome = run("verify", "robot.yaml", "poses.csv")
+    assert outcome.status == 2 and outcome.out == "" and outcome.err.count("\n") == 1
+    assert "not enough memory (Unable to allocate" in outcome.err
 
 
 def test_known_error_is_one_line_without_traceback(tmp_path: Path) -> None:

@@ -153,3 +153,13 @@ def test_what_cannot_tell_its_noise_is_refused(
     walk = np.cumsum(rng.normal(size=clean.q.shape), axis=0)
     with pytest.raises(FlexcalError, match="contains no periodic motion"):
         RepeatedMotion.of(replace(clean, q=walk), Window())
+
+
+def test_a_motion_larger_than_the_memory_is_refused_beforehand(
+    observation: Observation, base: BaseParameters, clean: Motion, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("flexcal.dynamics.periodic_likelihood.physical_memory", lambda: 500_000)
+    with pytest.raises(
+        FlexcalError, match=r"in memory, 0\.0 GB for 5000 samples, and this machine has 0\.0 GB"
+    ):
+        likeliest(observation, base, clean)

@@ -58,6 +58,12 @@ def _told(problem: BaseException, stopping: Stopping) -> tuple[str, int]:
         return str(problem), FAILED
     if isinstance(problem, FileNotFoundError) and problem.filename is None and not _folder_is_there():
         return "the current folder has been removed; change to one that is there.", FAILED
+    if isinstance(problem, MemoryError):
+        what = f" ({problem})" if str(problem) else ""
+        return (
+            f"there is not enough memory{what}; give fewer rows or logs, or take a machine with more.",
+            FAILED,
+        )
     if isinstance(problem, OSError):
         where = f"{problem.filename}: " if problem.filename else ""
         return f"{where}{problem.strerror or problem}.", FAILED

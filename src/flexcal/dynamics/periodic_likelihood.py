@@ -20,6 +20,7 @@ from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
+from flexcal.physical_memory import physical_memory
 
 _REACH = 5
 """Neighbouring lines on either side that the noise of a line is read from."""
@@ -30,6 +31,8 @@ _SMALLEST = 1e-9
 _SETTLED = 1e-2
 """Largest step of a parameter, in its standard deviations, that ends the iteration."""
 _ITERATIONS = 20
+_HELD = 100
+"""Bytes a sample and joint of periods that are averaged, filtered and differentiated together; 97 were measured."""
 _BLOCK = 512
 """Samples whose columns are in memory at once."""
 
@@ -43,8 +46,9 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
     Lines are weighed as if their errors were independent, but noise of the motion at few lines is in many of the torques: the covariance
     is that of the scores, from their scatter between the periods (`_covariance`), raised by the mean squared error of the weighted rows
     where the model misses more than the noise. Standstill is not masked. Raises `FlexcalError` as `RepeatedMotion.of` and
-    `weighted_least_squares` do, and where the steps do not settle.
+    `weighted_least_squares` do, where the steps do not settle, and for motions that the machine's memory cannot hold.
     """
+    _require_memory(recorded)
     motions = [
         RepeatedMotion.of(experiment, window)
         for experiment, window in zip(recorded.experiments, recorded.windows, strict=True)
@@ -76,6 +80,16 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
     raise FlexcalError(
         f"the noise estimate does not converge in {_ITERATIONS} iterations; use --estimator wls."
     )
+
+
+def _require_memory(recorded: RecordedRows) -> None:
+    samples = sum(experiment.samples for experiment in recorded.experiments)
+    needed, there = _HELD * samples * recorded.observation.model.n, physical_memory()
+    if there is not None and needed > there:
+        raise FlexcalError(
+            f"maximum likelihood holds the motion of all logs in memory, {needed / 1e9:.1f} GB for {samples} samples, and this machine has "
+            f"{there / 1e9:.1f} GB; give it fewer periods, or take --estimator wls."
+        )
 
 
 def _mean_rows(observation: Observation, motion: RepeatedMotion, factor: int) -> np.ndarray:
