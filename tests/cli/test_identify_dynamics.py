@@ -341,7 +341,10 @@ def test_estimators_that_simulate_the_robot(
     assert found["rank"] == 61
     assert abs(found["error_percent"]["held_out"] - linear["error_percent"]["held_out"]) < 0.5
     assert found["error_percent"]["train"] > linear["error_percent"]["train"]
-    assert f"declares no controller: {name} simulated one" in found["remarks"][0]
+    assert f"declares no controller: {name} simulated one" in found["notes"][0]
+    assert (
+        "drive_terms" not in found["verdict"]["reasons"]
+    )  # that is no parameter that the recordings leave open
 
 
 def test_torques_of_motors_without_their_gears(tx40: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -154,7 +154,7 @@ def test_a_column_that_the_data_leave_at_zero_is_named(tx40: RobotModel, swing: 
     data: RegressionData = observe(observation, BaseParameters.of(observation), [motion], Decimation(4))
     silent = {f"joint_3.{key}" for key in ("rotor_inertia", "viscous", "coulomb", "sublinear_viscous")}
     assert set(data.silent) == silent
-    remarks = dynamics_remarks(data, weighted_least_squares(data), "wls")
+    remarks = dynamics_remarks(data, weighted_least_squares(data))
     named = "rotor_inertia, viscous, coulomb, sublinear_viscous"
     assert f"joint_3: {named} keep their values: these recordings do not excite them" in remarks
 

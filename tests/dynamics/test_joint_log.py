@@ -177,6 +177,6 @@ def test_a_joint_that_never_moves(swing: Motion, observation: Observation, tmp_p
     assert data.silent == ("joint_2.rotor_inertia", "joint_2.viscous", "joint_2.coulomb")
     estimate = weighted_least_squares(data)
     assert not set(data.silent) & {n for n, k in zip(data.names, estimate.identifiable, strict=True) if k}
-    assert dynamics_remarks(data, estimate, "wls")[0] == (
+    assert dynamics_remarks(data, estimate)[0] == (
         "joint_2: rotor_inertia, viscous, coulomb keep their values: these recordings do not excite them"
     )

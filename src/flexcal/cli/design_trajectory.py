@@ -105,8 +105,9 @@ class DesignTrajectory:
                 self.robot, self.out, request, rate_hz=self.rate, command=command_line(), progress=progress
             ).document()
         without = "" if document["payload"] is None else ", without the payload"
+        one = document["trajectories"] == 1
         console.say(
-            f"wrote {self.out}: {document['trajectories']} trajectories of {document['periods']} periods of "
+            f"wrote {self.out}: {document['trajectories']} {'trajectory' if one else 'trajectories'} of {document['periods']} periods of "
             f"{1 / document['base_frequency_hz']:g} s{without}, {document['seconds_on_the_robot']:.0f} s on a real robot"
         )
         console.say(

@@ -80,7 +80,7 @@ class IdentifyDynamics:
     def run(self) -> None:
         """Fit, and print the base parameters and the error of the torques."""
         from flexcal.cli.tables import base_parameter_table, friction_table, learned_table, quantity_table
-        from flexcal.report.dynamics_checks import check_fit
+        from flexcal.report.dynamics_checks import check_external, check_fit, check_weight_shares
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
         from flexcal.workflow.used_signals import signal_sentences
 
@@ -144,8 +144,13 @@ class IdentifyDynamics:
                 f"the inertials of {', '.join(found.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
                 "need consistent ones; use --estimator sdp"
             )
-        for remark in document["remarks"]:
+        for remark in (*document["remarks"], *document["notes"]):
             console.say(remark)
+        if shares := document["weight_shares"]:
+            weight = check_weight_shares(shares)
+            console.say(f"{weight.question} {weight.answer}")
+        if (share := document["external_share"]) and (sensor := check_external(share)).status != "good":
+            console.say(sensor.answer)
         console.say(found.trust.sentence)
         console.say(f"wrote {found.estimates}")
         if learned and learned["file"]:

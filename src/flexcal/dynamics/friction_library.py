@@ -12,6 +12,7 @@ from flexcal.dynamics.drive_terms import Column, Memory
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.motor_axis import MotorAxis, motor_axes
 from flexcal.model import RobotModel, torque_regressor
+from flexcal.model.names import unknown_parallel
 
 
 class _PerMotor:
@@ -105,10 +106,15 @@ class CoulombWarmUp(_PerMotor):
 
 @dataclass(frozen=True)
 class Cables:
-    """`<joint>.cable_stiffness` · q: cables and hoses along the arm; where they are at rest is part of the torque offset."""
+    """`<joint>.cable_stiffness` · q: cables and hoses along the arm; where they are at rest is part of the torque offset.
+
+    A joint whose declared spring is identified has that in its place: the columns are the same.
+    """
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         for i, name in enumerate(model.joint_names):
+            if "spring_stiffness" in unknown_parallel(model, name):
+                continue
             yield Column(f"{name}.cable_stiffness", i, motion.q[:, i])
 
 

@@ -18,6 +18,7 @@ from flexcal.report.dynamics_checks import (
     check_shown,
     check_unseen,
     check_weight,
+    check_weight_shares,
 )
 from flexcal.report.notation import significant
 from flexcal.report.page import Check, Fact, Page, Section, Status, Verdict
@@ -143,6 +144,11 @@ def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
         check_bodies(results["bodiless_links"]).named("bodies"),
         check_shown(results["remarks"]).named("drive_terms"),
         *([check_weight(faults).named("weight")] if (faults := results.get("weight_faults")) else []),
+        *(
+            [check_weight_shares(shares).named("weight_shares")]
+            if (shares := results.get("weight_shares"))
+            else []
+        ),
         *(
             [check_external(share).named("external_torques")]
             if (share := results.get("external_share"))

@@ -111,6 +111,21 @@ def check_weight(faults: list[str]) -> Check:
     return Check(question, f"No, which was accepted: {faults[0]}.", "care")
 
 
+def check_weight_shares(shares: Mapping[str, Mapping[str, float]]) -> Check:
+    """Reservation about joints, named in `shares`, on which the links weigh far less or more than the URDF says."""
+    told = "; ".join(
+        f"on {joint} {significant(max(0.0, share['share']), 2)} times that (95 % interval {significant(share['low'], 2)} to "
+        f"{significant(share['high'], 2)})"
+        for joint, share in list(shares.items())[:_SHOWN]
+    )
+    return Check(
+        "Do the links weigh what the URDF says?",
+        f"No: {told}. Torques are not affected. Either something else carries the arm (declare springs under `dynamics: joint_springs:`; a "
+        "counterweight belongs in the URDF) or loads it (a tool), or the URDF's masses are guesses (accept that with --accept weight).",
+        "care",
+    )
+
+
 def check_external(share: Mapping[str, float]) -> Check:
     """Whether the motors feel what the force sensor reads."""
     question = "Do the motors feel what the force sensor reads?"

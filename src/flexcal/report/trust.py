@@ -106,6 +106,7 @@ PHRASES: dict[str, dict[str, str]] = {
         "else": "the motors do not feel what the force sensor reads: check the sign (`wrench:`), frame and unit of `force_sensor:`",
     },
     "weight": {"else": "the torques do not hold the links' weight, which was accepted"},
+    "weight_shares": {"else": "on a joint the links weigh far less or more than the URDF says"},
     "left_out": {
         "good": "poses left out of the fit are predicted as accurately as expected",
         "unknown": "no poses outside the fit were predicted",

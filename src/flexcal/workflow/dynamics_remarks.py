@@ -8,20 +8,18 @@ from flexcal.dynamics import FrictionSelection, RegressionData, attenuation
 from flexcal.estimation import Estimate
 from flexcal.model.regressor import INERTIAL
 from flexcal.workflow.estimators import EstimatorName
+from flexcal.workflow.parallel_springs import undeclared_springs
 
 _SHOWN = 3
-_REGROUPED = ("rotor_inertia", "arm_inertia", "spring_torque", "cable_torque")
+_REGROUPED = ("rotor_inertia", "arm_inertia", "spring_torque", "cable_torque", "torque_offset")
 _REGROUPED += tuple(f"{name}_offset" for name in ("fx", "fy", "fz", "mx", "my", "mz"))
 """Parameters that are always absorbed, by the inertias of links and by torque offsets."""
 _LARGEST_ATTENUATION = 0.5
 """Bias of a stiffness, in its standard deviations, up to which no remark is made."""
 
 
-def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
-    """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named.
-
-    So is a controller that was simulated but not declared.
-    """
+def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
+    """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named."""
     base = data.base.found
     structural = {base.names[i] for i in base.kept}
     absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
@@ -31,16 +29,23 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate, estimator: Estima
         f"{joint}: {', '.join(keys)} keep their values: these recordings do not excite them"
         for joint, keys in _by_joint(data.silent).items()
     ]
-    if estimator in ("iv", "didim") and data.observation.model.controller is None:
-        remarks.append(
-            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, gains proportional to inertia"
-        )
     for name in drives:
         if name in absorbed and (name in structural or not name.endswith(_REGROUPED)):
-            heirs = ", ".join(heir for heir, _ in absorbed[name][:_SHOWN]) or "nothing"
+            largest = sorted(absorbed[name], key=lambda heir: -abs(heir[1]))
+            heirs = ", ".join(heir for heir, _ in largest[:_SHOWN]) or "nothing"
             where = "in any recording" if name not in structural else "in these recordings"
             remarks.append(f"{name} is not identifiable beside {heirs} {where}")
-    return (*remarks, *_attenuated(data, estimate))
+    return tuple(remarks)
+
+
+def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
+    """One sentence each: an assumed controller, springs that robot.yaml does not declare, a stiffness that noise may have reduced."""
+    notes = []
+    if estimator in ("iv", "didim") and data.observation.model.controller is None:
+        notes.append(
+            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, gains proportional to inertia"
+        )
+    return (*notes, *undeclared_springs(data, estimate), *_attenuated(data, estimate))
 
 
 def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:
@@ -56,7 +61,7 @@ def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | N
         sets = f"{others} other sets of friction terms or shapes predict"
     return (
         f"{sets} the torques about as well; the differences are included in the standard deviations, which are up to {factor:.2g} times as "
-        f"large for it ({name})"
+        f"large as without them ({name})"
     )
 
 

@@ -21,6 +21,7 @@ from flexcal.dynamics import (
     with_nominal_spread,
     with_play,
 )
+from flexcal.dynamics.identified_weight import weight_shares
 from flexcal.errors import InputError
 from flexcal.estimates_file import provenance, read_estimates
 from flexcal.model import RobotModel
@@ -146,6 +147,7 @@ def identify_robot_dynamics(
             treatment=treatment,
             signals=used_signals(treatment, divided.logs),
             weight_faults=tuple(weight_faults(divided.logs, model)),
+            weight_shares={} if accept_weight else weight_shares(train, estimate),
             external=external,
             learned=learned,
             seconds=time.perf_counter() - begun,

@@ -9,12 +9,13 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.dynamics import EssentialParameters, ExternalShare, FrictionSelection, RegressionData
+from flexcal.dynamics.identified_weight import WeightShare
 from flexcal.estimation import Estimate
 from flexcal.model.names import torque_units
 from flexcal.model.pseudo_inertia import is_body
 from flexcal.report.dynamics import dynamics_checks
 from flexcal.report.trust import Trust
-from flexcal.workflow.dynamics_remarks import dynamics_remarks, selection_remark
+from flexcal.workflow.dynamics_remarks import dynamics_notes, dynamics_remarks, selection_remark
 from flexcal.workflow.estimators import EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
 from flexcal.workflow.results import dropped_parameters, quantities
@@ -27,9 +28,9 @@ class RobotDynamics:
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
     whose motors have equations of their own; `signals` are as `used_signals` has them. `weight_faults` are torques unlike the links' weight
-    that were accepted, `external` tells how much of the measured external torques the motors' show, None without a force sensor. `learned`
-    is what was learned beside the estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the
-    command line, where there was one.
+    that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was accepted. `external`
+    tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what was learned beside the
+    estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the command line, where there was one.
     """
 
     estimate: Estimate
@@ -45,6 +46,7 @@ class RobotDynamics:
     treatment: Treatment
     signals: Mapping[str, Any]
     weight_faults: tuple[str, ...]
+    weight_shares: Mapping[str, WeightShare]
     external: ExternalShare | None
     learned: LearnedDynamics | None
     seconds: float
@@ -103,7 +105,11 @@ class RobotDynamics:
             "weight_faults": list(self.weight_faults),
             "external_share": None if self.external is None else asdict(self.external),
             "selection_remark": selection_remark(self.friction, self.estimate),
-            "remarks": list(dynamics_remarks(self.train, self.estimate, self.estimator)),
+            "remarks": list(dynamics_remarks(self.train, self.estimate)),
+            "notes": list(dynamics_notes(self.train, self.estimate, self.estimator)),
+            "weight_shares": {
+                joint: asdict(share) for joint, share in self.weight_shares.items() if share.unlike
+            },
             "base_parameters": self._base_parameters(),
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),

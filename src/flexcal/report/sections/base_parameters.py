@@ -25,7 +25,8 @@ def base_parameters_section(results: Mapping[str, Any], estimate: Estimate) -> S
         f"instead of {significant(results['error_percent']['train'], 3)} %"
         + (f", and {significant(unseen, 3)} % on data outside the fit." if unseen is not None else ".")
     )
-    blocks: list[Block] = [Text((words,)), _table(base)]
+    notes = tuple(f"{note[0].upper()}{note[1:]}." for note in results.get("notes", ()))
+    blocks: list[Block] = [Text((words, *notes)), _table(base)]
     names, correlation = base_correlation(base, estimate)
     if len(names) > 1:
         blocks += [_map(names, correlation), _strongest(names, correlation)]
