@@ -153,7 +153,11 @@ def test_everything_of_a_dataclass(tmp_path: Path) -> None:
         ("name: a\nsure: yes\n", 2, ["sure", "true or false"]),
         ("name: a\nkind: meen\n", 2, ["'held', 'mean'", "did you mean 'mean'?"]),
         ("name: a\nterms: aut\n", 2, ["'auto' or 'none' or a list is expected"]),
-        ("name: a\nelastic: text\n", 2, ["elastic", "a list is expected"]),
+        (
+            "name: a\nelastic: text\n",
+            2,
+            ["elastic", "a list is expected (write [ ] around its entries", "not the text"],
+        ),
         ("name: a\nelastic: [3]\n", 2, ["elastic[0]", "a mapping"]),
         ("name: a\nstations: [3]\n", 2, ["stations", "a mapping"]),
         ("name: a\nstations:\n  a: {stiffness: 1}\n  b: {stiffness: x}\n", 4, ["stations.b.stiffness"]),

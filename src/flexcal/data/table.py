@@ -319,7 +319,7 @@ def _measurable(values: np.ndarray) -> np.ndarray:
 
 def _fault(cell: str, is_text: bool) -> str | None:
     if not cell:
-        return "the value is missing; complete or remove the line."
+        return "the value is missing; complete or remove this line, and others like it."
     if is_text:
         return None
     if not _is_number(cell):
@@ -328,7 +328,7 @@ def _fault(cell: str, is_text: bool) -> str | None:
     number = float(cell)
     if not abs(number) <= LARGEST:
         shown = cell if len(cell) < _QUOTED else f"{number:g}"
-        return f"the value is {shown}, which is no measurement; remove the line or measure it again."
+        return f"the value is {shown}, which is no measurement; remove this line, and others like it, or measure them again."
     return None
 
 
@@ -346,14 +346,14 @@ def _check_finite(table: Table, frame: pl.DataFrame) -> None:
             raise table.error(
                 int(np.argmax(frame[name].is_null().to_numpy())),
                 name,
-                "the value is missing; complete or remove the row.",
+                "the value is missing; complete or remove this row, and others like it.",
             )
         if values.dtype.kind == "f" and not _measurable(values).all():
             row = int(np.argmin(_measurable(values)))
             raise table.error(
                 row,
                 name,
-                f"the value is {values[row]}, which is no measurement; remove the row or measure it again.",
+                f"the value is {values[row]}, which is no measurement; remove this row, and others like it, or measure them again.",
             )
 
 

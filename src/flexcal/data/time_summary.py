@@ -32,10 +32,8 @@ class TimeSummary:
             return []
         step = bases[0].time_step
         if bases[0].even:
-            scatter = max(base.jitter for base in bases)
             return [
-                f"time stamps scatter by {_ms(scatter)}, but the positions are smooth when samples are taken as {_ms(step)} apart: so they "
-                "are"
+                f"time stamps scatter or are rounded: the positions are smooth if samples are {_ms(step)} apart, as which they are taken"
             ]
         lost = sum(base.lost for base in bases)
         jitter = max(base.jitter_max for base in bases)

@@ -79,7 +79,8 @@ def _guarded(kind: type, hook: Any) -> Any:
     def structure(value: Any, cls: Any) -> Any:
         if not isinstance(value, kind):
             expected = "a list" if kind is list else "a mapping (key: value)"
-            raise Unfit(f"{expected} is expected, not {describe(value)}")
+            how = " (write [ ] around its entries, or a line with - before each)" if kind is list else ""
+            raise Unfit(f"{expected} is expected{how}, not {describe(value)}")
         return hook(value, cls)
 
     return structure
