@@ -2,8 +2,8 @@
 
 `python -m benchmarks.large --rows 100000 1000000 --cases calibrate verify`
 
-Each verb runs in a process of its own whose address space is limited. The robots are those of the examples; poses and logs are made here
-from their models with changed parameters and noise.
+Each verb runs in a process of its own whose address space is limited. One that takes too long is stopped, and its memory until
+then is told. The robots are those of the examples; poses and logs are made here from their models with changed parameters and noise.
 """
 
 from __future__ import annotations
