@@ -53,6 +53,10 @@ def test_written_samples_keep_the_limits_from_rest_to_rest(run, gantry: Path) ->
     folder = gantry.parent
     outcome = run("design", "trajectory", gantry, "--count", 2, "--out", folder / "plan.yaml", "--json")
     assert outcome.status == 0 and "no friction of rail, shoulder, elbow" in outcome.err
+    # a URDF without collision shapes: that they are kept apart is not claimed
+    assert "no collision shapes, so collisions are not excluded" in outcome.err
+    page = " ".join((folder / "plan.html").read_text("utf-8").split())
+    assert "Cannot be judged: the URDF has no collision shapes" in page and "With care" in page
     model = pin.buildModelFromUrdf(str(folder / "gantry.urdf"))
     for number in (1, 2):
         header, rows = motion(folder / f"plan_{number}.csv")

@@ -37,6 +37,11 @@ class Clearance:
         self._reach = (self._first != self._second) * _reaches(checker)
         self._distance, self._where = np.zeros((0, 0)), np.zeros((0, 0, 0))
 
+    @property
+    def compares(self) -> bool:
+        """Whether there are shapes that could collide: a URDF may have none."""
+        return len(self._reach) > 0
+
     def wider(self, further: float) -> Clearance:
         """The same with margins that are larger by `further`, m, and nothing remembered."""
         return Clearance(self.checker, self.within, self.beyond + further)

@@ -43,7 +43,7 @@ class TrajectoryDesign:
     """A `plan`, and for each of its trajectories the information (r, r) on the base `columns` after it, all before it included.
 
     `limits` are those that it keeps, `goal` is what it was designed for, `merits` how much of that there is after each trajectory.
-    `clearance` is the least distance of bodies beyond their margins, m, up to 0.05.
+    `clearance` is the least distance of bodies beyond their margins, m, up to 0.05; None where the URDF has no shapes that could collide.
     """
 
     model: RobotModel
@@ -53,7 +53,7 @@ class TrajectoryDesign:
     goal: TorqueGoal
     merits: tuple[float, ...]
     information: tuple[np.ndarray, ...]
-    clearance: float
+    clearance: float | None
 
     def shares(self, motion: np.ndarray) -> dict[str, np.ndarray]:
         """Shares (N, n) of the limits that q, q̇, q̈ (3, N, n) take; motor torques are with friction, what has no limit is left out."""
@@ -148,7 +148,7 @@ def design_trajectories(
     stages = sequence or (Stage(tuple(range(model.n)), ()),) * count
     rng = np.random.default_rng(seed)
     coefficients, merits, information = [], [], []
-    least = NEAR
+    least, compares = NEAR, program.clearance.compares
     for number, stage in enumerate(stages):
         aim = goal.about(stage.wanted) if stage.wanted else goal
         program = replace(program, merit=aim, space=space.moving(stage.moving))
@@ -178,7 +178,14 @@ def design_trajectories(
         seed=seed,
     )
     return TrajectoryDesign(
-        model, plan, columns, limits, goal, tuple(merits), tuple(information), float(least)
+        model,
+        plan,
+        columns,
+        limits,
+        goal,
+        tuple(merits),
+        tuple(information),
+        float(least) if compares else None,
     )
 
 

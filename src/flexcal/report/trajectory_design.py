@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.design import TrajectoryDesign, joint_origins
+from flexcal.design.exciting_program import NEAR
 from flexcal.design.skeleton import link_frames
 from flexcal.report.figures.arm_poses import links_at
 from flexcal.report.figures.limit_shares import limit_shares
@@ -41,9 +42,10 @@ def write_trajectory_page(path: str | Path, design: TrajectoryDesign, document: 
 def trajectory_page(design: TrajectoryDesign, document: Mapping[str, Any]) -> Page:
     """The page before it becomes HTML; `document` is the plan's results.json."""
     plan = design.plan
+    motions = "trajectory" if len(plan) == 1 else "trajectories"
     return Page(
         title=f"{design.model.name}: exciting trajectories",
-        subtitle=f"{len(plan)} trajectories of {plan.periods} periods of {1 / plan.base_frequency_hz:g} s, criterion "
+        subtitle=f"{len(plan)} {motions} of {plan.periods} periods of {1 / plan.base_frequency_hz:g} s, criterion "
         f"{design.goal.criterion.name}",
         verdict=_verdict(design, document),
         sections=[
@@ -55,6 +57,21 @@ def trajectory_page(design: TrajectoryDesign, document: Mapping[str, Any]) -> Pa
     )
 
 
+def check_clearance(clearance: float | None) -> Check:
+    """Whether the motions are free of collisions, by the least `clearance` beyond the margin, m, up to 0.05; None without shapes."""
+    question = "Is it free of collisions?"
+    if clearance is None:
+        return Check(
+            question,
+            "Cannot be judged: the URDF has no collision shapes. Run the motion in a simulator, or slowly, first.",
+            "care",
+        )
+    if clearance <= 0:
+        return Check(question, "Bodies collide.", "bad")
+    least = "50 mm or more" if clearance >= NEAR else f"{1e3 * clearance:.0f} mm"
+    return Check(question, f"The smallest clearance is {least} beyond the margin.", "good")
+
+
 def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
     uses = document["largest_shares"]
     checks = (
@@ -64,13 +81,7 @@ def _verdict(design: TrajectoryDesign, document: Mapping[str, Any]) -> Verdict:
             f"{100 * uses['torque']:.1f} % of the torques that the design may use, on a grid ten times finer than that of the search.",
             "good" if max(uses.values()) <= 1 else "bad",
         ),
-        Check(
-            "Is it free of collisions?",
-            f"The smallest clearance is {1e3 * document['clearance']:.0f} mm beyond the margin."
-            if document["clearance"] > 0
-            else "Bodies collide.",
-            "good" if document["clearance"] > 0 else "bad",
-        ),
+        check_clearance(document["clearance"]),
         Check(
             "Are all base parameters excited?",
             f"The condition number of the column-scaled observation matrix is {significant(document['condition'], 3)}; up to 100 is good.",

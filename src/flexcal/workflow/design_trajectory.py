@@ -147,6 +147,10 @@ class DesignedTrajectories:
                 f"{100 * VISCOUS:.0f} % more at the velocity limit are left free for it; for the torques that the drives really have left, "
                 "give `drives:` with `coulomb:` (N m) and `viscous:` (N m s/rad), for example of a first 'flexcal identify dynamics'"
             )
+        if self.design.clearance is None:
+            remarks.append(
+                "the URDF has no collision shapes, so collisions are not excluded: run the motion in a simulator, or slowly, first"
+            )
         least, most, kept = min(self.conditions), max(self.conditions), self.conditions[0]
         if most > ALIKE * least:
             remarks.append(
