@@ -99,8 +99,13 @@ def test_torques_in_noise_with_memory(memory: float, duration: float, tmp_path: 
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "log",
-    [NOISY_POSITIONS, Log(position_noise=3e-5, torque_noise=0.5, memory=0.1), LONG_MEMORY],
-    ids=["positions alone", "positions and torques", "long memory"],
+    [
+        NOISY_POSITIONS,
+        Log(position_noise=3e-4),
+        Log(position_noise=3e-5, torque_noise=0.5, memory=0.1),
+        LONG_MEMORY,
+    ],
+    ids=["positions alone", "noisier positions alone", "positions and torques", "long memory"],
 )
 def test_kalman_filter(log: Log, tmp_path: Path) -> None:
     parameters, torques = coverage(tmp_path, log, "ekf", range(25))

@@ -120,7 +120,7 @@ def _covariance(scores: list[np.ndarray], root: np.ndarray) -> tuple[np.ndarray,
 
     `root` (k, k) has root · rootᵀ = (WᵀW)⁻¹ of the whitened rows W. Periods are few: standard deviations are moderated towards those of
     root · rootᵀ times a common factor, with the freedom that their ratios to these show (`moderated`), and correlations as by
-    `mixed_covariance`.
+    `mixed_covariance`. They are never below those of root · rootᵀ: weights from the same scatter make it too small.
     """
     nominal = root @ root.T
     apart = [own - own.mean(axis=1, keepdims=True) for own in scores]
@@ -129,7 +129,7 @@ def _covariance(scores: list[np.ndarray], root: np.ndarray) -> tuple[np.ndarray,
     scatter = nominal @ middle @ nominal
     freedom = float(sum(counts) - len(counts))
     ratios, known = moderated(np.diag(scatter) / np.diag(nominal), freedom)
-    std = np.sqrt(ratios * np.diag(nominal))
+    std = np.sqrt(np.maximum(1.0, ratios) * np.diag(nominal))
     return mixed_covariance(scatter, nominal, std, freedom), known
 
 
