@@ -26,13 +26,15 @@ class ForwardModels:
     """The models of all `steps` with the mass matrix and the slopes of the torques of the parameters `about` (p,).
 
     W has the `accelerations` (N, n), rad/s²: the measured ones, smoothed, as their noise biases inertias towards zero. Whatever they
-    are, q̈ does not depend on them where `about` is the truth.
+    are, q̈ does not depend on them where `about` is the truth. `corrections` (2, N, n), rad/s², make of the acceleration in the mean of a
+    step's samples that which moves the position, and that which moves the velocity.
     """
 
     steps: ForwardSteps
     about: np.ndarray
     slopes: np.ndarray
     accelerations: np.ndarray
+    corrections: np.ndarray
 
     @classmethod
     def of(cls, steps: ForwardSteps, about: np.ndarray, reach: int) -> ForwardModels:
@@ -43,7 +45,8 @@ class ForwardModels:
             [np.convolve(column, weights) for column in (*steps.middle.ddq.T, np.ones(len(steps.torque)))]
         )
         inner = sums[:, width - 1 : width - 1 + len(steps.torque)]
-        return cls(steps, about, steps.slopes(about), (inner[:-1] / inner[-1]).T)
+        smooth = (inner[:-1] / inner[-1]).T
+        return cls(steps, about, steps.slopes(about), smooth, _corrections(smooth, steps))
 
     def step(self, k: int, state: np.ndarray, parameters: np.ndarray) -> ForwardModel:
         """Step `k` from `state` (2 n,) with `parameters` (p,); raises `FlexcalError` where M is not positive definite."""
@@ -66,5 +69,18 @@ class ForwardModels:
         by_state = np.eye(2 * n)
         by_state[:n, n:] = h * np.eye(n)
         by_state -= onward @ np.hstack([by_position, by_speed])
-        predicted = np.concatenate([q + h * dq + 0.5 * h**2 * ddq, dq + h * ddq])
+        for_position, for_speed = self.corrections[:, k]
+        predicted = np.concatenate(
+            [q + h * dq + 0.5 * h**2 * (ddq + for_position), dq + h * (ddq + for_speed)]
+        )
         return ForwardModel(predicted, by_state, -onward @ columns, onward)
+
+
+def _corrections(accelerations: np.ndarray, steps: ForwardSteps) -> np.ndarray:
+    """Of the trapezoidal mean over samples, which exceeds that of the motion by a″/12 times the square of their spacing, and of a position
+    that a constant acceleration would move: a changing one moves it by a′h/6 less. Both would count as (ωh)²/12 of the inertia."""
+    if len(accelerations) < 3:
+        return np.zeros((2, *accelerations.shape))
+    rate = np.gradient(accelerations, steps.length, axis=0)
+    for_speed = -(steps.spacing**2) / 12 * np.gradient(rate, steps.length, axis=0)
+    return np.stack([for_speed - steps.length / 6 * rate, for_speed])
