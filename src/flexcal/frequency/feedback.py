@@ -55,11 +55,11 @@ class Feedback:
         return bool(((near @ self.share) / np.maximum(near.sum(1), 1)).max() > _ACTS)
 
     def share_at(self, frequencies_hz: np.ndarray) -> np.ndarray:
-        """(L,)"""
+        """Share (L,) at other frequencies, interpolated."""
         return np.interp(frequencies_hz, self.frequencies_hz, self.share)
 
     def bias_at(self, frequencies_hz: np.ndarray) -> np.ndarray:
-        """|bias| of the worst element (L,)."""
+        """|bias| (L,) of the worst element at other frequencies, interpolated."""
         return np.interp(frequencies_hz, self.frequencies_hz, np.abs(self.bias).max((1, 2)))
 
 
