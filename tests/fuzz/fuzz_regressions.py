@@ -49,6 +49,8 @@ REGRESSIONS: tuple[tuple[str, str, str], ...] = (
     ("commands.csv", "header_2_megabyte", "predict robot.yaml commands.csv --out new.csv"),
     ("commands.csv", "line_1_column_4_megabyte", "predict robot.yaml commands.csv --out new.csv"),
     ("cell.yaml", "spread_com_huge", _MEASURE),
+    ("cell.yaml", "spread_stiffness_int64", _MEASURE),
+    ("frequency/plan.yaml", "kind_lists", "identify response robot.yaml frequency --out new"),
     ("cell.yaml", "mismatch_hysteresis_huge", _MEASURE),
     ("cell.yaml", "mismatch_elastic_wrist_tiny", _MEASURE),
     ("plan.yaml", "lines_0_int64", _MEASURE),

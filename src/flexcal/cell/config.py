@@ -76,6 +76,10 @@ class FrictionConfig:
             raise FlexcalError("friction's coulomb_velocity and stribeck_velocity must be positive.")
 
 
+_WIDEST = 5.0
+"""Largest spread of the logarithm of a spring: a factor of 150."""
+
+
 @dataclass(frozen=True)
 class SpreadConfig:
     """Deviations of the true parameters from the nominal robot, 1σ unless stated otherwise.
@@ -98,6 +102,10 @@ class SpreadConfig:
         if not 0 <= self.backlash[0] <= self.backlash[1]:
             raise FlexcalError(
                 "the spread's backlash is [smallest, largest] half gap with 0 ≤ smallest ≤ largest."
+            )
+        if max(self.stiffness, self.damping) > _WIDEST:
+            raise FlexcalError(
+                f"the spread's stiffness and damping are of logarithms, at most {_WIDEST:g} (1σ); give for example 0.15."
             )
 
 

@@ -29,7 +29,7 @@ def read_plan(path: str | Path) -> Plan:
         return read_pose_table(Path(path))
     file = read_yaml_file(path)
     kind = file.data.get("kind") if isinstance(file.data, dict) else None
-    if kind not in _KINDS:
+    if not isinstance(kind, str) or kind not in _KINDS:
         raise file.error(
             ("kind",),
             f"this is no plan, whose kind is one of {', '.join(_KINDS)}; give what 'flexcal design' wrote, "
