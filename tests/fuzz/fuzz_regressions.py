@@ -51,6 +51,7 @@ REGRESSIONS: tuple[tuple[str, str, str], ...] = (
     ("cell.yaml", "spread_com_huge", _MEASURE),
     ("cell.yaml", "spread_stiffness_int64", _MEASURE),
     ("frequency/plan.yaml", "kind_lists", "identify response robot.yaml frequency --out new"),
+    ("results/points.csv", "line_30_column_0_huge", "report results"),
     ("cell.yaml", "mismatch_hysteresis_huge", _MEASURE),
     ("cell.yaml", "mismatch_elastic_wrist_tiny", _MEASURE),
     ("plan.yaml", "lines_0_int64", _MEASURE),

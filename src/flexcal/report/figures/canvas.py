@@ -42,8 +42,9 @@ def panels(
 
 
 def single(values: np.ndarray | Sequence[float]) -> np.ndarray:
-    """Float32, which the page stores in base64."""
-    return np.asarray(values, dtype=np.float32)
+    """Float32, which the page stores in base64; what it cannot hold is a gap."""
+    whole = np.asarray(values, dtype=float)
+    return np.where(np.abs(whole) <= np.finfo(np.float32).max, whole, np.nan).astype(np.float32)
 
 
 def positive(values: np.ndarray) -> np.ndarray:
