@@ -1,5 +1,9 @@
 """The errors that flexcal raises on purpose."""
 
+from __future__ import annotations
+
+from pathlib import Path
+
 
 class FlexcalError(Exception):
     """An error that the user can correct; the message is one sentence that says what is wrong, where, and what to do."""
@@ -7,3 +11,9 @@ class FlexcalError(Exception):
 
 class InputError(FlexcalError):
     """A file or argument that cannot be used as it is; the message names the file, and line, column or joint where there is one."""
+
+
+def unreadable(path: Path, problem: OSError | UnicodeDecodeError) -> InputError:
+    """The error of a file that cannot be read, with the system's reason."""
+    reason = getattr(problem, "strerror", None) or str(problem)
+    return InputError(f"{path} cannot be read ({reason}); check the name and the folder.")

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.plain_data import MisfitError, structure
 from flexcal.plain_data.keys import Keys
 from flexcal.publication import current
@@ -66,8 +66,7 @@ def read_yaml_file(path: str | Path) -> YamlFile:
     try:
         text = current(path).read_text(encoding="utf-8-sig")
     except OSError as problem:
-        reason = problem.strerror or str(problem)
-        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+        raise unreadable(path, problem) from problem
     except UnicodeDecodeError as problem:
         raise InputError(f"{path} is not UTF-8 text (byte {problem.start}); save it as UTF-8.") from problem
     return YamlFile(path, *parse_document(path, text))

@@ -1,8 +1,9 @@
 """Estimators with a simulated closed loop: the loop itself, the truth without noise, and no bias where least squares has one."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -139,14 +140,21 @@ def test_without_noise_the_truth_comes_back(
         assert off < 0.01 if observation is declared else 0.01 < off < 0.1
 
 
-def scores(unknown: Observation, clean: Motion, runs: int) -> tuple[np.ndarray, np.ndarray]:
-    """Errors over standard deviations (runs, k) of weighted least squares and of IV."""
-    truth, rng = true_values(unknown), np.random.default_rng(3)
+def scores(
+    unknown: Observation,
+    clean: Motion,
+    runs: int,
+    *,
+    seed: int = 3,
+    parted: Callable[[Motion], Any] = lambda motion: motion,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Errors over standard deviations (runs, k) of weighted least squares and of IV; `parted` makes the log of a noisy motion."""
+    truth, rng = true_values(unknown), np.random.default_rng(seed)
     linear, free = [], []
     for _ in range(runs):
-        motion = noisy(clean, rng)
-        rows = recorded(unknown, motion, 2)
-        data = observe(unknown, rows.base, [motion], Decimation(2))
+        log = parted(noisy(clean, rng))
+        rows = recorded(unknown, log, 2)
+        data = observe(unknown, rows.base, [log], Decimation(2))
         for found, kept in (
             (weighted_least_squares(data), linear),
             (instrumental_variables(data, rows), free),
@@ -238,20 +246,12 @@ def test_it_starts_from_cad_where_no_robot_can_be_built_of_the_data(
 
 def test_short_parts_between_gaps_are_simulated_too(unknown: Observation, clean: Motion) -> None:
     """Of 1.5 s, where the low-pass of the path takes 2.3 s: noisy velocities bias least squares, and not instrumental variables."""
-    truth, rng = true_values(unknown), np.random.default_rng(5)
-    linear, free = [], []
-    for _ in range(4):
-        motion = noisy(clean, rng)
+
+    def short(motion: Motion) -> Any:
         parts = [motion.part(first, first + 150) for first in range(0, len(motion) - 150, 160)]
-        log = divided(Motion.joined(parts), parts)
-        rows = recorded(unknown, log, 2)
-        data = observe(unknown, rows.base, [log], Decimation(2))
-        for found, kept in (
-            (weighted_least_squares(data), linear),
-            (instrumental_variables(data, rows), free),
-        ):
-            error, std = errors(found, unknown, truth)
-            kept.append(error / std)
+        return divided(Motion.joined(parts), parts)
+
+    linear, free = scores(unknown, clean, 4, seed=5, parted=short)
     assert np.abs(np.mean(linear, axis=0)).max() > 2.5
     assert np.abs(np.mean(free, axis=0)).max() < 1.2
     assert np.mean(np.abs(free) < 2.0) > 0.9

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.data.table import Table, TableFile
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.plain_data import suggestion
 from flexcal.publication import current
 from flexcal.units import DEGREE, MILLIMETRE
@@ -246,8 +246,7 @@ def read_matrix(path: str | Path) -> np.ndarray:
     try:
         lines = current(path).read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as problem:
-        reason = getattr(problem, "strerror", None) or str(problem)
-        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+        raise unreadable(path, problem) from problem
     rows: list[list[float]] = []
     for number, line in enumerate(lines, start=1):
         if not line.strip() or line.lstrip().startswith("#"):

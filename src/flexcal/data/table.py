@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from flexcal.atomic import atomic_path
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.publication import current
 from flexcal.units import LARGEST
 
@@ -176,8 +176,7 @@ def _open(path: Path) -> BinaryIO:
     try:
         return current(path).open("rb")
     except OSError as problem:
-        reason = problem.strerror or str(problem)
-        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+        raise unreadable(path, problem) from problem
 
 
 def _parquet_columns(path: Path) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.data.table import Table, TableFile
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.importing.foreign_table import ForeignTable
 from flexcal.importing.header_rows import NUMBER, find_header
 
@@ -92,8 +92,7 @@ def _decoded(path: Path) -> str:
     try:
         content = path.read_bytes()
     except OSError as problem:
-        reason = problem.strerror or str(problem)
-        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+        raise unreadable(path, problem) from problem
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16", errors="replace")
     try:

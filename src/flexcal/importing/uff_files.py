@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.data.table import Table, TableFile
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.importing.foreign_table import ForeignTable
 
 _FUNCTION, _TIME_RESPONSE = 58, 1
@@ -67,8 +67,7 @@ def _require_whole(path: Path) -> None:
     try:
         content = path.read_bytes()
     except OSError as problem:
-        reason = problem.strerror or str(problem)
-        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+        raise unreadable(path, problem) from problem
     if len(_DELIMITER.findall(content)) % 2:
         raise InputError(f"{path}: its last data set has no end, so the file was cut off; export it again.")
 
