@@ -56,6 +56,9 @@ REGRESSIONS: tuple[tuple[str, str, str], ...] = (
     ("cell.yaml", "mismatch_elastic_wrist_tiny", _MEASURE),
     ("plan.yaml", "lines_0_int64", _MEASURE),
     ("plan.yaml", "number_6_huge", _MEASURE),
+    ("plan.yaml", "number_8_int64", _MEASURE),
+    ("plan.yaml", "base_frequency_hz_tiny", _MEASURE),
+    ("responses/plan.yaml", "number_10_tiny", _STIFFNESS),
     ("frequency/truth.yaml", "dynamics_values_lower.com_z_huge", f"{_MEASURE} --truth frequency/truth.yaml"),
     (
         "frequency/truth.yaml",

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from flexcal.data.periodic_schedule import check_schedule
 from flexcal.errors import FlexcalError
 
 
@@ -116,22 +117,18 @@ class MultisinePlan:
             raise FlexcalError(
                 "lines must be ascending multiples of the base frequency from 1, and none a detection line too."
             )
-        if not (self.base_frequency_hz > 0 and self.rate_hz > 0):
-            raise FlexcalError("base_frequency_hz and rate_hz must be positive.")
+        check_schedule(self)
         if 2 * lines.max() * self.base_frequency_hz >= self.rate_hz:
             raise FlexcalError(
                 f"the line {lines.max()} lies at {lines.max() * self.base_frequency_hz:g} Hz, not below half the rate of "
                 f"{self.rate_hz:g} Hz; lower the band or raise rate_hz."
             )
-        if not 0 <= self.settle_periods < self.periods:
-            raise FlexcalError(
-                f"settle_periods is {self.settle_periods} of {self.periods} periods; keep at least one."
-            )
         if self.realisations < 1:
             raise FlexcalError(f"realisations is {self.realisations}; at least one is needed.")
         if self.reference_amplitude < 0 or self.reference_frequency_hz < 0:
             raise FlexcalError("reference_amplitude and reference_frequency_hz must not be negative.")
-        if self.payload is not None and self.payload < 0:
-            raise FlexcalError(f"the payload is {self.payload:g} kg; it must not be negative.")
-        if self.seed < 0:
-            raise FlexcalError(f"the seed is {self.seed}; it must not be negative.")
+        for name in ("reference_amplitude", "reference_frequency_hz"):
+            if 0 < getattr(self, name) < 1e-9:
+                raise FlexcalError(
+                    f"{name} is {getattr(self, name):g}, too little to move; write 0 for none."
+                )

@@ -8,6 +8,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from flexcal.data.periodic_schedule import check_schedule
 from flexcal.data.trajectory_paths import FourierPaths, SplinePaths
 from flexcal.errors import FlexcalError
 
@@ -84,19 +85,10 @@ class TrajectoryPlan:
                 )
 
     def _check_values(self) -> None:
-        if not (self.base_frequency_hz > 0 and self.rate_hz > 0):
-            raise FlexcalError("base_frequency_hz and rate_hz must be positive.")
+        check_schedule(self)
         ticks = self.rate_hz / self.base_frequency_hz
         if abs(ticks - round(ticks)) > 1e-9 * ticks:
             raise FlexcalError(
                 f"a period of {1 / self.base_frequency_hz:g} s is no whole number of samples at {self.rate_hz:g} Hz; "
                 "change base_frequency_hz."
             )
-        if not 0 <= self.settle_periods < self.periods:
-            raise FlexcalError(
-                f"settle_periods is {self.settle_periods} of {self.periods} periods; keep at least one."
-            )
-        if self.payload is not None and self.payload < 0:
-            raise FlexcalError(f"the payload is {self.payload:g} kg; it must not be negative.")
-        if self.seed < 0:
-            raise FlexcalError(f"the seed is {self.seed}; it must not be negative.")

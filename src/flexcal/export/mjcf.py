@@ -10,7 +10,6 @@ placement, the length errors in the placement of the next body.
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
@@ -22,6 +21,7 @@ from flexcal.model.inertia import parallel_axis
 from flexcal.model.names import SPRINGS
 from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz
+from flexcal.mujoco_log import log_mujoco_warnings
 
 if TYPE_CHECKING:
     import mujoco
@@ -44,8 +44,7 @@ def mjcf_spec(
     """
     import mujoco
 
-    if mujoco.get_mju_user_warning() is None:  # MuJoCo would leave a MUJOCO_LOG.TXT in the current folder
-        mujoco.set_mju_user_warning(logging.getLogger("flexcal.mujoco").warning)
+    log_mujoco_warnings()
     motors = set(range(model.n)) if free is None else set(free)
     if len(motors) < model.n and q is None:
         raise FlexcalError("joints are to be locked but no pose is given; pass q, one value per joint.")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -13,6 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from flexcal.hard_cell.description import ArmDescription
 from flexcal.hard_cell.drawn import PAYLOAD_RADIUS, HardRobot
+from flexcal.mujoco_log import log_mujoco_warnings
 
 if TYPE_CHECKING:
     import mujoco
@@ -71,8 +71,7 @@ def build(
     """
     import mujoco
 
-    if mujoco.get_mju_user_warning() is None:
-        mujoco.set_mju_user_warning(logging.getLogger("flexcal.mujoco").warning)
+    log_mujoco_warnings()
     arm = robot.arm
     root = ElementTree.Element("mujoco", model="arm")
     ElementTree.SubElement(root, "compiler", angle="radian", inertiafromgeom="false", balanceinertia="true")
