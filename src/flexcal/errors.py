@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 
@@ -17,3 +19,14 @@ def unreadable(path: Path, problem: OSError | UnicodeDecodeError) -> InputError:
     """The error of a file that cannot be read, with the system's reason."""
     reason = getattr(problem, "strerror", None) or str(problem)
     return InputError(f"{path} cannot be read ({reason}); check the name and the folder.")
+
+
+@contextmanager
+def naming(path: Path) -> Iterator[None]:
+    """Within it, an error about what a file holds names that file; an `InputError` already does."""
+    try:
+        yield
+    except InputError:
+        raise
+    except FlexcalError as problem:
+        raise InputError(f"{path}: {problem}") from problem

@@ -106,7 +106,7 @@ def _usable(
         hidden = f", of which the instrument can measure {len(shown)}" if len(shown) < len(given) else ""
         raise FlexcalError(
             f"the pool holds {len(given)} poses{hidden}, and the flank of every backlash is certain in {len(usable)} of them; "
-            f"{least} cannot be chosen."
+            f"{least} cannot be chosen; give more poses or a smaller --count."
         )
     return usable
 

@@ -10,6 +10,7 @@ from flexcal.errors import FlexcalError
 Triple = tuple[float, float, float]
 Bearings = Literal["before", "after"]
 """Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
+_LEAST_PRIOR = 1e-12
 
 
 @dataclass(frozen=True)
@@ -102,15 +103,16 @@ class PriorConfig:
     parameters: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        if min(self.mass, self.com, self.torque_constant) < 0:
-            raise FlexcalError(
-                "the prior's mass, com and torque_constant must not be negative (0: known exactly)."
-            )
+        for name in ("mass", "com", "torque_constant"):
+            if getattr(self, name) < 0 or 0 < getattr(self, name) < _LEAST_PRIOR:
+                raise FlexcalError(
+                    f"the prior's {name} must be 0 (known exactly) or at least {_LEAST_PRIOR:g}, not {getattr(self, name):g}."
+                )
         single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
         named = single | {"length": self.length, "angle": self.angle} | self.parameters
         for name, value in named.items():
-            if value is not None and not value > 0:
-                raise FlexcalError(f"the prior's {name} must be positive, not {value:g}.")
+            if value is not None and not value >= _LEAST_PRIOR:
+                raise FlexcalError(f"the prior's {name} must be at least {_LEAST_PRIOR:g}, not {value:g}.")
 
 
 @dataclass(frozen=True)

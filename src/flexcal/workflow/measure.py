@@ -21,7 +21,7 @@ from flexcal.data import (
     write_recordings,
 )
 from flexcal.data.experiment_folder import PLAN
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import InputError, naming
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.workflow.design_poses import VERIFICATION
@@ -96,12 +96,8 @@ def measure(
         result = Measurement(out, plan.kind, plan.name, _measure_poses(source, plan, out, progress), 0, False)
     else:
         total = len(list(labels(plan)))
-        try:
+        with naming(plan_file):
             write_recordings(out, plan, _counted(source.record(plan), total, progress))
-        except InputError:
-            raise
-        except FlexcalError as problem:
-            raise InputError(f"{plan_file} cannot be carried out: {problem}") from None
         poses = len(plan.poses) if isinstance(plan, MultisinePlan) else 0
         loaded = plan.payload != 0 and model.payload is not None
         result = Measurement(out, plan.kind, plan.name, poses, total, loaded)

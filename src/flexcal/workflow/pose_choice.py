@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import nullcontext
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ from flexcal.design import (
     working_box,
     working_points,
 )
-from flexcal.errors import InputError
+from flexcal.errors import InputError, naming
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.progress import Progress
 
@@ -59,16 +60,17 @@ class PoseChoice:
             if isinstance(candidates, Path)
             else candidates
         )
-        found = pose_candidates(
-            model,
-            rng=rng,
-            candidates=given,
-            least=least,
-            setup=MeasuringSetup.declared(model, payload),
-            working=None if place is None else place.q,
-            checker=checker,
-            progress=progress,
-        )
+        with naming(candidates) if isinstance(candidates, Path) else nullcontext():
+            found = pose_candidates(
+                model,
+                rng=rng,
+                candidates=given,
+                least=least,
+                setup=MeasuringSetup.declared(model, payload),
+                working=None if place is None else place.q,
+                checker=checker,
+                progress=progress,
+            )
         files = [candidates] if isinstance(candidates, Path) else []
         if (file := working_file(working)) is not None:
             files.append(file)
