@@ -112,6 +112,11 @@ REGRESSIONS: tuple[tuple[str, str, str], ...] = (
         for line in (f"{IMPORT} measured.uff", f"{RESPONSE} measured.uff")
     ),
     ("log.csv", "line_1_column_4_huge", f"{RESPONSE} log.csv"),
+    ("log.csv", "line_1_column_5_minus_huge", f"{RESPONSE} log.csv"),
+    ("log.csv", "line_1_column_6_digits", f"{RESPONSE} log.csv"),
+    ("others.csv", "one_row", _MAP),
+    ("poses.csv", "two_rows", "design poses robot.yaml --from poses.csv --count 5 --out new.yaml"),
+    ("robot.yaml", "prior_mass_tiny", CALIBRATE),
     ("log.csv", "line_1_column_4_underscore", f"{RESPONSE} log.csv"),
     ("results/.flexcal", "a_program", "calibrate robot.yaml poses.csv --terms kinematic --out results"),
 )

@@ -237,6 +237,12 @@ def _own_unit(column: str) -> str | None:
     return "N m" if column.rstrip("0123456789") == "tau" and column[-1:].isdigit() else None
 
 
+def _spread(foreign: ForeignTable, column: str) -> float:
+    """Standard deviation of a column, infinite or NaN where its numbers are too large for one."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(np.nanstd(foreign.numbers[column]))
+
+
 def _guessed_inputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> list[ResponseColumn]:
     """All columns of the most telling kind there is, measured ones before commanded ones, without those that hardly change."""
     kinds = [dict(KINDS)["tau"], _FORCE, dict(KINDS)["current"], _DRIVE]
@@ -248,7 +254,7 @@ def _guessed_inputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> li
             continue
         best = min(rank(free[column].words) for column in found)
         found = [column for column in found if rank(free[column].words) == best]
-        spread = {column: float(np.nanstd(foreign.numbers[column])) for column in found}
+        spread = {column: _spread(foreign, column) for column in found}
         largest = max(spread.values())
         columns = [column for column in found if largest > 0 and spread[column] > _QUIET * largest]
         result = []
@@ -263,7 +269,7 @@ def _guessed_references(
     foreign: ForeignTable, free: Mapping[str, ColumnName], inputs: int
 ) -> list[ResponseColumn]:
     """Signals that were added in a loop, else commanded positions, that move; none unless there is one for every input."""
-    moving = {column: name for column, name in free.items() if float(np.nanstd(foreign.numbers[column])) > 0}
+    moving = {column: name for column, name in free.items() if _spread(foreign, column) > 0}
     added = [column for column, name in moving.items() if set(name.words) & _ADDED]
     commanded = [
         column
@@ -287,7 +293,7 @@ def _guessed_outputs(foreign: ForeignTable, free: Mapping[str, ColumnName]) -> l
         if not set(name.words) & _NO_OUTPUT
         and not set(name.words) & (dict(KINDS)["tau"] | dict(KINDS)["current"] | _FORCE)
         and (item := _output(column, name)) is not None
-        and float(np.nanstd(foreign.numbers[column])) > 0
+        and _spread(foreign, column) > 0
     ]
     if not found:
         return []

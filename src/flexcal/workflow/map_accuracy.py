@@ -27,7 +27,7 @@ from flexcal.calibration import (
 from flexcal.data import page_beside
 from flexcal.data.table import write_table
 from flexcal.design import CollisionChecker
-from flexcal.errors import InputError
+from flexcal.errors import InputError, naming
 from flexcal.estimates_file import provenance
 from flexcal.progress import Progress, silent
 from flexcal.report.accuracy_map import MapStudy, write_map_page
@@ -253,7 +253,9 @@ def _verified(
         named = " and ".join(str(file) for file in files)
         raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
     before = robot_before(calibrated.nominal, poses).errors(poses)
-    return error_scale(found, covariance), before, found, fitted_among(calibrated, files, poses), sample
+    with naming(files[0]):
+        scale = error_scale(found, covariance)
+    return scale, before, found, fitted_among(calibrated, files, poses), sample
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:
