@@ -28,9 +28,9 @@ import polars as pl
 from flexcal.data import MultisinePlan, Recording, labels, write_plan, write_recording
 from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.export.mjcf import carried_inertias
 from flexcal.frequency import multisine
 from flexcal.model import RobotModel, inertial_parameters, tool_at_rest, torque_regressor
+from flexcal.model.held_payload import carried_inertias
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 ROWS = (100_000, 1_000_000)

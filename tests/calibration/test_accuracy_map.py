@@ -24,10 +24,10 @@ from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.config import Bearings
 from flexcal.model.joint_space import joint_ranges
 from flexcal.model.names import unit_of
 from flexcal.model.posterior import Posterior
+from flexcal.model.tree import Bearings
 
 STD = {
     "offset": 3e-5, "misalignment_1": 3e-5, "misalignment_2": 3e-5, "length_x": 2e-5, "length_y": 2e-5, "length_z": 2e-5,

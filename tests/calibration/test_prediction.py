@@ -9,8 +9,8 @@ import pytest
 from flexcal.calibration import predict
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
-from flexcal.model.loading import kinematic_tree
 from flexcal.model.names import GEOMETRY
+from flexcal.model.tree import kinematic_tree
 
 
 @pytest.fixture(params=["after", "before"])

@@ -11,7 +11,6 @@ from flexcal.cell.resolution import resolved_plant
 from flexcal.cell.rest import rest
 from flexcal.cell.truth import draw_truth
 from flexcal.model import RobotModel, static_equilibrium
-from flexcal.model.further_springs import with_drive_springs
 from flexcal.model.linearisation import linearise as pinocchio_linearise
 from flexcal.units import DEGREE
 
@@ -51,7 +50,7 @@ def test_mass_damping_stiffness_and_gravity_are_pinocchios(
     config = CellConfig(mismatch=MismatchConfig(elastic_wrist=wrist))
     plant = build_plant(truth, config, q=POSE, free=(0, 1, 2), payload=payload)
     if wrist > 0:
-        truth = with_drive_springs(truth, dict.fromkeys((3, 4, 5), (wrist, WRIST_DAMPING * wrist)))
+        truth = truth.with_drive_springs(dict.fromkeys((3, 4, 5), (wrist, WRIST_DAMPING * wrist)))
     found = rest(plant, mujoco.MjData(plant.mjmodel), POSE[:3])
     ours = linearise(plant, found.position)
     theirs = pinocchio_linearise(truth, POSE, payload)

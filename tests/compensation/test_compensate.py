@@ -16,8 +16,8 @@ from flexcal.compensation import best_posture, compensate
 from flexcal.data import PosePlan, PoseSet, ToolTargets
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel, point_kinematics, tool_at_rest
-from flexcal.model.config import Bearings
 from flexcal.model.rotations import rotation_vector, vector_rotation
+from flexcal.model.tree import Bearings
 
 MICROMETRE = 1e-6
 EASY = np.array([0.3, 0.5, 1.2, 0.4, 0.9, -0.5])

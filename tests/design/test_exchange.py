@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flexcal.design import DOptimal, SpectralCriterion, TraceOptimal, exchange, greedy
-from flexcal.design.exchange_algorithm import RankUpdates
+from flexcal.design.rank_updates import RankUpdates
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 

@@ -9,8 +9,8 @@ import pytest
 
 from flexcal.elasticity import Tolerances, identify_stiffness
 from flexcal.model import RobotModel
-from flexcal.model.config import Bearings
 from flexcal.model.names import spring_names
+from flexcal.model.tree import Bearings
 
 
 @pytest.mark.parametrize("true", ["before", "after"])

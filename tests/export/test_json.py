@@ -11,8 +11,8 @@ import pytest
 from flexcal.estimation import Parameter, Parameters
 from flexcal.export.json_document import render_json
 from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.config import Bearings
 from flexcal.model.posterior import Posterior
+from flexcal.model.tree import Bearings
 
 
 def stand(

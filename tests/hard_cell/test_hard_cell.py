@@ -16,7 +16,6 @@ from flexcal.errors import FlexcalError
 from flexcal.hard_cell import HardCell, counterparts, draw_robot, read_description
 from flexcal.hard_cell.drawn import ideal_robot
 from flexcal.model import RobotModel
-from flexcal.model.further_springs import with_drive_springs
 from flexcal.workflow.demo_cells import open_cell
 from flexcal.workflow.frequency_plans import frequency_plan
 
@@ -145,7 +144,7 @@ def test_drawn_links_err_in_shape_independently_of_mass(robot: Path) -> None:
 def test_counterparts_are_parameters_of_the_model(robot: Path, tx90l: RobotModel) -> None:
     cell = HardCell.drawn(robot, 1)
     values = counterparts(cell.robot)
-    assert set(values) <= set(with_drive_springs(tx90l, dict.fromkeys((3, 4, 5), (1e5, 10.0))).values)
+    assert set(values) <= set(tx90l.with_drive_springs(dict.fromkeys((3, 4, 5), (1e5, 10.0))).values)
     assert sum(name.endswith(".stiffness") for name in values) == 12
     assert not any("length" in name or "angle" in name for name in values)
 

@@ -10,9 +10,9 @@ import pinocchio as pin
 import pytest
 
 from flexcal.model import RobotModel, point_kinematics, static_equilibrium
-from flexcal.model.config import Bearings
 from flexcal.model.equilibrium import gravity_moments
 from flexcal.model.names import LATERAL
+from flexcal.model.tree import Bearings
 
 Q = np.random.default_rng(4).uniform(-2, 2, (20, 6))
 

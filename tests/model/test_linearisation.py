@@ -6,10 +6,9 @@ from scipy.linalg import eigh
 
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
-from flexcal.model.config import Bearings
-from flexcal.model.further_springs import with_drive_springs
 from flexcal.model.linearisation import linearise
 from flexcal.model.transfer import transfer_matrix
+from flexcal.model.tree import Bearings
 from flexcal.units import DEGREE
 
 LINES = np.arange(3.25, 80, 2.0)
@@ -62,7 +61,7 @@ def test_every_derivative_of_the_transfer_matrix(tx90l: RobotModel, bearings: Be
 
 def test_derivatives_by_the_springs_of_a_braked_wrist(tx90l: RobotModel) -> None:
     q = np.array([0.3, 0.7, -0.4, 0.5, 0.6, 0.2])
-    wrist = with_drive_springs(tx90l, dict.fromkeys((3, 4, 5), (5e4, 50.0)))
+    wrist = tx90l.with_drive_springs(dict.fromkeys((3, 4, 5), (5e4, 50.0)))
     robot = wrist.with_values({"joint_4.held_inertia": 0.2})
     names = [
         f"joint_{i}.{key}" for i in (4, 5, 6) for key in ("drive.stiffness", "drive.damping", "held_inertia")

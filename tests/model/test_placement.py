@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.loading import kinematic_tree
 from flexcal.model.names import GEOMETRY
 from flexcal.model.placement import link_placement, point_placement
+from flexcal.model.tree import kinematic_tree
 
 
 @pytest.mark.parametrize("slides", [(), (0,), (2, 4), (5,)])

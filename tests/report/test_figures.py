@@ -10,18 +10,15 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from flexcal.calibration.arm_shapes import skeletons
 from flexcal.design.skeleton import joint_origins
 from flexcal.model import RobotModel
 from flexcal.report import TwoStageStudy
-from flexcal.report.figures.arm_poses import skeletons
+from flexcal.report.figures.calibration_errors import ErrorSeries, error_components, verification_errors
 from flexcal.report.figures.canvas import canvas, decades
-from flexcal.report.figures.error_components import error_components
-from flexcal.report.figures.predicted_quantiles import expected_quantiles, predicted_quantiles
-from flexcal.report.figures.response_fit import response_fit, sensor_fit
-from flexcal.report.figures.response_levels import response_levels
-from flexcal.report.figures.singular_values import singular_values
-from flexcal.report.figures.spring_intervals import spring_intervals
-from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
+from flexcal.report.figures.error_distribution import expected_quantiles, predicted_quantiles
+from flexcal.report.figures.parameter_bars import singular_values, spring_intervals
+from flexcal.report.figures.response_fit import response_fit, response_levels, sensor_fit
 from flexcal.report.palette import INK, PAGE
 from flexcal.report.sections.geometry import exaggeration
 

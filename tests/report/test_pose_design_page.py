@@ -8,9 +8,7 @@ import pytest
 from flexcal.design import joint_origins
 from flexcal.model import RobotModel, point_kinematics
 from flexcal.report.figures.arm_poses import links_at
-from flexcal.report.figures.joint_positions import joint_positions
-from flexcal.report.figures.plan_space import plan_space
-from flexcal.report.figures.pose_numbers import pose_numbers
+from flexcal.report.figures.joint_positions import joint_positions, plan_space, pose_numbers
 from flexcal.report.pose_design import PoseStudy, pose_checks, pose_page
 
 ORIGIN = {"provenance": {"input.robot.yaml": "0123"}, "command": "flexcal design poses robot.yaml"}

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify, verify_jointly
+from flexcal.calibration.arm_shapes import arms_at
 from flexcal.data import MultisinePlan, PoseSet, write_plan
 from flexcal.elasticity import StiffnessResult
 from flexcal.estimates_file import Block, write_estimates
@@ -19,15 +20,15 @@ from flexcal.model import RobotModel
 from flexcal.model.linearisation import linearise
 from flexcal.model.names import GEOMETRY, SPRINGS, spring_names
 from flexcal.model.transfer import transfer_matrix
-from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.fitted_response import fitted_responses
 from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.units import DEGREE
 from flexcal.workflow.fitted_files import write_fitted
 from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.results import write_results
-from flexcal.workflow.two_stage_results import two_stage_document, write_verification
+from flexcal.workflow.two_stage_results import two_stage_document
 from flexcal.workflow.two_stage_run import TwoStageRun
+from flexcal.workflow.verification_points import write_verification
 
 DEFAULT_POSES_DEG = (
     (0, -28.6, -94.3, 37.3, -98.1, 0),

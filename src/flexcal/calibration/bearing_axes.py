@@ -13,7 +13,7 @@ from flexcal.calibration.geometric_calibration import Calibration
 from flexcal.errors import FlexcalError
 from flexcal.estimation.vuong import vuong_statistic
 from flexcal.model import RobotModel
-from flexcal.model.config import Bearings
+from flexcal.model.tree import Bearings
 
 _CERTAIN = 3.0
 """Vuong's statistic from which the preference is no chance."""

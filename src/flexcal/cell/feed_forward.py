@@ -8,8 +8,8 @@ import numpy as np
 
 from flexcal.cell.config import CellConfig
 from flexcal.cell.plant import Plant, gravity_stiffness, linearise
-from flexcal.export.mjcf import carried_inertias
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
+from flexcal.model.held_payload import carried_inertias
 
 
 def inverse_dynamics(

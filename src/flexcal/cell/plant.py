@@ -18,7 +18,6 @@ from flexcal.errors import FlexcalError
 from flexcal.export.mjcf import mjcf_spec
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
-from flexcal.model.further_springs import with_drive_springs
 
 if TYPE_CHECKING:
     import mujoco
@@ -104,7 +103,7 @@ def build_plant(
     wrist = rigid if config.mismatch.elastic_wrist > 0 else set()
     if wrist:
         stiffness = config.mismatch.elastic_wrist
-        model = with_drive_springs(model, dict.fromkeys(wrist, (stiffness, WRIST_DAMPING * stiffness)))
+        model = model.with_drive_springs(dict.fromkeys(wrist, (stiffness, WRIST_DAMPING * stiffness)))
     spec = mjcf_spec(model, q=q, free=free, payload=payload)
     for sensor in sensors:
         spec.body(model.joints[sensor.joint].link).add_site(name=sensor_site(sensor), pos=sensor.xyz)

@@ -2,7 +2,7 @@ from .accuracy_curve import PoseCurve, pose_curve
 from .candidates import random_candidates
 from .collision import CollisionChecker
 from .criteria import Criterion, DOptimal, Observability, SpectralCriterion, TraceOptimal, observability
-from .exchange_algorithm import Selection, exchange, greedy
+from .exchange_algorithm import exchange
 from .feasible_poses import PoseCandidates, pose_candidates
 from .geometry_sensitivity import (
     BaseSensitivity,
@@ -14,6 +14,7 @@ from .geometry_sensitivity import (
 from .next_best import NextPoses, next_poses
 from .poses import CriterionName, PoseDesign, choose_poses, design_poses, fewest_poses, random_poses
 from .preload import preloaded
+from .rank_updates import Selection, greedy
 from .sequences import Stage, sequence
 from .setup import MeasuringSetup, TrackerNoise
 from .skeleton import joint_origins, link_frames

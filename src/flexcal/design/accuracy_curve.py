@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.design.criteria import TraceOptimal
-from flexcal.design.exchange_algorithm import greedy
 from flexcal.design.poses import PoseDesign, tool_error
+from flexcal.design.rank_updates import greedy
 from flexcal.errors import FlexcalError
 from flexcal.progress import Progress, silent
 

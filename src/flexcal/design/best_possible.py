@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.design.criteria import TraceOptimal
-from flexcal.design.exchange_algorithm import greedy
+from flexcal.design.rank_updates import greedy
 from flexcal.estimation import Sensitivity
 
 LOOKED_AT = 2000

@@ -8,8 +8,9 @@ import numpy as np
 
 from flexcal.data import MultisinePlan
 from flexcal.design.collision import CollisionChecker
-from flexcal.design.exchange_algorithm import exchange, greedy
+from flexcal.design.exchange_algorithm import exchange
 from flexcal.design.frequency_candidates import ExcitablePoses
+from flexcal.design.rank_updates import greedy
 from flexcal.design.response_noise import COMMON_SENSORS, ResponseSensors
 from flexcal.design.response_sensitivity import response_parameters, response_sensitivity
 from flexcal.design.spring_criterion import largest_stiffness_std, spring_criterion

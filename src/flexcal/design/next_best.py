@@ -9,10 +9,10 @@ import numpy as np
 from flexcal.data import PoseSet
 from flexcal.design.best_possible import least_trace
 from flexcal.design.criteria import DOptimal, TraceOptimal
-from flexcal.design.exchange_algorithm import greedy
 from flexcal.design.feasible_poses import PoseCandidates
 from flexcal.design.geometry_sensitivity import BLOCK, geometry_jacobian, measuring_noise
 from flexcal.design.poses import CriterionName, PoseDesign, criterion_named, tool_error
+from flexcal.design.rank_updates import greedy
 from flexcal.design.setup import MeasuringSetup
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity

@@ -18,10 +18,10 @@ from flexcal.design.criteria import (
     TraceOptimal,
     observability,
 )
-from flexcal.design.exchange_algorithm import Selection, greedy
 from flexcal.design.feasible_poses import PoseCandidates, pose_candidates
 from flexcal.design.geometry_sensitivity import BaseSensitivity
 from flexcal.design.preload import preload_joints
+from flexcal.design.rank_updates import Selection, greedy
 from flexcal.design.setup import STANDARD, MeasuringSetup
 from flexcal.design.shortlist import choose
 from flexcal.errors import FlexcalError

@@ -10,7 +10,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.design.criteria import Criterion, SpectralCriterion
-from flexcal.design.exchange_algorithm import CHOOSING, Selection, exchange
+from flexcal.design.exchange_algorithm import exchange
+from flexcal.design.rank_updates import CHOOSING, Selection
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 

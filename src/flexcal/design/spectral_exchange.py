@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from flexcal.design.criteria import DOptimal, SpectralCriterion, TraceOptimal
-from flexcal.design.exchange_algorithm import CHOOSING, Selection, exchange, greedy
+from flexcal.design.rank_updates import CHOOSING, Selection, greedy, rank_exchange
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
@@ -111,7 +111,7 @@ def spectral_exchange(
     too small has σ_min = 0 and σ_min has many local optima; the better result counts.
     """
     if criterion.name == "O1":
-        found = exchange(
+        found = rank_exchange(
             sensitivity, count, DOptimal(uses_prior=False), start=start, passes=passes, progress=progress
         )
         merits = np.exp(0.5 * np.array(found.history))
@@ -132,7 +132,7 @@ def _starts(sensitivity: Sensitivity, count: int) -> tuple[np.ndarray, np.ndarra
     """The greedy and the exchanged A-optimal set."""
     smooth = TraceOptimal(np.eye(sensitivity.jacobian.shape[2]), "A", uses_prior=False)
     first = greedy(sensitivity, count, smooth).chosen
-    return first, exchange(sensitivity, count, smooth, start=first).chosen
+    return first, rank_exchange(sensitivity, count, smooth, start=first).chosen
 
 
 def _from(

@@ -8,8 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.estimation import Identifiability, analyse
-from flexcal.export.mjcf import carried_inertias
 from flexcal.model import RobotModel, inertial_names, inertial_parameters, torque_regressor
+from flexcal.model.held_payload import carried_inertias
 from flexcal.model.regressor import write_torque_regressor
 from flexcal.model.regressor_adjoint import placed_regressor_adjoint
 

@@ -22,6 +22,7 @@ from .drive_terms import (
 from .ekf import kalman_filter
 from .elimination import EssentialParameters, essential_parameters
 from .energy_model import energy_least_squares
+from .experiment import Experiment, Window
 from .feasible import feasible_least_squares
 from .friction_choice import Candidate, Trial
 from .friction_library import AsymmetricCoulomb, LoadCoulomb, Presliding, Stribeck, SublinearViscous, WarmUp
@@ -56,7 +57,6 @@ from .recorded_rows import RecordedRows
 from .regression import RegressionData, Subsystem, batches_each, observe
 from .residual_learning import BlockErrors, learn_residual
 from .robot_prior import RobotPrior
-from .rows import Experiment, Window
 from .sensor_offset import SensorOffset
 from .sensor_share import ExternalExcess, ExternalShare, external_share
 from .simulated_experiment import SimulatedExperiment

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Column, Memory
+from flexcal.dynamics.experiment import Experiment
 from flexcal.dynamics.motion import Motion, stretches
-from flexcal.dynamics.rows import Experiment
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 from flexcal.model.declared import uncertain_inertials

@@ -10,7 +10,8 @@ import numpy as np
 
 from flexcal.data.filtering import Decimation
 from flexcal.dynamics.equations import Equations
-from flexcal.dynamics.rows import Experiment, Rows, Window, rows
+from flexcal.dynamics.experiment import Experiment, Window
+from flexcal.dynamics.rows import Rows, rows
 from flexcal.dynamics.triangle import triangular
 from flexcal.errors import FlexcalError
 from flexcal.kernels import append

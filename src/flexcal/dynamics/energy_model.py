@@ -15,7 +15,7 @@ from flexcal.dynamics.scalar_equations import ScalarEquations
 from flexcal.dynamics.wls import noise_levels
 from flexcal.estimation import Estimate
 from flexcal.model import energy_regressor
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _WINDOW = 0.1
 """From one border to the other, s."""

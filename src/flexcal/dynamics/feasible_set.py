@@ -11,8 +11,8 @@ from flexcal.dynamics.cone import Cone
 from flexcal.dynamics.equations import Equations
 from flexcal.dynamics.triangle import Triangle
 from flexcal.model import Inertia, RobotModel
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.pseudo_inertia import PSEUDO_INERTIA, pseudo_inertia
-from flexcal.model.regressor import INERTIAL
 
 _LINK_FLOOR = 1e-3
 _DRIVE_FLOOR = 1e-5

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.dynamics.drive_terms import Memory
+from flexcal.dynamics.experiment import Experiment, Window
 from flexcal.dynamics.motion import Motion, stretches
 from flexcal.dynamics.observation import Observation
-from flexcal.dynamics.rows import Experiment, Window
 
 _STEP = 2e-3
 """s, at most, unless samples are farther apart."""

@@ -25,7 +25,7 @@ from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.wls import weighted_least_squares
 from flexcal.model import RobotModel
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _CLASSIC = ("viscous", "coulomb", "torque_offset")
 

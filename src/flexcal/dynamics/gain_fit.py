@@ -14,7 +14,7 @@ from flexcal.dynamics.triangle import Triangle, triangular
 from flexcal.dynamics.wls import noise_levels
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _SETTLED = 1e-6
 """Largest relative change of a gain that ends the iteration."""

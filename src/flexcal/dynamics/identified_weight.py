@@ -11,7 +11,7 @@ from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
 from flexcal.estimation.student import student_quantile
 from flexcal.model import torque_regressor
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _POSES = 300
 _LEAST = 0.1

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.estimation import analyse
 from flexcal.model import RobotModel, inertial_names, torque_regressor
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _SEED = 1991
 _SAMPLES_PER_COLUMN = 3

@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.dynamics.batched_equations import Batch, ExperimentSystem, reduced
+from flexcal.dynamics.experiment import Experiment
 from flexcal.dynamics.joint_log import JointLog, log_blocks
 from flexcal.dynamics.motion import Motion, filtered_motion
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData
-from flexcal.dynamics.rows import Experiment, Rows, rows
+from flexcal.dynamics.rows import Rows, rows
 from flexcal.errors import FlexcalError
 from flexcal.model import RobotModel
 

@@ -17,7 +17,8 @@ from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.sensor_offset import SensorOffset
 from flexcal.dynamics.tilted_arm import TiltedArm
 from flexcal.model import RobotModel, inertial_names, torque_regressor
-from flexcal.model.regressor import INERTIAL, write_torque_regressor
+from flexcal.model.inertia import INERTIAL
+from flexcal.model.regressor import write_torque_regressor
 
 
 @dataclass(frozen=True, eq=False)

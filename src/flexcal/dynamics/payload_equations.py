@@ -14,8 +14,8 @@ from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.robot_prior import FRICTION, RobotPrior
 from flexcal.dynamics.triangle import triangular
 from flexcal.model import Payload
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.pseudo_inertia import PSEUDO_INERTIA
-from flexcal.model.regressor import INERTIAL
 
 FRICTION_CHANGE = 0.2
 """1σ of what warmth and load change of friction from one recording to another, relative to Coulomb and viscous friction; and of a torque

@@ -22,8 +22,8 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
 from flexcal.estimation.student import student_quantile
 from flexcal.model import Payload
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.names import INERTIALS, MOMENTS, unit_of
-from flexcal.model.regressor import INERTIAL
 
 BODY = (*INERTIALS, *MOMENTS)
 """Of a payload in its frame: inertia about the centre of mass."""

@@ -11,9 +11,10 @@ from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.batched_equations import ExperimentSystem, batch_length, batched, experiment_system
 from flexcal.dynamics.equations import Equations
+from flexcal.dynamics.experiment import Experiment, Window
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.regression import RegressionData, batches_each
-from flexcal.dynamics.rows import Experiment, Rows, Window, rows
+from flexcal.dynamics.rows import Rows, rows
 from flexcal.dynamics.simulated_experiment import SimulatedExperiment
 from flexcal.errors import FlexcalError
 

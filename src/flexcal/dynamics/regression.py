@@ -12,9 +12,9 @@ from flexcal.data.filtering import Decimation
 from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.batched_equations import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
 from flexcal.dynamics.equations import Equations
-from flexcal.dynamics.rows import Experiment, Window
+from flexcal.dynamics.experiment import Experiment, Window
 from flexcal.dynamics.triangle import Triangle
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _SILENT = 1e-9
 """A column smaller than this beside the largest of its kind is zero."""

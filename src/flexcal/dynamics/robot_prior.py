@@ -10,8 +10,8 @@ from flexcal.dynamics.base_parameters import BaseParameters
 from flexcal.dynamics.observation import Observation
 from flexcal.estimation import Estimate, Parameters
 from flexcal.model.declared import declared
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.names import PARALLEL
-from flexcal.model.regressor import INERTIAL
 
 FRICTION = ("viscous", "coulomb", "torque_offset")
 _STEP = 1e-4

@@ -5,55 +5,19 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.equations import Equations
+from flexcal.dynamics.experiment import Experiment, Window
 from flexcal.dynamics.motion import AT_REST, Motion, stretches
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
 _STANDSTILL = 0.01
 """A joint stands still below this share of its largest speed in the recording, and where it is at rest."""
-
-
-class Experiment(Protocol):
-    """One recording; it can be gone through again and again."""
-
-    @property
-    def name(self) -> str:
-        """What messages call it."""
-        ...
-
-    @property
-    def samples(self) -> int:
-        """How many there are."""
-        ...
-
-    @property
-    def top_speed(self) -> np.ndarray:
-        """The largest |q̇| of every joint (n,)."""
-        ...
-
-    @property
-    def cutoff_hz(self) -> float:
-        """Of the low-pass that its positions went through, infinite where they went through none."""
-        ...
-
-    def blocks(self) -> Iterator[Motion]:
-        """The motion in parts that follow each other."""
-        ...
-
-
-@dataclass(frozen=True)
-class Window:
-    """Rows from `start` to before `end`, s on the recording's clock."""
-
-    start: float = -math.inf
-    end: float = math.inf
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,9 +12,9 @@ import numpy as np
 from flexcal.data.filtering import Decimation
 from flexcal.data.low_pass import LowPass
 from flexcal.dynamics.closed_loop import ClosedLoop, Target
+from flexcal.dynamics.experiment import Experiment
 from flexcal.dynamics.motion import BESIDE, Motion, differences, smoothed, stretches
 from flexcal.dynamics.observation import Observation
-from flexcal.dynamics.rows import Experiment
 from flexcal.dynamics.simulated_robot import SimulatedRobot
 
 _PATH = 0.1

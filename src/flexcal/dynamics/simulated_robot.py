@@ -11,7 +11,7 @@ from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.errors import FlexcalError
 from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _PINOCCHIO = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
 """Pinocchio's order of the ten parameters, which has Iyy before Ixz; it takes those that no body has, too."""

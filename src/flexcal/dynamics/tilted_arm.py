@@ -9,9 +9,9 @@ import numpy as np
 from flexcal.dynamics.motion import Motion
 from flexcal.kernels import Tree
 from flexcal.model import RobotModel
-from flexcal.model.loading import bearing_frame
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.placement import joint_placement
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.tree import bearing_frame
 
 _TURNED = {2: (0, 1, 2), 1: (2, 0, 1), 0: (1, 2, 0)}
 """Axes of the bearing frame in cyclic order, that of the coordinate last."""

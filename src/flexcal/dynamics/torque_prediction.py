@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.filtering import Decimation
+from flexcal.dynamics.experiment import Experiment, Window
 from flexcal.dynamics.observation import Observation
-from flexcal.dynamics.rows import Experiment, Window, rows
+from flexcal.dynamics.rows import rows
 
 _LONGEST_SEGMENT = 512
 _SEGMENTS = 4

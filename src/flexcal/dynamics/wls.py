@@ -8,7 +8,7 @@ from flexcal.dynamics.linear_fit import Unknowns, linear_fit, weighted_system
 from flexcal.dynamics.regression import RegressionData, Subsystem
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 
 _FIRST, _ROUNDS = 1e-2, 3
 """Noise to begin with of equations that nobody drives, over what their links ask, and how often it is renewed."""

@@ -14,7 +14,6 @@ from flexcal.elasticity.score_test import asks_for
 from flexcal.estimation import profile_rise
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.further_springs import with_drive_springs
 from flexcal.model.linearisation import linearise
 
 DAMPING_RATIO = 0.1
@@ -43,7 +42,7 @@ class HeldJoints:
         ]
         if not rigid:
             return cls({})
-        held = with_drive_springs(model, dict.fromkeys(rigid, (1e12, 0.0)))
+        held = model.with_drive_springs(dict.fromkeys(rigid, (1e12, 0.0)))
         axes = [(e.index, c) for e in held.elastic for c in e.components]
         rows = [len(held.driven) + axes.index((i, 2)) for i in rigid]
         inertia = np.median(
@@ -74,7 +73,7 @@ class HeldJoints:
         residual, parameters = fit.residual, fit.estimate.parameters
         base, columns = residual.model.responses(fit.x), []
         for i, (stiffness, _) in self.springs.items():
-            yielding = with_drive_springs(model, {i: (NEARLY_RIGID * stiffness, 0.0)})
+            yielding = model.with_drive_springs({i: (NEARLY_RIGID * stiffness, 0.0)})
             moved = ResponseModel(yielding, parameters, residual.model.poses).responses(fit.x)
             none = np.empty(0, dtype=int)
             columns.append(

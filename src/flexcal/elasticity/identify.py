@@ -23,7 +23,6 @@ from flexcal.estimation import Estimate, solve
 from flexcal.estimation.uncertainty import known_to_a_factor_of_two
 from flexcal.frequency import FrequencyResponse
 from flexcal.model import RobotModel
-from flexcal.model.further_springs import with_brakes, with_drive_springs
 from flexcal.model.names import INERTIALS, spring_names
 from flexcal.progress import Progress, silent
 
@@ -127,7 +126,7 @@ def identify_stiffness(
     )
     check_responses(model, responses)
     check_sensors(model, responses)
-    model = with_brakes(model, responses[0].joints)
+    model = model.with_brakes(responses[0].joints)
     search = MultiStart() if search is None else search
     x = search.find(model, responses, *data.parameters(model), rng, progress)
     progress("fitting", 0.0)
@@ -185,7 +184,7 @@ def _with_held_joints(
     """The robot with springs at those of the `held` joints for which the data ask, and its fit; the same robot and None for none."""
     values: dict[str, float] = {}
     while held.springs:
-        wider = with_drive_springs(model, held.springs)
+        wider = model.with_drive_springs(held.springs)
         parameters = data.parameters(wider)[0]
         if values:
             x = parameters.coordinates({name: values[name] for name in parameters.names})

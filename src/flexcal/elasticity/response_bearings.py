@@ -9,7 +9,7 @@ from flexcal.elasticity.fit import ResponseData, ResponseFit, first_fit, fit_res
 from flexcal.errors import FlexcalError
 from flexcal.estimation.vuong import vuong_statistic
 from flexcal.model import RobotModel
-from flexcal.model.config import Bearings
+from flexcal.model.tree import Bearings
 
 CERTAIN = 3.0
 """Vuong's statistic from which a preference is no chance."""

@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model import Inertia, RobotModel
-from flexcal.model.inertia import parallel_axis
+from flexcal.model import RobotModel
+from flexcal.model.held_payload import carried_inertias
 from flexcal.model.names import SPRINGS
 from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz
@@ -70,26 +70,6 @@ def mjcf_spec(
         joint, position, rotation = point_placement(model, name)
         bodies[joint].add_site(name=name, pos=position, quat=rotation_wxyz(rotation))
     return spec
-
-
-def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
-    """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
-    held = model.payload
-    if held is None:
-        if payload:
-            raise FlexcalError(
-                f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`."
-            )
-        return model.inertias
-    mass = held.mass if payload is None else payload
-    if mass == 0:
-        return model.inertias
-    link, own = model.inertias[held.joint], held.carried(mass)
-    total = link.mass + mass
-    com = (link.mass * link.com + mass * own.com) / total
-    inertia = link.inertia + own.inertia
-    inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, own.com - com)
-    return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
 
 
 def _add_joints(

@@ -3,13 +3,34 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from flexcal.data.table import tables_in
+import numpy as np
+
+from flexcal.data.table import Table, tables_in
+from flexcal.data.timestamps import seconds_of
 from flexcal.errors import InputError
 from flexcal.importing.foreign_table import ForeignTable
-from flexcal.importing.timestamps import with_times
 from flexcal.publication import refuse_stream
+
+
+def with_times(foreign: ForeignTable) -> ForeignTable:
+    """`foreign` with texts most of which are timestamps as seconds from the first of their column, named in `times`."""
+    found = {}
+    for name, texts in foreign.texts.items():
+        seconds = seconds_of(texts.tolist())
+        if seconds is not None:
+            found[name] = seconds
+    if not found:
+        return foreign
+    notes = [
+        f"{name} counts in seconds from {foreign.texts[name][np.isfinite(seconds)][0]}"
+        for name, seconds in found.items()
+    ]
+    table = Table(foreign.table.file, foreign.table.first, {**foreign.table.columns, **found})
+    return replace(foreign, table=table, notes=(*foreign.notes, *notes), times=(*foreign.times, *found))
+
 
 _TEXT = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _EXCEL = (".xlsx", ".xlsm", ".xls", ".xlsb", ".ods")

@@ -6,10 +6,9 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from flexcal.errors import FlexcalError
+from flexcal.model.tree import Bearings
 
 Triple = tuple[float, float, float]
-Bearings = Literal["before", "after"]
-"""Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
 _LEAST_PRIOR = 1e-12
 
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from flexcal.model.equilibrium import elastic_axes
 from flexcal.model.inertia import Inertia
-from flexcal.model.loading import bearing_frame
 from flexcal.model.names import SPRINGS
 from flexcal.model.placement import joint_placement
 from flexcal.model.robot_model import RobotModel
+from flexcal.model.tree import bearing_frame
 
 
 class ElasticArm:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.kinematics import joint_batch
-from flexcal.model.regressor import INERTIAL, torque_regressor
+from flexcal.model.regressor import torque_regressor
 from flexcal.model.robot_model import RobotModel
 
 

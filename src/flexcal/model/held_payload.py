@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
+from flexcal.model.inertia import Inertia, parallel_axis
 from flexcal.model.point import Payload
-from flexcal.model.robot_model import RobotModel
 from flexcal.model.urdf import read_urdf
+
+if TYPE_CHECKING:
+    from flexcal.model.robot_model import RobotModel
 
 
 def last_frame(model: RobotModel) -> str:
@@ -36,3 +40,23 @@ def holding(model: RobotModel, frame: str, mass: float, com: np.ndarray, inertia
         payload_com=np.array(com),
         payload_inertia=held.moments,
     )
+
+
+def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
+    """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
+    held = model.payload
+    if held is None:
+        if payload:
+            raise FlexcalError(
+                f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`."
+            )
+        return model.inertias
+    mass = held.mass if payload is None else payload
+    if mass == 0:
+        return model.inertias
+    link, own = model.inertias[held.joint], held.carried(mass)
+    total = link.mass + mass
+    com = (link.mass * link.com + mass * own.com) / total
+    inertia = link.inertia + own.inertia
+    inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, own.com - com)
+    return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))

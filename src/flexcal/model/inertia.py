@@ -19,3 +19,12 @@ class Inertia:
 def parallel_axis(mass: float, com: np.ndarray) -> np.ndarray:
     """What moving the reference from the centre of mass to the frame's origin adds to the inertia, (3, 3) kg m²."""
     return mass * ((com @ com) * np.eye(3) - np.outer(com, com))
+
+
+INERTIAL = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+
+
+"""The ten parameters of a link in the order of the columns: mass (kg), first moment (kg m) and inertia (kg m²) at the joint frame.
+
+Ixy, Ixz and Iyz are entries of the inertia matrix, as URDF has them: negative products of inertia.
+"""

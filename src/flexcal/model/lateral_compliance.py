@@ -12,7 +12,7 @@ def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
 
     The former are fixed to the parent link; the latter turn with the joint, but for `bearings: before`. Zero for prismatic joints.
     """
-    from flexcal.model.loading import bearing_frame
+    from flexcal.model.tree import bearing_frame
 
     result = np.zeros((*q.shape, 2, 2))
     motion = q + model.geometry[:, 0] if model.bearings == "after" else np.zeros(q.shape)

@@ -1,45 +1,37 @@
-"""robot.yaml and URDF to RobotModel."""
+"""Reading of robot.yaml and URDF into the parts of a robot model."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from flexcal.kernels import Tree
 from flexcal.model.arm_sensor import ArmSensor
-from flexcal.model.config import Bearings, ElasticConfig, RobotConfig
+from flexcal.model.config import ElasticConfig, RobotConfig
 from flexcal.model.joint import Joint
 from flexcal.model.names import COUPLED, FRICTION, PARALLEL, SCATTER
 from flexcal.model.point import ForceSensor, Payload, Point
-from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import rpy_rotation
+from flexcal.model.tree import bearing_frame, kinematic_tree
 from flexcal.model.urdf import Description, Frame, read_urdf
 from flexcal.plain_data import suggestion
-from flexcal.publication import current
 from flexcal.yaml_reader import YamlFile, read_yaml_file
 
 HARMONICS = (1, 2, 3)
 
 
-def load_robot(path: Path, *, estimates: bool) -> RobotModel:
-    """Read a robot; raises `InputError` with file and line for everything that does not fit together."""
+def robot_parts(path: Path) -> dict[str, Any]:
+    """Arguments of `RobotModel` for a robot.yaml and its URDF; raises `InputError` with file and line where they do not fit."""
     file = read_yaml_file(path)
     config = file.structure(RobotConfig)
     urdf = path.parent / config.robot
-    description = read_urdf(urdf, config.locked)
-    model = _assemble(file, config, urdf, description)
-    stored = path.parent / config.estimates
-    if estimates and current(stored).exists():
-        from flexcal.model.stored import apply_estimates
-
-        model = apply_estimates(model, stored)
-    return model
+    return _parts(file, config, urdf, read_urdf(urdf, config.locked))
 
 
-def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Description) -> RobotModel:
+def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Description) -> dict[str, Any]:
     joints = description.joints
     n = len(joints)
     names = [joint.name for joint in joints]
@@ -84,7 +76,7 @@ def _assemble(file: YamlFile, config: RobotConfig, urdf: Path, description: Desc
             if spring is not None:
                 stiffness[i, c], damping[i, c] = spring.stiffness, spring.damping
     stations = tuple(config.stations) or ("tracker",)
-    return RobotModel(
+    return dict(
         config=config,
         path=file.path,
         urdf=urdf,
@@ -220,27 +212,6 @@ def _bearing_frame(file: YamlFile, k: int, entry: ElasticConfig, joint: Joint) -
             f"the z axis of frame_rpy is not the axis of '{joint.name}'; turn it so that it is, or leave frame_rpy out.",
         )
     return frame
-
-
-def bearing_frame(joint: Joint) -> np.ndarray:
-    """The default bearing frame (3, 3) of a joint: z its axis, x the first axis normal to it."""
-    x = joint.normals[0]
-    return np.column_stack([x, np.cross(joint.axis, x), joint.axis])
-
-
-def kinematic_tree(
-    joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings | None = None
-) -> Tree:
-    """The kernels' view of some joints, of the bearing frames (3, 3) of the elastic ones by joint index, and of where bearings tilt."""
-    return Tree.build(
-        [j.parent for j in joints],
-        [j.kind == "prismatic" for j in joints],
-        np.array([j.rotation for j in joints]),
-        np.array([j.translation for j in joints]),
-        np.array([j.normals for j in joints]),
-        np.array([bearing_frames.get(i, bearing_frame(j)) for i, j in enumerate(joints)]),
-        bearings == "before",
-    )
 
 
 def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndarray:

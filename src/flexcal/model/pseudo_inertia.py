@@ -6,8 +6,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from flexcal.model.inertia import Inertia, parallel_axis
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL, Inertia, parallel_axis
 
 
 def _basis() -> np.ndarray:

@@ -5,14 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.errors import FlexcalError
+from flexcal.model.inertia import INERTIAL
 from flexcal.model.kinematics import joint_batch
 from flexcal.model.robot_model import RobotModel
-
-INERTIAL = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-"""The ten parameters of a link in the order of the columns: mass (kg), first moment (kg m) and inertia (kg m²) at the joint frame.
-
-Ixy, Ixz and Iyz are entries of the inertia matrix, as URDF has them: negative products of inertia.
-"""
 
 
 def inertial_names(model: RobotModel) -> tuple[str, ...]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.regressor import INERTIAL, motion_batch
+from flexcal.model.inertia import INERTIAL
+from flexcal.model.regressor import motion_batch
 from flexcal.model.robot_model import RobotModel
 
 

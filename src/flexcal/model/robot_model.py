@@ -16,13 +16,15 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.kernels import Tree
 from flexcal.model.arm_sensor import ArmSensor
-from flexcal.model.config import Bearings, ControllerConfig, PriorConfig, RobotConfig
+from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
 from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis
 from flexcal.model.joint import Joint
 from flexcal.model.names import locations
 from flexcal.model.point import ForceSensor, Payload, Point
 from flexcal.model.posterior import NOTHING_ESTIMATED, Posterior
+from flexcal.model.tree import Bearings, bearing_frame, kinematic_tree
+from flexcal.publication import current
 
 _MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
 _FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
@@ -84,28 +86,63 @@ class RobotModel:
     @classmethod
     def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
         """Read robot.yaml, its URDF and, where present, the estimates beside it; raises `InputError` with file and line."""
-        from flexcal.model.loading import load_robot
+        from flexcal.model.loading import robot_parts
+        from flexcal.model.stored import apply_estimates
 
-        return load_robot(Path(path), estimates=estimates)
+        model = cls(**robot_parts(Path(path)))
+        stored = model.path.parent / model.config.estimates
+        return apply_estimates(model, stored) if estimates and current(stored).exists() else model
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the kernels' view, which is built anew where the robot arrives: other processes can be handed robots."""
         return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "tree"}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        from flexcal.model.loading import kinematic_tree
-
         self.__dict__.update(
             state, tree=kinematic_tree(state["joints"], state["bearing_frames"], state["config"].bearings)
         )
 
     def with_bearings(self, bearings: Bearings) -> RobotModel:
         """The robot whose bearings are known to tilt before or after the joint's rotation, its parameters and posterior as they are."""
-        from flexcal.model.loading import kinematic_tree
-
         config = replace(self.config, bearings=bearings)
         tree = kinematic_tree(self.joints, self.bearing_frames, bearings)
         return replace(self, config=config, tree=tree)
+
+    def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
+        """The robot with a drive spring, (stiffness in N m/rad, damping in N m s/rad), at each of some rigid joints, by index.
+
+        In a frequency experiment the motors of these joints are braked. Raises `FlexcalError` for a prismatic joint.
+        """
+        frames, stiffness, damping = dict(self.bearing_frames), self.stiffness.copy(), self.damping.copy()
+        for i, (constant, loss) in springs.items():
+            joint = self.joints[i]
+            if joint.kind != "revolute":
+                raise FlexcalError(
+                    f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic."
+                )
+            frames[i] = bearing_frame(joint)
+            stiffness[i, 2], damping[i, 2] = constant, loss
+        return replace(
+            self,
+            bearing_frames=frames,
+            tree=kinematic_tree(self.joints, frames, self.config.bearings),
+            stiffness=stiffness,
+            damping=damping,
+            braked=self.braked | set(springs),
+        )
+
+    def with_estimated_springs(self, values: Mapping[str, float]) -> RobotModel:
+        """The robot with a drive spring at every rigid joint whose `<joint>.drive.stiffness` is among `values`."""
+        springs = {}
+        for i, name in enumerate(self.joint_names):
+            stiffness = values.get(f"{name}.drive.stiffness")
+            if stiffness is not None and i not in self.bearing_frames:
+                springs[i] = (stiffness, values.get(f"{name}.drive.damping", 0.0))
+        return self.with_drive_springs(springs) if springs else self
+
+    def with_brakes(self, excited: tuple[str, ...]) -> RobotModel:
+        """The robot in a frequency experiment that excites the named joints: the motors of all other elastic joints are braked."""
+        return replace(self, braked=frozenset(e.index for e in self.elastic if e.name not in excited))
 
     @property
     def n(self) -> int:
@@ -294,9 +331,8 @@ class RobotModel:
 
         A rigid joint whose drive stiffness was estimated gets that spring.
         """
-        from flexcal.model.further_springs import with_estimated_springs
 
-        widened = with_estimated_springs(self, estimate.values)
+        widened = self.with_estimated_springs(estimate.values)
         own = tuple(name for name in estimate.parameters.names if name in widened.values)
         changed = widened.with_values({name: estimate.values[name] for name in own})
         return replace(changed, posterior=self.posterior.updated(estimate, own))

@@ -6,19 +6,20 @@ import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import cast
+from typing import TYPE_CHECKING, cast
 
 import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.estimates_file import Block, read_estimates
 from flexcal.estimation import Estimate
-from flexcal.model.config import Bearings
-from flexcal.model.further_springs import with_estimated_springs
 from flexcal.model.held_payload import holding
 from flexcal.model.names import unit_in, unit_of
 from flexcal.model.pseudo_inertia import is_body
-from flexcal.model.robot_model import RobotModel
+from flexcal.model.tree import Bearings
+
+if TYPE_CHECKING:
+    from flexcal.model.robot_model import RobotModel
 
 PAYLOAD_FRAME = "frame"
 """Of the provenance of the block `payload`: the URDF frame that its values are in."""
@@ -52,7 +53,7 @@ def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path)
     if "payload" in blocks:
         model = _with_payload(model, blocks["payload"], path)
     for block, estimate in blocks.items():
-        model = with_estimated_springs(model, estimate.values)
+        model = model.with_estimated_springs(estimate.values)
         unknown = [
             n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
         ]

@@ -12,10 +12,8 @@ import numpy as np
 from flexcal.calibration import AccuracyMap, ErrorScale, Verification
 from flexcal.model import RobotModel
 from flexcal.report.before import before_table
-from flexcal.report.figures.accuracy_space import SHOWN, accuracy_space
-from flexcal.report.figures.accuracy_views import accuracy_views
-from flexcal.report.figures.predicted_quantiles import predicted_quantiles
-from flexcal.report.figures.variance_shares import variance_shares
+from flexcal.report.figures.accuracy_space import SHOWN, accuracy_space, accuracy_views, variance_shares
+from flexcal.report.figures.error_distribution import predicted_quantiles
 from flexcal.report.notation import document_millimetres, scaled, significant
 from flexcal.report.page import (
     Block,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.calibration import ErrorStatistics
+from flexcal.calibration.arm_shapes import ArmPoses
 from flexcal.estimation import Estimate
 from flexcal.report.bearings_check import check_bearings
 from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
@@ -15,14 +16,15 @@ from flexcal.report.checks import check_drift, check_error_budget, check_left_ou
 from flexcal.report.considered_terms import considered_terms
 from flexcal.report.first_screen import rung, three_facts
 from flexcal.report.gravity_loads import GravityLoads
-from flexcal.report.measured_points import CALIBRATED, RIGID, ArmPoses, MeasuredPoints
+from flexcal.report.identifiable import Determined
+from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints
 from flexcal.report.notation import NOTHING, millimetres, ratio, sentences, statistics_cells
 from flexcal.report.page import Check, Page, Section, Table, Text, Verdict
 from flexcal.report.render import write_page
 from flexcal.report.responses_check import check_misfit, read_misfit
 from flexcal.report.sections.budget import budget_table
 from flexcal.report.sections.geometry import arm_figure, error_figures
-from flexcal.report.sections.identifiability import Determined, identifiability_blocks
+from flexcal.report.sections.identifiability import identifiability_blocks
 from flexcal.report.sections.parameters import parameter_figures, parameter_table
 from flexcal.report.sections.provenance import provenance_section
 from flexcal.report.sections.residuals import residuals_section

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.report.excitation_checks import excitation_checks
-from flexcal.report.figures.bode import bode
+from flexcal.report.figures.response_fit import bode
 from flexcal.report.notation import NOTHING, percent, sentences, significant, to_half_width
 from flexcal.report.page import Block, Fact, FigureBlock, Page, Section, Status, Table, Text, Verdict
 from flexcal.report.render import write_page

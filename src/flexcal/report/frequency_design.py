@@ -12,10 +12,12 @@ import numpy as np
 from flexcal.design.planned_responses import PlannedResponses
 from flexcal.estimation.uncertainty import LOG_STD_LIMIT
 from flexcal.model import RobotModel
-from flexcal.report.figures.amplitude_spectrum import amplitude_spectrum
-from flexcal.report.figures.planned_arm import planned_arm
-from flexcal.report.figures.poses_against_std import poses_against_std
-from flexcal.report.figures.predicted_springs import predicted_springs
+from flexcal.report.figures.predicted_springs import (
+    amplitude_spectrum,
+    planned_arm,
+    poses_against_std,
+    predicted_springs,
+)
 from flexcal.report.notation import significant, spring_label
 from flexcal.report.page import Block, Check, Fact, FigureBlock, Page, Section, Table, Verdict, tally, worst
 from flexcal.report.render import write_page

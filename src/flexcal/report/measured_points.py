@@ -69,19 +69,3 @@ class MeasuredPoints:
 def errors_before(before: ErrorsBefore) -> dict[str, np.ndarray]:
     """The errors of an uncalibrated robot by the names that they have among `MeasuredPoints.errors`."""
     return {NOMINAL if name == "registered" else name: errors for name, errors in before.known.items()}
-
-
-@dataclass(frozen=True, eq=False)
-class ArmPoses:
-    """The arm at measured points, in the robot's base frame, m.
-
-    `corners` (K, joints + 2, 3) from the base through every joint to the point, of some of the poses; `surface` (E, V, 3) vertices and
-    `triangles` (F, 3) of the links in a few of them; `pose` (N,) numbers, `tip` (N, 3) points and `errors` (N, 3) by model of all.
-    """
-
-    corners: np.ndarray
-    surface: np.ndarray
-    triangles: np.ndarray
-    pose: np.ndarray
-    tip: np.ndarray
-    errors: Mapping[str, np.ndarray]

@@ -12,9 +12,7 @@ import numpy as np
 from flexcal.design import joint_origins, station_position
 from flexcal.model import RobotModel
 from flexcal.report.figures.arm_poses import links_at
-from flexcal.report.figures.joint_positions import joint_positions
-from flexcal.report.figures.plan_space import plan_space
-from flexcal.report.figures.pose_numbers import pose_numbers
+from flexcal.report.figures.joint_positions import joint_positions, plan_space, pose_numbers
 from flexcal.report.notation import significant
 from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Verdict, worst
 from flexcal.report.render import write_page

@@ -11,8 +11,8 @@ import numpy as np
 
 from flexcal.calibration import CYCLES, VISITS_A_SET, PoseRepeatability
 from flexcal.data import PoseSet
-from flexcal.report.figures.pose_courses import pose_courses
-from flexcal.report.figures.residual_trend import residual_trend
+from flexcal.report.figures.calibration_errors import pose_courses
+from flexcal.report.figures.residual_joints import residual_trend
 from flexcal.report.notation import document_millimetres
 from flexcal.report.page import Check, Fact, FigureBlock, Page, Section, Table, Text, Verdict, worst
 from flexcal.report.render import write_page

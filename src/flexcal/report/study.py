@@ -8,13 +8,14 @@ from functools import cached_property
 from typing import Any, Literal
 
 from flexcal.calibration import ErrorStatistics, Verification
+from flexcal.calibration.arm_shapes import ArmPoses
 from flexcal.data import MultisinePlan
 from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
 from flexcal.report.fitted_response import FittedResponse
-from flexcal.report.measured_points import ArmPoses, MeasuredPoints
+from flexcal.report.identifiable import Determined
+from flexcal.report.measured_points import MeasuredPoints
 from flexcal.report.publication import Publication
-from flexcal.report.sections.identifiability import Determined
 
 
 @dataclass(frozen=True)

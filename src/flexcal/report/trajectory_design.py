@@ -12,9 +12,7 @@ from flexcal.design import TrajectoryDesign, joint_origins
 from flexcal.design.exciting_program import NEAR
 from flexcal.design.skeleton import link_frames
 from flexcal.report.figures.arm_poses import links_at
-from flexcal.report.figures.limit_shares import limit_shares
-from flexcal.report.figures.prior_gains import prior_gains
-from flexcal.report.figures.swept_paths import swept_paths
+from flexcal.report.figures.limit_shares import limit_shares, prior_gains, swept_paths
 from flexcal.report.notation import significant
 from flexcal.report.page import (
     Check,

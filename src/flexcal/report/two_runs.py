@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.estimates_file import Block
+from flexcal.report.figures.calibration_errors import ErrorSeries
 from flexcal.report.figures.error_distribution import error_distribution
-from flexcal.report.figures.verification_errors import ErrorSeries
 from flexcal.report.first_screen import rung
 from flexcal.report.notation import NOTHING, millimetres, scaled, significant, statistics_cells
 from flexcal.report.page import Block as PageBlock

@@ -8,14 +8,20 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.calibration import ErrorStatistics, Verification
+from flexcal.calibration.arm_shapes import ArmPoses
 from flexcal.report.before import BEFORE_NOTE, before_rows, before_rungs
-from flexcal.report.checks import check_claimed_uncertainty, check_enough, check_flanks, check_unseen
-from flexcal.report.figures.error_distribution import error_distribution
-from flexcal.report.figures.predicted_quantiles import predicted_quantiles
-from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
+from flexcal.report.checks import (
+    check_claimed_uncertainty,
+    check_enough,
+    check_flanks,
+    check_known_points,
+    check_moved,
+    check_unseen,
+)
+from flexcal.report.figures.calibration_errors import ErrorSeries, verification_errors
+from flexcal.report.figures.error_distribution import error_distribution, predicted_quantiles
 from flexcal.report.first_screen import rung, three_facts
-from flexcal.report.measured_points import ArmPoses, MeasuredPoints
-from flexcal.report.moved_checks import check_known_points, check_moved
+from flexcal.report.measured_points import MeasuredPoints
 from flexcal.report.notation import millimetres, sentences, statistics_cells
 from flexcal.report.page import Block, Check, FigureBlock, Page, Section, Status, Table, Text, Verdict
 from flexcal.report.palette import ELASTIC, NOMINAL

@@ -30,6 +30,7 @@ from flexcal.calibration import (
     robot_before,
     select_terms,
 )
+from flexcal.calibration.arm_shapes import arms_at
 from flexcal.calibration.geometry_fit import LossName
 from flexcal.calibration.terms import PER_JOINT
 from flexcal.calibration.variance_components import TRANSMISSION
@@ -43,7 +44,6 @@ from flexcal.model.stored import with_blocks
 from flexcal.progress import Progress, silent
 from flexcal.report.calibration import calibration_checks
 from flexcal.report.considered_terms import considered_document
-from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.gravity_loads import gravity_loads
 from flexcal.report.measured_points import CALIBRATED, RIGID, MeasuredPoints, errors_before
 from flexcal.report.responses_check import misfit_document, misfit_sentences

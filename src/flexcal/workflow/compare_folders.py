@@ -16,7 +16,7 @@ from flexcal.workflow.point_files import read_points
 from flexcal.workflow.report_folder import OF_CALIBRATION, OF_VERIFICATION, lacking
 from flexcal.workflow.results import RESULTS, read_results
 from flexcal.workflow.stored_block import ESTIMATES
-from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
+from flexcal.workflow.verification_points import VERIFICATION, read_verification
 
 COMPARISON = "comparison.html"
 _DECLARED = (".yaml", ".yml", ".urdf", ".xml")

@@ -12,11 +12,10 @@ import numpy as np
 
 from flexcal.data import TrajectoryPlan, page_beside, read_plan_of, write_plan
 from flexcal.design import TrajectoryDesign, design_trajectories, sequence
-from flexcal.design.assumed_friction import COULOMB, VISCOUS, with_assumed_friction
 from flexcal.design.condition import condition_number
 from flexcal.design.motion_space import Kind
 from flexcal.design.sequences import SequenceName
-from flexcal.design.stated_limits import require_stated_limits
+from flexcal.design.stated_limits import COULOMB, VISCOUS, require_stated_limits, with_assumed_friction
 from flexcal.design.timed_motion import TimedMotion, timed_motion
 from flexcal.design.torque_columns import TorqueColumns
 from flexcal.design.torque_goal import TrajectoryCriterion

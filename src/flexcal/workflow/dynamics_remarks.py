@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from flexcal.dynamics import FrictionSelection, RegressionData, attenuation
 from flexcal.estimation import Estimate
-from flexcal.model.regressor import INERTIAL
+from flexcal.model.inertia import INERTIAL
 from flexcal.workflow.estimators import EstimatorName
 from flexcal.workflow.parallel_springs import undeclared_springs
 

@@ -8,12 +8,13 @@ import numpy as np
 import polars as pl
 
 from flexcal.atomic import atomic_path
+from flexcal.calibration.arm_shapes import ArmPoses
 from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.npz_reader import ArrayForm, NpzFile
 from flexcal.publication import current
 from flexcal.report.gravity_loads import GravityLoads
-from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, ArmPoses, MeasuredPoints
+from flexcal.report.measured_points import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.units import LARGEST
 
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"

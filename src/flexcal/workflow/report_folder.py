@@ -33,7 +33,7 @@ from flexcal.workflow.point_files import read_arm, read_loads, read_points
 from flexcal.workflow.prediction_files import read_predictions
 from flexcal.workflow.results import RESULTS, read_results
 from flexcal.workflow.stored_block import ESTIMATES
-from flexcal.workflow.two_stage_results import VERIFICATION, read_verification
+from flexcal.workflow.verification_points import VERIFICATION, read_verification
 
 REPORT = "report.html"
 _DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"

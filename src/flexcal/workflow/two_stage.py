@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify, verify_jointly
+from flexcal.calibration.arm_shapes import arms_at
 from flexcal.cell import read_truth
 from flexcal.data import Cell, MultisinePlan, Recording, write_plan, write_poses
 from flexcal.design import MeasuringSetup, design_poses, random_poses
@@ -22,7 +23,6 @@ from flexcal.frequency import FrequencyResponse, frequency_responses
 from flexcal.model import RobotModel
 from flexcal.model.names import INERTIALS
 from flexcal.progress import Progress, silent
-from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.fitted_response import fitted_responses
 from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
@@ -36,8 +36,9 @@ from flexcal.workflow.point_files import write_arm, write_points
 from flexcal.workflow.report_folder import report_folder, two_stage_study
 from flexcal.workflow.results import write_results
 from flexcal.workflow.stage_zero import run_stage_zero
-from flexcal.workflow.two_stage_results import VERIFICATION, two_stage_document, write_verification
+from flexcal.workflow.two_stage_results import two_stage_document
 from flexcal.workflow.two_stage_run import CadAlone, TwoStageRun
+from flexcal.workflow.verification_points import VERIFICATION, write_verification
 
 CALIBRATION_POSES, QUICK_POSES = 40, 25
 RIGID_POSES = (40, 100)

@@ -25,12 +25,12 @@ from flexcal.calibration import (
     robot_before,
     verify_jointly,
 )
+from flexcal.calibration.arm_shapes import arms_at
 from flexcal.data import PoseSet, read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimates_file import provenance
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.figures.arm_poses import arms_at
 from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
 from flexcal.report.trust import Trust
 from flexcal.report.verification import verification_checks

@@ -8,36 +8,19 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.data import PoseSet
+from flexcal.calibration.arm_shapes import ArmPoses
 from flexcal.model import RobotModel
-from flexcal.model.names import STATION
-from flexcal.model.rotations import vector_rotation
 from flexcal.report.figures.canvas import canvas, single
 from flexcal.report.link_surface import LinkSurface
-from flexcal.report.measured_points import CALIBRATED, ArmPoses
+from flexcal.report.measured_points import CALIBRATED
 from flexcal.report.palette import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID
 from flexcal.units import MILLIMETRE
 
-_EXAMPLES = 3
-"""Poses in which the links are drawn, as in the paper's figure."""
 _FAINT = 0.25
 """Opacity of the links in all of these but the first."""
 
-_MOST_ARMS = 60
-_MOST_ARROWS = 1500
 _HEAD = 0.35
 """Length of an arrow's head over that of the arrow."""
-
-
-def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray]) -> ArmPoses:
-    """The arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; of many arms and arrows some, evenly chosen."""
-    rows = _evenly(len(poses), _MOST_ARROWS)
-    corners = skeletons(model, poses.subset(rows))
-    turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
-    surface = LinkSurface.of(model)
-    drawn = surface.at(model, poses.q[rows[_evenly(len(rows), _EXAMPLES)]]).astype(np.float32)
-    arms = corners[_evenly(len(rows), _MOST_ARMS)]
-    return ArmPoses(arms, drawn, surface.triangles, poses.pose[rows], corners[:, -1], turned)
 
 
 def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> go.Figure:
@@ -100,27 +83,6 @@ def space_axes() -> dict[str, Any]:
     }
 
 
-def skeletons(model: RobotModel, poses: PoseSet) -> np.ndarray:
-    """Corners (N, joints + 2, 3) m of the arm from the base through every joint to the measured point, base frame, undeflected."""
-    chain: list[int] = []
-    joint = model.point(str(poses.target[0])).joint
-    while joint >= 0:
-        chain.insert(0, joint)
-        joint = model.joints[joint].parent
-    still = np.zeros((len(poses), model.n, 3))
-    q = np.ascontiguousarray(poses.q)
-    target = model.point(str(poses.target[0]))
-
-    def place(index: int, rotation: np.ndarray, translation: np.ndarray, xyz: np.ndarray) -> np.ndarray:
-        frame = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
-        geometry = np.ascontiguousarray(model.geometry)
-        return model.tree.point(index, frame[0], frame[1], xyz, geometry, np.zeros(6), q, still, False)[0]
-
-    origins = [place(k, np.eye(3), np.zeros(3), np.zeros(3)) for k in chain]
-    tip = place(target.joint, target.rotation, target.translation, target.xyz)
-    return np.stack([np.zeros_like(tip), *origins, tip], axis=1)
-
-
 def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0) -> go.Scatter3d:
     """Several lines (lines, corners, 3) as one trace, parted by gaps."""
     parted = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1).reshape(-1, 3)
@@ -152,17 +114,3 @@ def links_at(model: RobotModel, q: np.ndarray) -> list[go.Mesh3d]:
     """The links of a robot at joint positions `q` (P, n), one shaded trace a pose."""
     surface = LinkSurface.of(model)
     return [solid(vertices, surface.triangles, 1.0, legend=True) for vertices in surface.at(model, q)]
-
-
-def in_base(model: RobotModel, poses: PoseSet, vectors: np.ndarray) -> np.ndarray:
-    """Vectors (N, 3) of the instrument's frame turned into the robot's base frame."""
-    turned = np.empty_like(vectors)
-    for station in poses.stations:
-        angles = np.array([model.value(f"station.{station}.{key}") for key in STATION[3:]])
-        own = poses.station == station
-        turned[own] = vectors[own] @ vector_rotation(angles)
-    return turned
-
-
-def _evenly(total: int, most: int) -> np.ndarray:
-    return np.unique(np.linspace(0, total - 1, min(total, most)).astype(int))

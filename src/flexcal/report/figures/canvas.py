@@ -101,3 +101,10 @@ def _styled(figure: go.Figure, height: int, legend: bool) -> go.Figure:
     figure.update_xaxes(**axis, zeroline=False)
     figure.update_yaxes(**axis)
     return figure
+
+
+def millimetre_axis(figure: go.Figure, axis: str = "y", title: str = "error / mm") -> None:
+    """A logarithmic axis in millimetres with plain numbers at 1, 2 and 5."""
+    ticks = [m * 10.0**e for e in range(-4, 3) for m in (1, 2, 5)]
+    update = figure.update_yaxes if axis == "y" else figure.update_xaxes
+    update(type="log", tickvals=ticks, ticktext=[f"{t:g}" for t in ticks], title_text=title)

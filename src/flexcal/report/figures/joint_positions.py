@@ -1,13 +1,16 @@
-"""Joint positions of planned poses between their limits."""
+"""A plan of calibration poses: joint positions, poses in space, predicted error against their number."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.model import RobotModel
-from flexcal.report.figures.canvas import canvas, single
-from flexcal.report.palette import AXIS, ELASTIC
+from flexcal.report.figures.arm_poses import polyline, space_axes
+from flexcal.report.figures.canvas import canvas, millimetre_axis, positive, single
+from flexcal.report.palette import AXIS, ELASTIC, INK, NOMINAL, QUIET, RIGID
 from flexcal.units import DEGREE, MILLIMETRE
 
 
@@ -40,3 +43,68 @@ def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
     )
     figure.update_yaxes(autorange="reversed", showgrid=False)
     return figure
+
+
+_COLOURS = (ELASTIC, NOMINAL, QUIET)
+_NUMBERS = [m * 10**e for e in range(5) for m in (1, 2, 5)]
+
+
+def pose_numbers(
+    numbers: Sequence[int], errors: Mapping[str, Sequence[float]], plan: int, wanted: float | None
+) -> go.Figure:
+    """Named `errors` (mm) against the `numbers` of poses, both logarithmic; the number of the `plan` and the `wanted` error marked."""
+    figure = canvas(400)
+    for colour, (name, values) in zip(_COLOURS, errors.items(), strict=False):
+        figure.add_trace(
+            go.Scatter(
+                x=single(numbers), y=positive(np.asarray(values)), mode="lines+markers", name=name,
+                line={"color": colour, "width": 2}, marker={"size": 5, "color": colour},
+                hovertemplate="%{x} poses: %{y:.4f} mm",
+            )
+        )  # fmt: skip
+    figure.add_vline(x=plan, line={"color": AXIS, "width": 1.5, "dash": "dash"})
+    if wanted is not None:
+        figure.add_hline(y=wanted, line={"color": RIGID, "width": 1.5, "dash": "dot"})
+    figure.update_xaxes(type="log", title_text="poses", tickvals=_NUMBERS)
+    millimetre_axis(figure, title="predicted tool error / mm")
+    return figure
+
+
+_EDGES = np.array(
+    [[0, 1], [0, 2], [0, 4], [1, 3], [1, 5], [2, 3], [2, 6], [3, 7], [4, 5], [4, 6], [5, 7], [6, 7]]
+)
+
+
+def plan_space(
+    corners: np.ndarray,
+    links: go.Mesh3d,
+    working: np.ndarray | None,
+    box: np.ndarray | None,
+    station: np.ndarray | None,
+) -> go.Figure:
+    """Skeletons `corners` (N, K, 3), the `links` in one pose, the target's path, `working` points (W, 3), their `box` (2, 3), the
+    instrument (3,); all in m."""
+    figure = canvas(620)
+    tips = corners[:, -1]
+    figure.add_trace(links)
+    figure.add_trace(polyline(corners, "arm at other poses", NOMINAL, 2.5, opacity=0.45))
+    figure.add_trace(polyline(tips[None], "order", ELASTIC, 3.0, opacity=0.6))
+    labels = [f"pose {k}" for k in range(1, len(tips) + 1)]
+    figure.add_trace(_points(tips, "target", ELASTIC, 4, labels))
+    if working is not None:
+        figure.add_trace(_points(working, "where it will work", QUIET, 1.5, [""] * len(working)))
+    if box is not None:
+        ends = box[(np.arange(8)[:, None] >> np.arange(3)) & 1, np.arange(3)]
+        figure.add_trace(polyline(ends[_EDGES], "working volume", INK, 4.0))
+    if station is not None:
+        figure.add_trace(_points(station[None], "instrument", RIGID, 7, ["instrument"]))
+    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
+    return figure
+
+
+def _points(places: np.ndarray, name: str, colour: str, size: float, labels: list[str]) -> go.Scatter3d:
+    return go.Scatter3d(
+        x=single(places[:, 0]), y=single(places[:, 1]), z=single(places[:, 2]), mode="markers", name=name,
+        marker={"size": size, "color": colour}, text=labels, hovertemplate="%{text}<extra></extra>",
+        hoverinfo=None if labels[0] else "skip",
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""Measured and predicted torques over time."""
+"""Measured and predicted torques over time and frequency."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.dynamics import TorquePrediction
-from flexcal.report.figures.canvas import panels, single
+from flexcal.report.figures.canvas import decades, panels, positive, single
 from flexcal.report.palette import ELASTIC, NOMINAL, RIGID
 
 _APART = 1.5
@@ -75,3 +75,45 @@ def axis_title(units: Mapping[str, str]) -> str:
     """Quantity and unit of an axis."""
     names = {"N m": "torque", "N": "force"}
     return ", ".join(f"{names[unit]} / {unit}" for unit in dict.fromkeys(units.values()))
+
+
+_COLUMNS = 3
+
+
+def torque_spectra(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]) -> go.Figure:
+    """Amplitude density of the measured torque and of the residual of every joint, one log shown at a time.
+
+    `units` are N m, or N, by joint; densities are these per √Hz.
+
+    Traces carry `meta = {"log": label}`, by which the page chooses.
+    """
+    rows = -(-len(units) // _COLUMNS)
+    figure = panels(rows, _COLUMNS, 230 * rows + 70, labelled(units), row_gap=0.3 / rows)
+    for number, (label, log) in enumerate(logs.items()):
+        curves = (
+            ("measured torque", log.measured_density, NOMINAL),
+            ("measured minus predicted", log.residual_density, RIGID),
+        )
+        for kind, density, colour in curves:
+            for joint, unit in enumerate(units.values()):
+                figure.add_trace(
+                    go.Scatter(
+                        x=single(log.frequencies_hz),
+                        y=positive(np.sqrt(density[:, joint])),
+                        name=kind,
+                        legendgroup=kind,
+                        showlegend=joint == 0,
+                        mode="lines",
+                        line={"color": colour, "width": 1.6},
+                        meta={"log": label},
+                        visible=number == 0,
+                        hovertemplate=f"%{{x:.2f}} Hz<br>%{{y:.3g}} {unit}/√Hz",
+                    ),
+                    row=joint // _COLUMNS + 1,
+                    col=joint % _COLUMNS + 1,
+                )
+    figure.update_xaxes(title_text="Hz", nticks=6)
+    figure.update_yaxes({"type": "log"} | decades(-9, 6))
+    title = ", ".join(f"{unit}/√Hz" for unit in dict.fromkeys(units.values()))
+    figure.update_yaxes(title_text=title, row=(rows + 1) // 2, col=1)
+    return figure

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.estimation import Estimate
-from flexcal.report.figures.correlation_map import correlation_map
+from flexcal.report.figures.parameter_bars import correlation_map
 from flexcal.report.notation import NOTHING, significant
 from flexcal.report.page import Block, FigureBlock, Section, Table, Text
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexcal.calibration.arm_shapes import ArmPoses
 from flexcal.data import PoseSet
 from flexcal.report.figures.arm_poses import arm_poses
-from flexcal.report.figures.calibration_errors import calibration_errors
-from flexcal.report.figures.error_components import error_components
-from flexcal.report.figures.error_histogram import error_histogram
-from flexcal.report.measured_points import CALIBRATED, NOMINAL, ArmPoses
+from flexcal.report.figures.calibration_errors import calibration_errors, error_components
+from flexcal.report.figures.error_distribution import error_histogram
+from flexcal.report.measured_points import CALIBRATED, NOMINAL
 from flexcal.report.notation import millimetres
 from flexcal.report.page import FigureBlock, Section, Selector, Slider
 from flexcal.report.sections.budget import budget_table

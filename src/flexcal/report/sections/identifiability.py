@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
-
-import numpy as np
+from collections.abc import Sequence
 
 from flexcal.estimation import Dropped
-from flexcal.report.figures.singular_values import singular_values
+from flexcal.report.figures.parameter_bars import singular_values
+from flexcal.report.identifiable import Determined
 from flexcal.report.page import Block, FigureBlock, Table, Text
 from flexcal.report.publication import Publication
 
@@ -17,37 +14,6 @@ _MOST = 4
 
 _NOTHING = 1e-9
 """Amounts (SI) below this are rounding errors of a column that is zero."""
-
-
-@dataclass(frozen=True, eq=False)
-class Determined:
-    """Which of so many `parameters` are determined.
-
-    `singular_values` and `diagonal` (of R) are relative to the largest; `gap` in decades; `weak` names the weakest directions that are
-    kept, each with its singular value.
-    """
-
-    parameters: int
-    rank: int
-    gap: float
-    singular_values: np.ndarray
-    diagonal: np.ndarray
-    dropped: tuple[Dropped, ...]
-    weak: tuple[tuple[str, float], ...]
-
-    @classmethod
-    def stored(cls, block: Mapping[str, Any]) -> Determined:
-        """From the block of results.json."""
-        dropped = tuple(
-            Dropped(item["name"], tuple((by["name"], by["coefficient"]) for by in item["absorbed_by"]))
-            for item in block["dropped"]
-        )
-        weak = tuple(
-            (item["direction"], item["relative_singular_value"]) for item in block["weak_directions"]
-        )
-        gap = np.inf if block["gap_decades"] is None else block["gap_decades"]
-        values, diagonal = (np.array(block[key]) for key in ("singular_values", "diagonal"))
-        return cls(block["parameters"], block["rank"], gap, values, diagonal, dropped, weak)
 
 
 def identifiability_blocks(found: Determined, paper: Publication | None) -> tuple[Block, ...]:

@@ -7,11 +7,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from flexcal.data import PoseSet
-from flexcal.report.figures.error_field import error_field
-from flexcal.report.figures.residual_joints import residual_joints
-from flexcal.report.figures.residual_torque import loaded_joints, residual_torque
-from flexcal.report.figures.residual_trend import residual_trend
-from flexcal.report.figures.residual_workspace import residual_workspace
+from flexcal.report.figures.residual_joints import (
+    error_field,
+    loaded_joints,
+    residual_joints,
+    residual_torque,
+    residual_trend,
+    residual_workspace,
+)
 from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.notation import millimetres
 from flexcal.report.page import Block, FigureBlock, Section, Table

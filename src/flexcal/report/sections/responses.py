@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from flexcal.report.figures.response_levels import response_levels
+from flexcal.report.figures.response_fit import response_levels
 from flexcal.report.measured_response import MeasuredResponse, in_words
 from flexcal.report.page import FigureBlock, Selector
 

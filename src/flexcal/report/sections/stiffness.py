@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.estimation import Estimate
+from flexcal.report.figures.parameter_bars import spring_intervals
 from flexcal.report.figures.response_fit import response_fit, sensor_fit
-from flexcal.report.figures.spring_intervals import spring_intervals
 from flexcal.report.fitted_response import FittedResponse
 from flexcal.report.notation import percent, significant
 from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text

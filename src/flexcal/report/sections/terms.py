@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.calibration import ConsideredTerm
-from flexcal.report.figures.term_scores import term_label, term_scores
+from flexcal.report.figures.parameter_bars import term_label, term_scores
 from flexcal.report.notation import NOTHING
 from flexcal.report.page import FigureBlock, Section, Table
 from flexcal.units import MILLIMETRE

@@ -7,8 +7,7 @@ from pathlib import PurePath
 from typing import Any
 
 from flexcal.dynamics import TorquePrediction
-from flexcal.report.figures.torque_spectra import torque_spectra
-from flexcal.report.figures.torque_traces import torque_traces
+from flexcal.report.figures.torque_traces import torque_spectra, torque_traces
 from flexcal.report.notation import significant
 from flexcal.report.page import Block, FigureBlock, Selector, Table
 

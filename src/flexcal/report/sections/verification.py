@@ -5,9 +5,8 @@ from __future__ import annotations
 from flexcal.calibration import ErrorStatistics
 from flexcal.report import palette
 from flexcal.report.before import BEFORE
-from flexcal.report.figures.error_distribution import error_distribution
-from flexcal.report.figures.predicted_quantiles import predicted_quantiles
-from flexcal.report.figures.verification_errors import ErrorSeries, verification_errors
+from flexcal.report.figures.calibration_errors import ErrorSeries, verification_errors
+from flexcal.report.figures.error_distribution import error_distribution, predicted_quantiles
 from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import millimetres, ratio, statistics_cells
 from flexcal.report.page import Block, FigureBlock, Section, Table, Text
