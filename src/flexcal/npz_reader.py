@@ -15,6 +15,7 @@ from numpy.lib.npyio import NpzFile as NpzArrays
 
 from flexcal.errors import InputError
 from flexcal.publication import current
+from flexcal.units import LARGEST
 
 Kind = Literal["real", "complex", "whole", "truth", "text"]
 _KINDS: dict[Kind, tuple[str, str]] = {
@@ -35,7 +36,7 @@ _UNREADABLE = (
 class ArrayForm:
     """What an array has to be: its kind, and per axis an extent or a name; axes of one name are as long in every array of a file.
 
-    Numbers that are not finite are refused unless `finite` is False.
+    Numbers that are not finite are refused, NaN not where `finite` is False; so are numbers beyond `units.LARGEST`.
     """
 
     kind: Kind
@@ -121,8 +122,13 @@ class NpzFile:
         for axis, length in zip(form.axes, array.shape, strict=True):
             if isinstance(axis, str):
                 self._lengths[axis] = length
-        if form.finite and form.kind in ("real", "complex") and not np.isfinite(array).all():
-            raise self.error(f"holds numbers in '{name}' that are not finite")
+        if form.kind in ("real", "complex"):
+            with np.errstate(over="ignore"):
+                size = np.abs(array)
+            if form.finite and not np.isfinite(size).all():
+                raise self.error(f"holds numbers in '{name}' that are not finite")
+            if float(np.max(size, initial=0.0, where=~np.isnan(size))) > LARGEST:
+                raise self.error(f"holds numbers beyond {LARGEST:g} in '{name}'")
         return array
 
 

@@ -10,7 +10,7 @@ from flexcal.data import Recording, write_recording
 from flexcal.dynamics import JointLog, Motion, Observation
 from flexcal.errors import InputError
 from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.workflow.log_torques import require_joint_torques
+from flexcal.workflow.log_payloads import require_joint_torques
 
 STEP = 1 / 200
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.dynamics.residual_noise import noise
+from flexcal.dynamics.prior_fit import noise
 from flexcal.dynamics.trajectory_rows import TrajectoryRows
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameter, Parameters

@@ -15,7 +15,7 @@ from flexcal.dynamics import CLASSIC, BaseParameters, Motion, Observation, obser
 from flexcal.dynamics.friction_library import Cables
 from flexcal.dynamics.identified_weight import WeightShare, weight_shares
 from flexcal.report.dynamics_checks import check_weight_shares
-from flexcal.workflow.parallel_springs import undeclared_springs
+from flexcal.workflow.dynamics_remarks import undeclared_springs
 
 
 def moved(arm: Observation) -> Motion:

@@ -7,12 +7,11 @@ from .even_sample import EvenSample, all_errors
 from .gauge import POINT_KNOWN, found_point, point_uncertainty, probable_robot, probable_robots
 from .geometric_calibration import Calibration, calibrate
 from .mapped_accuracy import AccuracyMap, accuracy_map, random_poses_in
-from .measured_points import require_points
 from .placement import Placement, best_placement, enough_for_points, registrable, rigid_placement
 from .plausibility import Moved, hardly_fits, moved_far, scattered
 from .pose_drift import VISITS_A_SET, PoseDrift, common_way, drift_of_poses
 from .pose_repeatability import CYCLES, PoseRepeatability, noise_repeatability, repeatability
-from .prediction import Prediction, predict, predicted_positions
+from .prediction import Prediction, predict, predicted_positions, require_points
 from .propagated_covariance import Propagation, propagation
 from .refit import Refit, Refitted, refitted
 from .registration import register, rigid_motion

@@ -13,8 +13,8 @@ from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.fitted_points import FittedPoints, PointFit
 from flexcal.calibration.flanks import ambiguous_poses
 from flexcal.calibration.geometry_fit import LossName
-from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.practical import Undetermined
+from flexcal.calibration.prediction import require_points
 from flexcal.calibration.scatter import Scatter
 from flexcal.calibration.variance_components import LinearFit
 from flexcal.data import PoseSet

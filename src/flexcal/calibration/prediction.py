@@ -17,6 +17,17 @@ from flexcal.model.names import GEOMETRY, LATERAL, SPRINGS, STATION
 from flexcal.model.rotations import vector_rotation
 from flexcal.progress import Progress, silent
 
+
+def require_points(poses: PoseSet, where: str = "the poses") -> None:
+    """Raise `FlexcalError` for what is measured beside or in place of points and would be left out; `where` names the files."""
+    if poses.length is not None:
+        raise FlexcalError(f"{where}: lengths of a wire cannot be used yet; give points x, y, z.")
+    if poses.quaternion_wxyz is not None:
+        raise FlexcalError(
+            f"{where}: measured orientations cannot be used yet; take out the columns qw, qx, qy, qz to use the points alone."
+        )
+
+
 _BLOCK = 20_000
 """Poses whose predictions are in memory together."""
 

@@ -8,9 +8,8 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.measured_points import require_points
 from flexcal.calibration.placement import best_placement, rigid_placement
-from flexcal.calibration.prediction import predict
+from flexcal.calibration.prediction import predict, require_points
 from flexcal.calibration.verification import ErrorCovariance, Verification, verify_jointly
 from flexcal.data import PoseSet
 from flexcal.errors import FlexcalError

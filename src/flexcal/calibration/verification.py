@@ -9,8 +9,7 @@ import numpy as np
 from flexcal.calibration.error_cells import ErrorCells, block_columns
 from flexcal.calibration.error_statistics import ErrorStatistics
 from flexcal.calibration.flanks import ambiguous_poses
-from flexcal.calibration.measured_points import require_points
-from flexcal.calibration.prediction import Prediction, predict
+from flexcal.calibration.prediction import Prediction, predict, require_points
 from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
 from flexcal.calibration.scatter import Scatter, joint_turns, known_scatter
 from flexcal.data import PoseSet

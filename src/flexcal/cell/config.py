@@ -72,8 +72,10 @@ class FrictionConfig:
 
     def __post_init__(self) -> None:
         _not_negative(self)
-        if not (self.coulomb_velocity > 0 and self.stribeck_velocity > 0):
-            raise FlexcalError("friction's coulomb_velocity and stribeck_velocity must be positive.")
+        if min(self.coulomb_velocity, self.stribeck_velocity) < 1e-9:
+            raise FlexcalError(
+                "friction's coulomb_velocity and stribeck_velocity must be positive, at least 1e-9 rad/s."
+            )
 
 
 _WIDEST = 5.0

@@ -59,7 +59,7 @@ def run_loop(
     `FlexcalError` where it diverges.
 
     A plant step is MuJoCo's semi-implicit Euler, M (q₊ − 2 q + q₋)/h² = τ̄ − forces; how τ̄ and the forces are taken so that the
-    torque is held exactly, springs are right to fourth and dampers to third order is in `flexcal.cell.scheme`.
+    torque is held exactly, springs are right to fourth and dampers to third order is in `flexcal.cell.plant`.
     """
     import mujoco
 

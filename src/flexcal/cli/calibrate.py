@@ -30,6 +30,26 @@ if TYPE_CHECKING:
     from flexcal.workflow.calibrate_robot import RobotCalibration
 
 
+def considered_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One line a term of `term_selection` in results.json; compliances of single joints that were left stand in one line together."""
+    lines, joints = [], []
+    for row in rows:
+        term = row["term"]
+        if term is None:
+            continue
+        if not row["taken"] and "." in term:
+            joints.append(term)
+            continue
+        lines.append(
+            f"considered {term}: {'taken, because it' if row['taken'] else 'left, because'} {row['reason']}"
+        )
+    if joints:
+        lines.append(
+            f"considered for single joints and left, because left-out poses or the BIC do not support them: {', '.join(joints)}"
+        )
+    return lines
+
+
 @dataclass(frozen=True)
 class Calibrate:
     """Calibrate the geometry of a robot from measured positions: joint offsets, misalignments, lengths, tool, backlash.
@@ -60,7 +80,7 @@ class Calibrate:
     def run(self) -> None:
         """Calibrate, and print identifiability, errors and remarks."""
         from flexcal.calibration import POINT_KNOWN, hardly_fits
-        from flexcal.cli.considered_terms import considered_lines
+        from flexcal.cli.calibrate import considered_lines
         from flexcal.cli.tables import before_rows, dropped_table, error_table, weak_table
 
         require_robot(self.robot, *self.poses)

@@ -82,7 +82,7 @@ class IdentifyDynamics:
         from flexcal.cli.tables import base_parameter_table, friction_table, learned_table, quantity_table
         from flexcal.report.dynamics_checks import check_external, check_fit, check_weight_shares
         from flexcal.workflow.identify_dynamics import identify_robot_dynamics
-        from flexcal.workflow.used_signals import signal_sentences
+        from flexcal.workflow.treatment import signal_sentences
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")

@@ -39,7 +39,7 @@ class IdentifyGains:
         """Fit, and print the gains."""
         from flexcal.cli.tables import drive_gain_table
         from flexcal.workflow.identify_gains import identify_gains
-        from flexcal.workflow.used_signals import signal_sentences
+        from flexcal.workflow.treatment import signal_sentences
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")

@@ -70,7 +70,7 @@ class IdentifyPayload:
         """Fit, and print the payload."""
         from flexcal.cli.tables import quantity_table
         from flexcal.workflow.identify_payload import identify_robot_payload
-        from flexcal.workflow.used_signals import signal_sentences
+        from flexcal.workflow.treatment import signal_sentences
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")

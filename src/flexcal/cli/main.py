@@ -108,8 +108,7 @@ def _was_interrupted(problem: BaseException | None) -> bool:
 def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
-    from flexcal.cli.inputs import settle_inputs
-    from flexcal.cli.outputs import outputs
+    from flexcal.cli.outputs import outputs, settle_inputs
     from flexcal.cli.refusal import refusal, refuse_unknown_options
 
     command = getattr(import_module(f"flexcal.cli.{verb.module}"), verb.command)

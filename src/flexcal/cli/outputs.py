@@ -9,6 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from fnmatch import fnmatchcase
 from pathlib import Path
+from typing import Any
 
 from flexcal.cli.ledger import LEDGER, Ledger
 from flexcal.data import page_beside
@@ -144,3 +145,16 @@ def _digest_on_disk(path: Path) -> str:
         raise InputError(
             f"{path} cannot be read ({problem.strerror or problem}); give another --out."
         ) from problem
+
+
+def settle_inputs(parsed: Any) -> None:
+    """Finish what a run that was cut off has left in the folders of all paths among the arguments, so that files of one run are read there.
+
+    Raises `InputError` where that is not possible.
+    """
+    given = [
+        item for value in vars(parsed).values() for item in (value if isinstance(value, tuple) else (value,))
+    ]
+    paths = [item for item in given if isinstance(item, Path)]
+    for folder in {path if path.is_dir() else path.parent for path in paths}:
+        settle(folder)

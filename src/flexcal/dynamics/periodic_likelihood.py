@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 
 import numpy as np
+from scipy.optimize import root_scalar
+from scipy.special import digamma, polygamma
 
 from flexcal.dynamics.batch_covariance import mixed_covariance
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.linear_fit import Unknowns
-from flexcal.dynamics.moderated_variance import moderated
 from flexcal.dynamics.motion import Motion
 from flexcal.dynamics.observation import Observation
 from flexcal.dynamics.periodic_motion import real_rows
@@ -20,7 +22,39 @@ from flexcal.dynamics.triangle import Triangle
 from flexcal.dynamics.wls import weighted_least_squares
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.physical_memory import physical_memory
+
+
+def physical_memory() -> int | None:
+    """Bytes; None where the system does not say."""
+    try:
+        return os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, ValueError, OSError):
+        return None
+
+
+def moderated(variances: np.ndarray, freedom: float) -> tuple[np.ndarray, float]:
+    """Posterior means of the precisions, inverted (k,), and their degrees of freedom.
+
+    Each of the `variances` (k,) has so many degrees of `freedom`. The true ones have an inverse chi-squared prior, whose level and
+    degrees of freedom come from the mean and the variance of the logarithms (Smyth 2004, Eqs. 2, 5 and 6); these are at most those of all
+    `variances` together, which a common one would have.
+    """
+    if len(variances) == 1:
+        return variances, freedom
+    most = (len(variances) - 1) * freedom
+    logs = np.log(np.maximum(variances, np.finfo(float).tiny))
+    excess = np.var(logs, ddof=1) - float(polygamma(1, freedom / 2))
+    if excess <= float(polygamma(1, most / 2)):
+        prior = most
+    else:
+        prior = 2 * float(
+            root_scalar(lambda half: float(polygamma(1, half)) - excess, bracket=(1e-6, most / 2)).root
+        )
+    level = np.exp(
+        np.mean(logs) - digamma(freedom / 2) + np.log(freedom / 2) + digamma(prior / 2) - np.log(prior / 2)
+    )
+    return (prior * level + freedom * variances) / (prior + freedom), prior + freedom
+
 
 _REACH = 5
 """Neighbouring lines on either side that the noise of a line is read from."""

@@ -21,7 +21,7 @@ from flexcal.model.held_payload import carried_inertias
 from flexcal.model.names import SPRINGS
 from flexcal.model.placement import bearing_placement, link_placement, point_placement
 from flexcal.model.rotations import rotation_wxyz
-from flexcal.mujoco_log import log_mujoco_warnings
+from flexcal.mujoco_step import log_mujoco_warnings
 
 if TYPE_CHECKING:
     import mujoco

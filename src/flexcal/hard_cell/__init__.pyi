@@ -1,6 +1,5 @@
 from .cell import HardCell
 from .description import ArmDescription, read_description
-from .drawn import HardRobot, draw_robot
-from .named_values import counterparts
+from .drawn import HardRobot, counterparts, draw_robot
 
 __all__ = ["ArmDescription", "HardCell", "HardRobot", "counterparts", "draw_robot", "read_description"]

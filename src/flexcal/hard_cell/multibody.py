@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 
 from flexcal.hard_cell.description import ArmDescription
 from flexcal.hard_cell.drawn import PAYLOAD_RADIUS, HardRobot
-from flexcal.mujoco_log import log_mujoco_warnings
+from flexcal.mujoco_step import log_mujoco_warnings
 
 if TYPE_CHECKING:
     import mujoco

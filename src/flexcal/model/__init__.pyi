@@ -1,9 +1,8 @@
-from .elastic_joint import ElasticJoint
 from .energies import energy_regressor
 from .equilibrium import Equilibrium, gravity_torque, static_equilibrium
 from .inertia import Inertia
 from .inverse_kinematics import reach_points
-from .joint import Joint
+from .joint import ElasticJoint, Joint
 from .kinematics import PointKinematics, point_kinematics
 from .point import Payload, Point
 from .regressor import inertial_names, inertial_parameters, torque_regressor

@@ -105,13 +105,16 @@ class PriorConfig:
         for name in ("mass", "com", "torque_constant"):
             if getattr(self, name) < 0 or 0 < getattr(self, name) < _LEAST_PRIOR:
                 raise FlexcalError(
-                    f"the prior's {name} must be 0 (known exactly) or at least {_LEAST_PRIOR:g}, not {getattr(self, name):g}."
+                    "the prior's mass, com and torque_constant must not be negative (0: known exactly), and no less than "
+                    f"{_LEAST_PRIOR:g} otherwise; {name} is {getattr(self, name):g}."
                 )
         single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
         named = single | {"length": self.length, "angle": self.angle} | self.parameters
         for name, value in named.items():
             if value is not None and not value >= _LEAST_PRIOR:
-                raise FlexcalError(f"the prior's {name} must be at least {_LEAST_PRIOR:g}, not {value:g}.")
+                raise FlexcalError(
+                    f"the prior's {name} must be positive, at least {_LEAST_PRIOR:g}, not {value:g}."
+                )
 
 
 @dataclass(frozen=True)

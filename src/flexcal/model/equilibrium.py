@@ -9,8 +9,28 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.hardening import tangent_ratio, twist_of
 from flexcal.model.kinematics import joint_batch
-from flexcal.model.lateral_compliance import lateral_axes
 from flexcal.model.robot_model import RobotModel
+
+
+def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Axes of `misalignment_1` and `misalignment_2` (N, n, 2, 2) at `q` (N, n), by their components on the tilt axes x and y.
+
+    The former are fixed to the parent link; the latter turn with the joint, but for `bearings: before`. Zero for prismatic joints.
+    """
+    from flexcal.model.tree import bearing_frame
+
+    result = np.zeros((*q.shape, 2, 2))
+    motion = q + model.geometry[:, 0] if model.bearings == "after" else np.zeros(q.shape)
+    cosine, sine = np.cos(motion), np.sin(motion)
+    for i, joint in enumerate(model.joints):
+        if joint.kind != "revolute":
+            continue
+        frame = model.bearing_frames.get(i)
+        x, y = (joint.normals @ (bearing_frame(joint) if frame is None else frame))[:, :2].T
+        result[:, i, :, 0] = np.outer(cosine[:, i], x) + np.outer(sine[:, i], y)
+        result[:, i, :, 1] = np.outer(cosine[:, i], y) - np.outer(sine[:, i], x)
+    return result
+
 
 _FLANK_PASSES = 5
 _RIGID = 1e17

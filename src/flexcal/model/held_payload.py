@@ -1,15 +1,17 @@
-"""A robot with a payload in any URDF frame."""
+"""A robot with a payload or a measured point in any URDF frame, and the inertias that its joints carry."""
 
 from __future__ import annotations
 
 from dataclasses import replace
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model.inertia import Inertia, parallel_axis
-from flexcal.model.point import Payload
+from flexcal.model.point import Payload, Point
+from flexcal.model.robot_model import RobotModel
 from flexcal.model.urdf import read_urdf
 
 if TYPE_CHECKING:
@@ -60,3 +62,28 @@ def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[I
     inertia = link.inertia + own.inertia
     inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, own.com - com)
     return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
+
+
+def with_frame(model: RobotModel, frame: str) -> RobotModel:
+    """`model` with a point named as the URDF frame `frame`, at its origin, after the declared ones; itself where robot.yaml declares that.
+
+    Raises `InputError` for a frame that the URDF lacks or that no joint moves, and where a declared point of that name is elsewhere.
+    """
+    declared = model.points.get(frame)
+    if declared is not None:
+        if declared.frame == frame and not declared.xyz.any():
+            return model
+        raise InputError(
+            f"{model.path} declares a point '{frame}' that is not at the origin of the frame '{frame}'; rename it there, or give --target."
+        )
+    frames = read_urdf(model.urdf, model.config.locked).frames
+    place = frames.get(frame)
+    if place is None or place.joint < 0:
+        moving = ", ".join(name for name, known in frames.items() if known.joint >= 0)
+        raise InputError(f"no joint of {model.urdf.name} moves a frame '{frame}'; give one of {moving}.")
+    point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
+    return replace(
+        model,
+        points=MappingProxyType({**model.points, frame: point}),
+        point_error=np.vstack([model.point_error, np.zeros(3)]),
+    )

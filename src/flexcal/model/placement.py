@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.model.elastic_joint import ElasticJoint
+from flexcal.model.joint import ElasticJoint
 from flexcal.model.robot_model import RobotModel
 from flexcal.model.rotations import axis_rotation
 

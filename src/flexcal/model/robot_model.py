@@ -17,9 +17,8 @@ from flexcal.estimation import Estimate
 from flexcal.kernels import Tree
 from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.config import ControllerConfig, PriorConfig, RobotConfig
-from flexcal.model.elastic_joint import ElasticJoint
 from flexcal.model.inertia import Inertia, parallel_axis
-from flexcal.model.joint import Joint
+from flexcal.model.joint import ElasticJoint, Joint
 from flexcal.model.names import locations
 from flexcal.model.point import ForceSensor, Payload, Point
 from flexcal.model.posterior import NOTHING_ESTIMATED, Posterior

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
-from contextlib import ExitStack, suppress
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from types import TracebackType
 
@@ -14,7 +16,29 @@ from flexcal.publication.locks import locked
 from flexcal.publication.regular import refuse_irregular, refuse_stream
 from flexcal.publication.settling import settle
 from flexcal.publication.stage import Stage
-from flexcal.publication.undisturbed import undisturbed
+
+_POSTPONED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Within the block, exceptions that handlers of Ctrl-C and other signals would raise wait until its end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in _POSTPONED}
+    postponed = [number for number, handler in handlers.items() if callable(handler)]
+    for number in postponed:
+        signal.signal(number, lambda which, _frame: came.append(which))
+    try:
+        yield
+    finally:
+        for number in postponed:
+            signal.signal(number, handlers[number])
+        if came:
+            signal.raise_signal(came[0])
+
 
 _open: list[Publication] = []
 """The one whose block is being carried out, last; of the whole process, as files are."""

@@ -15,7 +15,7 @@ from flexcal.data import ToolTargets, read_targets, write_commands
 from flexcal.data.table import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model import RobotModel
-from flexcal.model.added_point import with_frame
+from flexcal.model.held_payload import with_frame
 from flexcal.model.joint_space import joint_limits
 from flexcal.model.placement import found_xyz
 from flexcal.model.resting_tool import points_kinematics

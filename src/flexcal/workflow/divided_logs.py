@@ -20,11 +20,9 @@ from flexcal.dynamics import (
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress
-from flexcal.workflow.log_payloads import require_unloaded
+from flexcal.workflow.log_payloads import require_joint_torques, require_unloaded, require_wrenches
 from flexcal.workflow.log_predictions import log_predictions
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split, watched
-from flexcal.workflow.log_torques import require_joint_torques
-from flexcal.workflow.log_wrenches import require_wrenches
 from flexcal.workflow.treatment import Treatment
 
 

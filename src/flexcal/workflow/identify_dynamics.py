@@ -32,14 +32,13 @@ from flexcal.workflow.divided_logs import DividedLogs
 from flexcal.workflow.drive_springs import bearing_springs, drive_springs
 from flexcal.workflow.estimators import ESTIMATORS, EstimatorName
 from flexcal.workflow.learned_dynamics import LearnedDynamics
-from flexcal.workflow.log_torques import weight_faults
+from flexcal.workflow.log_payloads import weight_faults
 from flexcal.workflow.prediction_files import write_predictions
 from flexcal.workflow.results import write_results
 from flexcal.workflow.robot_dynamics import RobotDynamics
 from flexcal.workflow.scratch import scratch_folder
 from flexcal.workflow.stored_block import place_of_block, store_block
-from flexcal.workflow.treatment import treatment_of
-from flexcal.workflow.used_signals import used_signals
+from flexcal.workflow.treatment import treatment_of, used_signals
 
 
 def identify_robot_dynamics(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,28 +13,67 @@ from flexcal.data.signals import mapped_signals
 from flexcal.dynamics import (
     CLASSIC,
     BaseParameters,
+    ExperimentSystem,
     Observation,
     RegressionData,
     Window,
     batches_each,
     drive_gains,
 )
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.estimates_file import provenance
 from flexcal.estimation import Estimate
 from flexcal.model import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.gain_checks import gain_checks
+from flexcal.report.run_difference import ParameterChanges, parameter_changes
 from flexcal.report.trust import Trust
 from flexcal.workflow.distinct_files import require_distinct
-from flexcal.workflow.half_gains import HalfGains, half_gains
-from flexcal.workflow.log_payloads import log_payloads
+from flexcal.workflow.log_payloads import log_payloads, require_no_wrenches
 from flexcal.workflow.log_systems import LogPart, log_systems, read_logs
-from flexcal.workflow.log_wrenches import require_no_wrenches
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.scratch import scratch_folder
-from flexcal.workflow.treatment import treatment_of
-from flexcal.workflow.used_signals import used_signals
+from flexcal.workflow.treatment import treatment_of, used_signals
+
+
+@dataclass(frozen=True)
+class HalfGains:
+    """Factors of the gains from each half alone, and how they differ."""
+
+    changes: ParameterChanges
+
+    def document(self) -> dict[str, Any]:
+        """The block `halves` of results.json."""
+        return {
+            "probability": self.changes.probability,
+            "factors": {
+                change.name: {"first": change.values[0], "second": change.values[1], "score": change.score}
+                for change in self.changes.changes
+            },
+        }
+
+
+def half_gains(
+    observation: Observation,
+    base: BaseParameters,
+    systems: Sequence[ExperimentSystem],
+    payloads: Sequence[float],
+) -> HalfGains | None:
+    """`drive_gains` from the first and the second half of every recording; None where a half alone does not determine them."""
+    if min(len(system.batches) for system in systems) < 2:
+        return None
+    halves = zip(*(_halves(system) for system in systems), strict=True)
+    try:
+        first, second = (drive_gains(RegressionData.of(observation, base, half), payloads) for half in halves)
+    except FlexcalError:
+        return None
+    changes = parameter_changes(first, second)
+    return HalfGains(changes) if changes.changes else None
+
+
+def _halves(system: ExperimentSystem) -> tuple[ExperimentSystem, ExperimentSystem]:
+    middle = len(system.batches) // 2
+    return replace(system, batches=system.batches[:middle]), replace(system, batches=system.batches[middle:])
 
 
 @dataclass(frozen=True, eq=False)

@@ -30,9 +30,8 @@ from flexcal.report.payload_checks import payload_checks
 from flexcal.report.trust import Trust
 from flexcal.workflow.calibrated_robot import stored_estimates
 from flexcal.workflow.distinct_files import require_distinct
+from flexcal.workflow.log_payloads import require_joint_torques, require_no_wrenches, weight_faults
 from flexcal.workflow.log_systems import read_logs
-from flexcal.workflow.log_torques import require_joint_torques, weight_faults
-from flexcal.workflow.log_wrenches import require_no_wrenches
 from flexcal.workflow.payload_remarks import declared_body, other_payloads, payload_remarks
 from flexcal.workflow.payload_system import PayloadSystem
 from flexcal.workflow.prediction_files import write_predictions
@@ -40,8 +39,7 @@ from flexcal.workflow.recorded_logs import RecordedLogs, recorded_with
 from flexcal.workflow.results import quantities, write_results
 from flexcal.workflow.scratch import scratch_folder
 from flexcal.workflow.stored_block import place_of_block, store_block
-from flexcal.workflow.treatment import Treatment, treatment_of
-from flexcal.workflow.used_signals import used_signals
+from flexcal.workflow.treatment import Treatment, treatment_of, used_signals
 
 _ROUGH = 2
 """Fits of an elastic robot before the last one, each with the springs loaded by the payload of the one before."""

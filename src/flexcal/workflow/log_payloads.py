@@ -1,8 +1,8 @@
-"""Payloads of logs."""
+"""Checks of joint logs: payload column, force sensor's columns, and torques against gravity."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 from flexcal.dynamics import JointLog
 from flexcal.errors import InputError
@@ -33,3 +33,53 @@ def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
                 f"{log.path}: recorded with a payload of {held:g} kg, but the robot's own dynamics need logs without; give both kinds to "
                 "'flexcal identify gains'."
             )
+
+
+def require_wrenches(logs: Sequence[JointLog], model: RobotModel) -> None:
+    """Raises `InputError` for a log without the columns of the force sensor that robot.yaml declares."""
+    for log in logs:
+        if model.force_sensor is not None and not log.wrench:
+            raise InputError(
+                f"{log.path}: robot.yaml declares a force sensor, but the columns fx, fy, fz, mx, my, mz are missing, so what acts beyond "
+                "it is unknown; add them, or remove `force_sensor:` if nothing is beyond it."
+            )
+
+
+def require_no_wrenches(logs: Sequence[JointLog]) -> None:
+    """Raises `InputError` for a log with the columns of a force sensor, which carries the payload and so takes it out of the torques."""
+    for log in logs:
+        if log.wrench:
+            raise InputError(
+                f"{log.path}: the force sensor's columns (fx, …) contain the payload, which would be taken out of the torques with them; "
+                "remove these columns."
+            )
+
+
+_OVERRIDE = (
+    "; where springs balance the arm, declare them under `dynamics: joint_springs:`, and where its masses in the URDF are guesses, go on "
+    "with --accept weight"
+)
+
+
+def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
+    """A sentence for every log of torques that are the motors' own, or of the other sign."""
+    for log in logs:
+        joint = log.weight.reversed
+        if joint is not None:
+            yield (
+                f"{log.path}: the torque of {model.joint_names[joint]} has the sign of its gravity torque instead of the "
+                "opposite; change its sign by "
+                "`tau: {gain: […]}` under `signals:`, or correct `gravity:` in robot.yaml"
+            )
+        elif log.weight.by_motors:
+            yield (
+                f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} is only {log.weight.share:.2%} of its "
+                "gravity torque; these look "
+                "like torques on the motor side: declare gear ratios as `tau: {gain: […]}` under `signals:`"
+            )
+
+
+def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
+    """Raises `InputError` for the first of the `weight_faults`."""
+    for fault in weight_faults(logs, model):
+        raise InputError(f"{fault}{_OVERRIDE}.")
