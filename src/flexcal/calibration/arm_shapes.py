@@ -31,8 +31,6 @@ class ArmPoses:
 
 
 _EXAMPLES = 3
-
-
 """Poses in which the links are drawn, as in the paper's figure."""
 
 

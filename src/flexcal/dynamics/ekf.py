@@ -7,14 +7,13 @@ from collections.abc import Iterator
 import numpy as np
 
 from flexcal.dynamics.batch_covariance import BatchCovariance, covariance_of_scores, offset_scores
-from flexcal.dynamics.experiment import Experiment, Window
+from flexcal.dynamics.experiment import Experiment, Window, slowest_speeds
 from flexcal.dynamics.forward_model import ForwardModel, ForwardModels
 from flexcal.dynamics.forward_steps import ForwardSteps, forward_steps
 from flexcal.dynamics.innovation_scores import InnovationScores
 from flexcal.dynamics.linear_fit import Unknowns, weighted_system
 from flexcal.dynamics.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import RegressionData, batches_each
-from flexcal.dynamics.rows import slowest_speeds
 from flexcal.dynamics.triangle import triangular
 from flexcal.dynamics.wls import noise_levels
 from flexcal.estimation import Estimate

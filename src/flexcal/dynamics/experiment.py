@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from flexcal.dynamics.motion import Motion
+from flexcal.dynamics.motion import AT_REST, Motion
+from flexcal.dynamics.rows import _STANDSTILL
 
 
 class Experiment(Protocol):
@@ -46,3 +47,8 @@ class Window:
 
     start: float = -math.inf
     end: float = math.inf
+
+
+def slowest_speeds(experiment: Experiment) -> np.ndarray:
+    """Speed (n,) up to which each joint stands still."""
+    return np.maximum(_STANDSTILL * experiment.top_speed, AT_REST)

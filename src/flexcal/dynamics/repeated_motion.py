@@ -8,9 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.data.low_pass import LowPass
-from flexcal.dynamics.experiment import Experiment, Window
+from flexcal.dynamics.experiment import Experiment, Window, slowest_speeds
 from flexcal.dynamics.motion import Motion, stretches
-from flexcal.dynamics.rows import slowest_speeds
 from flexcal.errors import FlexcalError
 
 FEWEST = 4

@@ -11,8 +11,8 @@ import numpy as np
 from flexcal.data.filtering import Decimation, DecimationStream
 from flexcal.dynamics.drive_terms import Memory
 from flexcal.dynamics.equations import Equations
-from flexcal.dynamics.experiment import Experiment, Window
-from flexcal.dynamics.motion import AT_REST, Motion, stretches
+from flexcal.dynamics.experiment import Experiment, Window, slowest_speeds
+from flexcal.dynamics.motion import Motion, stretches
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
@@ -119,11 +119,6 @@ def _stretch_rows(
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)
-
-
-def slowest_speeds(experiment: Experiment) -> np.ndarray:
-    """Speed (n,) up to which each joint stands still."""
-    return np.maximum(_STANDSTILL * experiment.top_speed, AT_REST)
 
 
 class _Centres:

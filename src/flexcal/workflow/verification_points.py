@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
@@ -12,14 +13,14 @@ from flexcal.data import PoseSet
 from flexcal.errors import InputError
 from flexcal.publication import current
 from flexcal.report.measured_points import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
-from flexcal.workflow.two_stage_run import TwoStageRun
+
+if TYPE_CHECKING:
+    from flexcal.workflow.two_stage_run import TwoStageRun
 
 VERIFICATION = "verification.csv"
 
 
 _COLUMNS = {NOMINAL: "nominal", OWN: "own", CALIBRATED: "elastic", RIGID: "rigid"}
-
-
 """Models of verification.csv, and what their columns are called there."""
 
 
