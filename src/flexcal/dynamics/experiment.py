@@ -10,7 +10,9 @@ from typing import Protocol
 import numpy as np
 
 from flexcal.dynamics.motion import AT_REST, Motion
-from flexcal.dynamics.rows import _STANDSTILL
+
+_STANDSTILL = 0.01
+"""A joint stands still below this share of its largest speed in the recording, and where it is at rest."""
 
 
 class Experiment(Protocol):

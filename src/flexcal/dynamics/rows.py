@@ -16,8 +16,6 @@ from flexcal.dynamics.motion import Motion, stretches
 
 _BLOCK = 1000
 """Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
-_STANDSTILL = 0.01
-"""A joint stands still below this share of its largest speed in the recording, and where it is at rest."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,8 +11,6 @@ from flexcal.kernels import Tree
 from flexcal.model.joint import Joint
 
 Bearings = Literal["before", "after"]
-
-
 """Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
 
 
