@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.data import MultisinePlan, Recording, RecordingLabel
-from flexcal.frequency import frequency_response, multisine
+from flexcal.frequency import frequency_response
+from flexcal.frequency.multisine import multisine_spectra, synthesise
 
 AXES, REALISATIONS, PERIODS, SETTLE, LINES = 6, 4, 4, 2, 1000
 BASE_HZ, RATE_HZ = 0.25, 4000.0
@@ -56,12 +57,12 @@ def experiment(rng: np.random.Generator) -> tuple[MultisinePlan, list[Recording]
     period = round(RATE_HZ / BASE_HZ)
     recordings = []
     for realisation in range(REALISATIONS):
-        phasors = multisine.spectra(plan, realisation)
+        phasors = multisine_spectra(plan, realisation)
         for e in range(AXES):
             motion = -np.linalg.solve(mass, phasors[:, :, e].T).T / omega[:, None] ** 2
             for sign in (1, -1):
-                torque = np.tile(sign * multisine.synthesise(phasors[:, :, e], lines, period), (PERIODS, 1))
-                q = np.tile(sign * multisine.synthesise(motion, lines, period), (PERIODS, 1))
+                torque = np.tile(sign * synthesise(phasors[:, :, e], lines, period), (PERIODS, 1))
+                q = np.tile(sign * synthesise(motion, lines, period), (PERIODS, 1))
                 q += 1e-8 * rng.standard_normal(q.shape)
                 label = RecordingLabel(0, realisation, e, sign)
                 recordings.append(

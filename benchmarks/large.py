@@ -28,7 +28,7 @@ import polars as pl
 from flexcal.data import MultisinePlan, Recording, labels, write_plan, write_recording
 from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import excitation_torque, reference_trajectory
 from flexcal.model import RobotModel, inertial_parameters, tool_at_rest, torque_regressor
 from flexcal.model.held_payload import carried_inertias
 
@@ -256,14 +256,14 @@ def _responses(folder: Path, rows: int) -> None:
     omega = 2 * np.pi * base * np.arange(1, samples // 2 + 1)
     rng = np.random.default_rng(5)
     for label in labels(plan):
-        torque = multisine.torque(plan, label.realisation, label.experiment, label.sign)
+        torque = excitation_torque(plan, label.realisation, label.experiment, label.sign)
         swing = np.fft.rfft(torque, axis=0)
         swing[1:] /= -(omega**2)[:, None] * np.array([40.0, 30.0, 10.0])
         swing[0] = 0.0
         count = samples * plan.periods
         q, tau = np.tile(plan.poses[0], (count, 1)), np.zeros((count, arm.n))
         q[:, :3] += np.tile(np.fft.irfft(swing, samples, axis=0), (plan.periods, 1))
-        q[:, :3] += multisine.reference(plan, np.arange(count) / rate)[0][:, None]
+        q[:, :3] += reference_trajectory(plan, np.arange(count) / rate)[0][:, None]
         tau[:, :3] += np.tile(torque, (plan.periods, 1))
         q += 1e-6 * rng.standard_normal(q.shape)
         tau += 0.1 * rng.standard_normal(tau.shape)

@@ -13,7 +13,7 @@ from flexcal.cell import CellConfig, FrictionConfig, LoopConfig, SensorConfig, V
 from flexcal.cell.arm_readings import mounted, sensitivities
 from flexcal.data import MultisinePlan, read_recording, write_recording
 from flexcal.elasticity import ReferenceMotion, reference_shift
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import samples_per_period
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
 from flexcal.model.config import ArmSensorConfig, SignalConfig
@@ -77,7 +77,7 @@ EXACT = CellConfig(
 
 
 def test_readings_follow_the_linearised_robot(sensing: RobotModel, plan: MultisinePlan) -> None:
-    period = multisine.samples_per_period(plan.base_frequency_hz, 1 / RATE_HZ)
+    period = samples_per_period(plan.base_frequency_hz, 1 / RATE_HZ)
     torque, read, q = [], [], []
     for recording in VirtualCell(sensing, EXACT, SEED).record(plan):
         assert recording.sensors == ("hand", "forearm", "beam", "probe")
@@ -98,7 +98,7 @@ def test_readings_follow_the_linearised_robot(sensing: RobotModel, plan: Multisi
 def test_readings_along_the_reference_motion(sensing: RobotModel, plan: MultisinePlan) -> None:
     """What a sensor sees of a displacement turns with the arm: a simulation in time that swings by 0.04 rad."""
     swaying = replace(plan, signs=True, reference_amplitude=0.04, reference_frequency_hz=1.75)
-    period = 2 * multisine.samples_per_period(plan.base_frequency_hz, 1 / RATE_HZ)
+    period = 2 * samples_per_period(plan.base_frequency_hz, 1 / RATE_HZ)
     torque, read, q = [], [], []
     for recording in VirtualCell(sensing, EXACT, SEED).record(swaying):
         last = slice(-period, None)

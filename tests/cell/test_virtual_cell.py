@@ -10,7 +10,7 @@ from flexcal.cell import CellConfig, VirtualCell, draw_truth
 from flexcal.cell.config import FrictionConfig, LoopConfig, MismatchConfig, SensorConfig, SpreadConfig
 from flexcal.data import Cell, MultisinePlan, PosePlan
 from flexcal.errors import FlexcalError, InputError
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import odd_lines
 from flexcal.model import RobotModel, point_kinematics, static_equilibrium
 from flexcal.model.rotations import vector_rotation
 from flexcal.units import DEGREE
@@ -29,7 +29,7 @@ def truth(tx90l: RobotModel, rng: np.random.Generator) -> RobotModel:
 @pytest.fixture
 def plan() -> MultisinePlan:
     """Two poses, one short period of 1 s, three axes."""
-    lines = multisine.odd_lines(1.0, 3.0, 80.0)
+    lines = odd_lines(1.0, 3.0, 80.0)
     return MultisinePlan(
         name="short",
         poses=np.array([[0, 60, -105, 80, 67, 0], [0, 45, 60, 0, 45, 0]]) * DEGREE,

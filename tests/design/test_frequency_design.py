@@ -19,7 +19,8 @@ from flexcal.design.planned_responses import PlannedResponses
 from flexcal.design.response_sensitivity import thinned
 from flexcal.design.spring_criterion import spring_criterion
 from flexcal.errors import FlexcalError
-from flexcal.frequency import leave_out_detection_lines, multisine
+from flexcal.frequency import leave_out_detection_lines
+from flexcal.frequency.multisine import crest_factor, excitation_torque, multisine_spectra, synthesise
 from flexcal.model import gravity_torque
 from flexcal.model.closed_loop import closed_loop_motion, drive_pull
 from flexcal.model.joint_space import joint_ranges
@@ -66,9 +67,9 @@ def test_the_limit_of_a_gap_is_gravity_over_its_crest(tx90l, plan):
     system = linearise(tx90l, q)
     moved = closed_loop_motion(system, still.frequencies_hz, still.kp[:3], still.kd[:3])
     strain = (
-        tx90l.stiffness[:3, 2][:, None] * (drive_pull(tx90l, system).T @ moved) @ multisine.spectra(still, 0)
+        tx90l.stiffness[:3, 2][:, None] * (drive_pull(tx90l, system).T @ moved) @ multisine_spectra(still, 0)
     )
-    torque = multisine.synthesise(strain, still.lines, 4096)  # (samples, drives, experiments)
+    torque = synthesise(strain, still.lines, 4096)  # (samples, drives, experiments)
     held = np.abs(gravity_torque(tx90l, q[None]))[0, 1:3]
     rms = np.sqrt(np.mean(torque**2, axis=(0, 2)))[1:]
     assert allowed == pytest.approx((held / (CREST * rms)).min(), rel=0.02)
@@ -105,10 +106,7 @@ def test_shaped_amplitudes_keep_all_limits_and_tell_more(tx90l, plan, choice, am
     assert over.max() <= MOST + 1e-9
     np.testing.assert_array_equal(found.detection_lines, plan.detection_lines)
     assert not np.isin(found.detection_lines, found.lines).any()
-    crests = [
-        multisine.crest_factor(multisine.torque(replace(found, crest="optimised"), r, 0)).max()
-        for r in (0, 1)
-    ]
+    crests = [crest_factor(excitation_torque(replace(found, crest="optimised"), r, 0)).max() for r in (0, 1)]
     assert max(crests) < CREST
     planned = PlannedResponses.of(tx90l, found)
     criterion = spring_criterion(planned.parameters)

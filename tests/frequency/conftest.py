@@ -8,7 +8,12 @@ import pytest
 import scipy.linalg
 
 from flexcal.data import MultisinePlan, Recording, RecordingLabel
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import (
+    excitation_torque,
+    half_integer_frequency,
+    odd_lines,
+    reference_trajectory,
+)
 
 
 def make_plan(**changes: object) -> MultisinePlan:
@@ -19,7 +24,7 @@ def make_plan(**changes: object) -> MultisinePlan:
         "joints": (0, 2),
         "payload": None,
         "base_frequency_hz": 0.5,
-        "lines": multisine.odd_lines(0.5, 3.0, 40.0),
+        "lines": odd_lines(0.5, 3.0, 40.0),
         "detection_lines": np.array([], int),
         "amplitude": None,
         "periods": 4,
@@ -27,7 +32,7 @@ def make_plan(**changes: object) -> MultisinePlan:
         "realisations": 4,
         "signs": True,
         "reference_amplitude": 0.0,
-        "reference_frequency_hz": multisine.half_integer_frequency(0.5, 2.2),
+        "reference_frequency_hz": half_integer_frequency(0.5, 2.2),
         "kp": np.zeros(3),
         "kd": np.zeros(3),
         "rate_hz": 200.0,
@@ -125,7 +130,7 @@ class LinearCell:
             for realisation in range(plan.realisations):
                 for experiment in range(n):
                     for sign in (1, -1) if plan.signs else (1,):
-                        one = multisine.torque(plan, realisation, experiment, sign)
+                        one = excitation_torque(plan, realisation, experiment, sign)
                         r = np.fft.rfft(np.tile(one, (plan.periods, 1)), axis=0)[bins, :, None]
                         v, w = noise(self.position_noise), noise(self.process_noise)
                         u = np.linalg.solve(loop, r - self.feedback * (held @ w + v))
@@ -136,7 +141,7 @@ class LinearCell:
                         q = np.tile(position, (samples, 1))
                         torque = np.zeros_like(q)
                         axes = list(plan.joints)
-                        q[:, axes] += moved + multisine.reference(plan, t)[0][:, None]
+                        q[:, axes] += moved + reference_trajectory(plan, t)[0][:, None]
                         torque[:, axes] = time(u) + self.torque_noise * rng.standard_normal((samples, n))
                         torque[:, axes] += (
                             self.reference_torque

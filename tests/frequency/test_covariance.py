@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from flexcal.frequency import covariance as cov
 from flexcal.frequency import frequency_response
+from flexcal.frequency.covariance import (
+    input_gain,
+    kronecker,
+    output_noise,
+    pool_noise,
+    shrink_to_diagonal,
+    transform_covariance,
+)
 
 NOISES = {
     "encoder": {"position_noise": 2e-5},
@@ -67,18 +74,18 @@ def test_propagation_through_the_division(rng):
     found = (g @ gamma + noise[:, :n]) @ np.linalg.inv(gamma + noise[:, n:])
     errors = np.swapaxes(found - g, 1, 2).reshape(draws, -1)
     sample = errors.T @ errors.conj() / draws
-    predicted = cov.kronecker(
-        cov.input_gain(gamma[None, None]), cov.output_noise(g[None], (root @ root.conj().T)[None])
-    )[0]
+    predicted = kronecker(input_gain(gamma[None, None]), output_noise(g[None], (root @ root.conj().T)[None]))[
+        0
+    ]
     size = np.sqrt(np.outer(np.diag(predicted), np.diag(predicted)).real)
     np.testing.assert_allclose(sample / size, predicted / size, atol=0.04)
 
 
 def test_pool_is_a_moving_mean_of_constant_width(rng):
     values, bins = rng.standard_normal((20, 2)), np.arange(20) * 2
-    pooled = cov.pool(values, bins, np.array([0, 20, 38]), 5)
+    pooled = pool_noise(values, bins, np.array([0, 20, 38]), 5)
     np.testing.assert_allclose(pooled, [values[:5].mean(0), values[8:13].mean(0), values[-5:].mean(0)])
-    np.testing.assert_allclose(cov.pool(values, bins, np.array([7]), 50), [values.mean(0)])
+    np.testing.assert_allclose(pool_noise(values, bins, np.array([7]), 50), [values.mean(0)])
 
 
 def test_transform_is_the_kronecker_congruence(rng):
@@ -89,9 +96,11 @@ def test_transform_is_the_kronecker_congruence(rng):
     )
     inner = inner @ np.swapaxes(inner, 1, 2).conj()
     factor = np.stack([np.kron(a, b) for a, b in zip(right, left, strict=True)])
-    np.testing.assert_allclose(cov.kronecker(right, left), factor)
+    np.testing.assert_allclose(kronecker(right, left), factor)
     np.testing.assert_allclose(
-        cov.transform(inner, right, left), factor @ inner @ np.swapaxes(factor, 1, 2).conj(), atol=1e-12
+        transform_covariance(inner, right, left),
+        factor @ inner @ np.swapaxes(factor, 1, 2).conj(),
+        atol=1e-12,
     )
 
 
@@ -99,11 +108,11 @@ def test_shrinkage_drops_chance_and_keeps_correlation(rng):
     freedom, p = 45, 9
     independent = complex_normal(rng, 200, p, freedom)
     sample = independent @ np.swapaxes(independent, 1, 2).conj() / freedom
-    shrunk = cov.shrink_to_diagonal(sample, freedom)
+    shrunk = shrink_to_diagonal(sample, freedom)
     off = ~np.eye(p, dtype=bool)
     assert np.abs(shrunk[:, off]).mean() < 0.3 * np.abs(sample[:, off]).mean()
     assert np.linalg.cond(shrunk).mean() < 0.5 * np.linalg.cond(sample).mean()
     common = independent + 2.0 * complex_normal(rng, 200, 1, freedom)
     sample = common @ np.swapaxes(common, 1, 2).conj() / freedom
-    shrunk = cov.shrink_to_diagonal(sample, freedom)
+    shrunk = shrink_to_diagonal(sample, freedom)
     assert np.abs(shrunk[:, off]).mean() > 0.95 * np.abs(sample[:, off]).mean()

@@ -8,9 +8,10 @@ import scipy.linalg
 
 from flexcal.data import Recording, RecordingLabel
 from flexcal.errors import FlexcalError
-from flexcal.frequency import frequency_response, local_polynomial_responses, multisine
+from flexcal.frequency import frequency_response, local_polynomial_responses
 from flexcal.frequency.covariance import kronecker
 from flexcal.frequency.local_polynomial import local_polynomial, without_transient
+from flexcal.frequency.multisine import excitation_torque, odd_lines
 
 
 def from_rest(mechanism, plan, experiments, rng, noise):
@@ -28,7 +29,7 @@ def from_rest(mechanism, plan, experiments, rng, noise):
     block = scipy.linalg.expm(np.block([[a, b], [np.zeros((n, 2 * size + n))]]) * step)
     ad, bd = block[: 2 * size, : 2 * size], block[: 2 * size, 2 * size :]
     for experiment in experiments:
-        u = np.tile(multisine.torque(plan, 0, experiment), (plan.periods, 1))
+        u = np.tile(excitation_torque(plan, 0, experiment), (plan.periods, 1))
         q, torque = np.zeros((len(u), 3)), np.zeros((len(u), 3))
         state = np.zeros(2 * size)
         for i, row in enumerate(u):
@@ -43,7 +44,7 @@ def test_transient_is_removed_and_the_covariance_holds(make_plan, mechanism):
     """Two experiments from rest: E|δ|²/σ² = 1 where noise is all there is, less where a parabola does not follow a resonance."""
     plan = make_plan(
         base_frequency_hz=0.125,
-        lines=multisine.odd_lines(0.125, 4.0, 30.0),
+        lines=odd_lines(0.125, 4.0, 30.0),
         periods=2,
         settle_periods=0,
         realisations=1,

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 from flexcal.data import Recording, RecordingLabel
-from flexcal.frequency import frequency_response, multisine, noise_lines, reference, spectrum
+from flexcal.frequency import frequency_response, noise_lines, reference_trajectory, spectrum
+from flexcal.frequency.multisine import excitation_torque, odd_lines
 
 INERTIA, GAIN, DAMPING = 8.0, 3000.0, 150.0
 
 
 def make_axis_plan(make_plan, reference_hz, **changes):
-    lines = multisine.odd_lines(0.25, 3.0, 60.0)
+    lines = odd_lines(0.25, 3.0, 60.0)
     values = {
         "joints": (0,),
         "poses": np.zeros((1, 1)),
@@ -35,10 +36,10 @@ def record_axis(plan, coulomb=0.0, spring=0.0, cubic=0.0, noise=0.0, rng=None):
     Coulomb friction is exact: an implicit step that stops the rotor where friction can hold it.
     """
     keys = [(r, s) for r in range(plan.realisations) for s in (1, -1)]
-    excitation = np.stack([multisine.torque(plan, r, 0, s)[:, 0] for r, s in keys], 1)
+    excitation = np.stack([excitation_torque(plan, r, 0, s)[:, 0] for r, s in keys], 1)
     excitation = np.tile(excitation, (plan.periods, 1))
     step = 1.0 / plan.rate_hz
-    angle, velocity, acceleration = reference(plan, np.arange(len(excitation)) * step)
+    angle, velocity, acceleration = reference_trajectory(plan, np.arange(len(excitation)) * step)
     q, v = np.zeros(len(keys)), np.full(len(keys), velocity[0])
     positions, torques = np.zeros_like(excitation), np.zeros_like(excitation)
     h = step / 2

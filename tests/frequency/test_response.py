@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.frequency import FrequencyResponse, frequency_response, frequency_responses, multisine
+from flexcal.frequency import FrequencyResponse, frequency_response, frequency_responses
+from flexcal.frequency.multisine import leave_out_detection_lines
 
 
 def relative_error(response, mechanism):
@@ -128,7 +129,7 @@ def test_bad_recordings_are_refused(make_plan, linear_cell, rng):
 
 def test_lines_left_out_show_the_odd_distortion(make_plan, linear_cell, rng):
     """A cubic in the position, with noise: what is found is what the spectrum of the cubic itself has there, axis by axis."""
-    plan = multisine.leave_out_detection_lines(make_plan(realisations=4))
+    plan = leave_out_detection_lines(make_plan(realisations=4))
     gain = np.array([8e3, 2e3])
 
     def cubic(position):

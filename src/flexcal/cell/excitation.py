@@ -20,7 +20,7 @@ from flexcal.cell.sensors import encoder_resolution, read_encoder, read_torque
 from flexcal.cell.stepping import LoopCommand, LoopGains, run_loop
 from flexcal.data import MultisinePlan, Recording, RecordingLabel
 from flexcal.errors import FlexcalError
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import excitation_torque, reference_trajectory, samples_per_period
 from flexcal.model import RobotModel
 from flexcal.model.arm_sensor import ArmSensor
 
@@ -83,8 +83,8 @@ def prepare(
         truth, config, q=pose, free=free, payload=plan.payload, rate_hz=plan.rate_hz, sensors=sensors
     )
     assumed = build_plant(believed, config, q=pose, free=free, payload=plan.payload)
-    samples = plan.periods * multisine.samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
-    reference = multisine.reference(plan, np.arange(samples) / plan.rate_hz)
+    samples = plan.periods * samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
+    reference = reference_trajectory(plan, np.arange(samples) / plan.rate_hz)
     motion, rate, acceleration = (np.repeat(x[:, None], len(free), axis=1) for x in reference)
     expected = np.zeros(assumed.mjmodel.nv)
     expected[assumed.motors] = pose[free]
@@ -103,7 +103,7 @@ def run(
 ) -> Recording:
     """Run one experiment and read the instruments."""
     sensors, plant, command = config.sensors, excitation.plant, excitation.command
-    period = multisine.torque(plan, label.realisation, label.experiment, label.sign)
+    period = excitation_torque(plan, label.realisation, label.experiment, label.sign)
     excited = np.tile(period[:, np.argsort(plan.joints)], (plan.periods, 1))
     log = run_loop(
         plant,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data import MultisinePlan
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import multisine_spectra, reference_trajectory, synthesise
 from flexcal.model import RobotModel
 from flexcal.model.closed_loop import closed_loop_motion
 from flexcal.model.declared import SHARED_DISTORTION
@@ -62,15 +62,15 @@ class FrictionDisturbance:
         frequencies, lines = plan.frequencies_hz, np.asarray(plan.lines)
         samples = 1 << int(np.ceil(np.log2(_SAMPLES_PER_LINE * lines.max())))
         time = np.arange(samples) / (samples * plan.base_frequency_hz)
-        slow = np.abs(multisine.reference(plan, time)[1])[:, None, None]
-        phasors = np.concatenate([multisine.spectra(plan, draw) for draw in range(DRAWS)], axis=2)
+        slow = np.abs(reference_trajectory(plan, time)[1])[:, None, None]
+        phasors = np.concatenate([multisine_spectra(plan, draw) for draw in range(DRAWS)], axis=2)
         s = 2j * np.pi * frequencies[:, None, None]
         viscous = np.zeros(len(axes))
         deviation = np.zeros((len(lines), len(axes), phasors.shape[2]), dtype=complex)
         for _ in range(PASSES):
             moved = closed_loop_motion(system, frequencies, plan.kp[axes], plan.kd[axes] + viscous)
             fast = s * (moved[:, : len(axes)] @ phasors)
-            velocity = multisine.synthesise(fast, lines, samples)
+            velocity = synthesise(fast, lines, samples)
             met = coulomb[:, None] * np.where(np.abs(velocity) > slow, np.sign(velocity), 0.0)
             drag = np.fft.rfft(met, axis=0)[lines] * (2 / samples)
             viscous = np.sum(np.real(drag * fast.conj()), axis=(0, 2)) / np.sum(

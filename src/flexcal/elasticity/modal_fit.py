@@ -210,7 +210,7 @@ def _coherence(
     spectra: RecordSpectra, found: LocalResponse, response: np.ndarray, scatter: np.ndarray
 ) -> np.ndarray:
     """Multiple coherence (L, n_y): power that the response explains at the lines, pooled over the window, over the total."""
-    from flexcal.frequency.covariance import pool
+    from flexcal.frequency.covariance import pool_noise
 
     at = np.searchsorted(spectra.frequencies_hz, found.frequencies_hz - 1e-9)
     lines = np.flatnonzero(spectra.excited)
@@ -223,7 +223,7 @@ def _coherence(
     ).reshape(len(lines), *response.shape[1:])
     power = (np.abs(np.einsum("kyu,rku->rky", every, spectra.inputs[:, lines])) ** 2).mean(0)
     count = max(1, round(found.correlated_hz / spectra.resolution_hz * len(lines) / len(spectra.excited)))
-    power = pool(power, lines, at, count)
+    power = pool_noise(power, lines, at, count)
     return power / np.maximum(power + scatter, np.finfo(float).tiny)
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.frequency.covariance import pool
+from flexcal.frequency.covariance import pool_noise
 from flexcal.frequency.record_spectra import RecordSpectra
 
 CLUSTERS = 8
@@ -146,7 +146,7 @@ def pooled_covariance(errors: np.ndarray, excited: np.ndarray) -> np.ndarray:
         own = index[excited == kind]
         if own.size:
             count = min(own.size, max(5, -(-_POOLED // records)))
-            found[own] = pool(squares[own], own, own, count)
+            found[own] = pool_noise(squares[own], own, own, count)
     return found
 
 

@@ -10,7 +10,7 @@ _SMALLEST_RELATIVE_STD = (
 )
 
 
-def pool(squares: np.ndarray, bins: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
+def pool_noise(squares: np.ndarray, bins: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
     """Means (L, …) of `squares` (B, …) over the `count` successive bins around each of the positions `at` (L,).
 
     `bins` is sorted; near the ends the window keeps its size and leans inwards. O(B) for any window.
@@ -30,7 +30,7 @@ def column_noise(empty: np.ndarray, bins: np.ndarray, lines: np.ndarray, count: 
     whose noise is smoother over frequency than that of the acceleration.
     """
     squares = np.swapaxes(empty, 1, 2) @ empty.conj() / empty.shape[1]
-    return pool(squares, bins, lines, count)
+    return pool_noise(squares, bins, lines, count)
 
 
 def output_noise(response: np.ndarray, column: np.ndarray) -> np.ndarray:
@@ -86,7 +86,7 @@ def total_covariance(
     input_noise = np.linalg.solve(driven, np.swapaxes(input_noise.conj(), -1, -2))
     significant = 1.0 + 2.0 / np.sqrt((members - 1) * count)  # what the noise may well explain shapes nothing
     disturbance = (np.abs(input_scatter) ** 2).mean((0, -1)) - significant * _diagonal(input_noise)
-    disturbance = np.maximum(pool(disturbance, at, at, count), 0.0)
+    disturbance = np.maximum(pool_noise(disturbance, at, at, count), 0.0)
 
     size = np.linalg.norm(response, axis=2)
     size[:, :n] = np.linalg.norm(driven, axis=(1, 2))[:, None]  # axes have one unit, sensors their own
@@ -98,9 +98,9 @@ def total_covariance(
     vectors = np.swapaxes(white, -1, -2).reshape(members, lines, n * m).transpose(1, 2, 0)
     squares = vectors @ _dagger(vectors) / members
     freedom = float((members - 1) * count)
-    pooled = shrink_to_diagonal(pool(squares, at, at, count), freedom)
+    pooled = shrink_to_diagonal(pool_noise(squares, at, at, count), freedom)
     pooled = pooled + 1e-12 * np.eye(n * m)  # keeps it definite where a scatter is exactly nil
-    return transform(pooled, right, left), freedom
+    return transform_covariance(pooled, right, left), freedom
 
 
 def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
@@ -121,7 +121,7 @@ def shrink_to_diagonal(covariance: np.ndarray, freedom: float) -> np.ndarray:
     return shrunk
 
 
-def transform(covariance: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
+def transform_covariance(covariance: np.ndarray, right: np.ndarray, left: np.ndarray) -> np.ndarray:
     """Covariance of vec(L Y Pᵀ) from that of vec(Y), (L, m n, m n), for batched L = `left` and P = `right`."""
     half = _from_left(covariance, right, left)
     result = _dagger(_from_left(_dagger(half), right, left))

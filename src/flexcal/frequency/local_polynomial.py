@@ -13,7 +13,7 @@ import numpy as np
 
 from flexcal.data import MultisinePlan, Recording
 from flexcal.errors import FlexcalError
-from flexcal.frequency import covariance as cov
+from flexcal.frequency.covariance import kronecker, output_noise
 from flexcal.frequency.line_spectra import has_reference, kept_samples
 from flexcal.frequency.local_windows import ORDER, LocalWindows
 from flexcal.frequency.periods import column_factor
@@ -152,8 +152,8 @@ def _response(records: PoseRecords, names: tuple[str, ...]) -> FrequencyResponse
     )
     return FrequencyResponse(
         frequencies_hz=plan.frequencies_hz,
-        **sensed(records.sensors, n, fit.response, cov.kronecker(fit.gain, fit.scatter)),
-        noise_covariance=cov.kronecker(fit.gain, cov.output_noise(fit.response, noise)[:, :n, :n]),
+        **sensed(records.sensors, n, fit.response, kronecker(fit.gain, fit.scatter)),
+        noise_covariance=kronecker(fit.gain, output_noise(fit.response, noise)[:, :n, :n]),
         degrees_of_freedom=fit.degrees_of_freedom,
         realisations=fit.response[None, :, :n],
         joints=names,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.frequency import covariance as cov
+from flexcal.frequency.covariance import kronecker
 from flexcal.frequency.local_windows import ORDER, LocalWindows, projected
 from flexcal.frequency.record_spectra import RecordSpectra
 
@@ -69,7 +69,7 @@ def local_response(spectra: RecordSpectra) -> LocalResponse:
     return LocalResponse(
         frequencies_hz=spectra.frequencies_hz[at],
         response=response,
-        covariance=cov.kronecker(gain, scatter),
+        covariance=kronecker(gain, scatter),
         scatter=scatter,
         coherence=power / np.maximum(total, np.finfo(float).tiny),
         degrees_of_freedom=min(float(part[4]) for part in parts),

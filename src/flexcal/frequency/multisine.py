@@ -80,7 +80,7 @@ def phases(plan: MultisinePlan, realisation: int) -> np.ndarray:
     return optimise_crest(plan.amplitude, drawn, plan.lines) if plan.crest == "optimised" else drawn
 
 
-def spectra(plan: MultisinePlan, realisation: int) -> np.ndarray:
+def multisine_spectra(plan: MultisinePlan, realisation: int) -> np.ndarray:
     """Torque phasors Γ (L, n_u, n_u) in N m of eq. (25): rows are axes, column e is experiment e.
 
     Γ(k) = diag(A_i(k) exp(jφ_i(k))) T, so an experiment drives axis i with A_i / √n_u at every line, ΓΓᴴ = diag(A_i²),
@@ -90,9 +90,9 @@ def spectra(plan: MultisinePlan, realisation: int) -> np.ndarray:
     return diagonal.T[:, :, None] * orthogonal_matrix(diagonal.shape[0])
 
 
-def torque(plan: MultisinePlan, realisation: int, experiment: int, sign: int = 1) -> np.ndarray:
+def excitation_torque(plan: MultisinePlan, realisation: int, experiment: int, sign: int = 1) -> np.ndarray:
     """One period (samples, n_u) of the excitation torque in N m at the control rate; row 0 is t = 0."""
-    column = sign * spectra(plan, realisation)[:, :, experiment]
+    column = sign * multisine_spectra(plan, realisation)[:, :, experiment]
     samples = samples_per_period(plan.base_frequency_hz, 1.0 / plan.rate_hz)
     return synthesise(column, plan.lines, samples)
 
@@ -110,7 +110,9 @@ def synthesise(phasors: np.ndarray, lines: Sequence[int] | np.ndarray, samples: 
     return np.fft.irfft(bins, samples, axis=0)
 
 
-def reference(plan: MultisinePlan, t: np.ndarray | float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def reference_trajectory(
+    plan: MultisinePlan, t: np.ndarray | float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """The reference motion added to every excited axis at times t (s): angle rad, velocity rad/s, acceleration rad/s²."""
     omega = 2.0 * np.pi * plan.reference_frequency_hz
     sine, cosine = np.sin(omega * np.asarray(t)), np.cos(omega * np.asarray(t))

@@ -3,8 +3,7 @@
 import numpy as np
 
 from flexcal.data import MultisinePlan, Recording
-from flexcal.frequency import covariance as cov
-from flexcal.frequency import multisine
+from flexcal.frequency.covariance import column_noise
 from flexcal.frequency.line_spectra import (
     ExperimentSpectra,
     kept_samples,
@@ -13,6 +12,7 @@ from flexcal.frequency.line_spectra import (
     spectrum,
     torque_hold,
 )
+from flexcal.frequency.multisine import multisine_spectra
 from flexcal.frequency.records import PoseRecords
 
 
@@ -46,11 +46,11 @@ def experiment_spectra(records: PoseRecords, pooled_lines: int) -> ExperimentSpe
     factor = column_factor(records, lines)
     columns = np.moveaxis(columns * factor, 1, -1)  # (R, L, m + n, E)
     empty = empty.transpose(2, 0, 1, 3).reshape(empty.shape[2], -1, columns.shape[2])
-    noise = cov.column_noise(empty, empty_lines, lines, pooled_lines)
+    noise = column_noise(empty, empty_lines, lines, pooled_lines)
     return ExperimentSpectra(
         outputs=columns[..., :m, :],
         torque=columns[..., m:, :],
-        excitation=np.stack([multisine.spectra(plan, member) for member in range(plan.realisations)]),
+        excitation=np.stack([multisine_spectra(plan, member) for member in range(plan.realisations)]),
         noise=noise * factor[:, :, None] * factor[:, None, :].conj(),
     )
 

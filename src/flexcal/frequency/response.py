@@ -10,8 +10,8 @@ import numpy as np
 from flexcal.atomic import atomic_path
 from flexcal.data import MultisinePlan, Recording
 from flexcal.errors import FlexcalError, InputError
-from flexcal.frequency import covariance as cov
 from flexcal.frequency.averages import Average, average_response, right_divide
+from flexcal.frequency.covariance import input_gain, kronecker, output_noise, total_covariance
 from flexcal.frequency.periods import experiment_spectra, keep_periods, odd_distortion
 from flexcal.frequency.records import PoseRecords, by_pose
 from flexcal.npz_reader import ArrayForm, NpzFile
@@ -257,19 +257,19 @@ def response_of(
         )
     try:
         realisations = right_divide(spectra.outputs, spectra.torque)
-        gain = cov.input_gain(spectra.torque)
+        gain = input_gain(spectra.torque)
     except np.linalg.LinAlgError as problem:
         raise FlexcalError(
             "the torque of the experiments leaves an axis unexcited at some line (Γ is singular)."
         ) from (problem)
     mean = realisations.mean(0)
-    noise = cov.output_noise(mean, spectra.noise)
-    total, freedom = cov.total_covariance(realisations, mean, noise, gain, pooled_lines)
+    noise = output_noise(mean, spectra.noise)
+    total, freedom = total_covariance(realisations, mean, noise, gain, pooled_lines)
     n = len(joints)
     return FrequencyResponse(
         frequencies_hz=lines * plan.base_frequency_hz,
         **sensed(records.sensors, n, average_response(spectra, realisations, average), total / members),
-        noise_covariance=cov.kronecker(gain, noise[:, :n, :n]) / members,
+        noise_covariance=kronecker(gain, noise[:, :n, :n]) / members,
         degrees_of_freedom=freedom,
         realisations=realisations[:, :, :n],
         joints=joints,

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from flexcal.data import MultisinePlan, Recording, RecordingLabel, TrajectoryPlan, labels
 from flexcal.errors import FlexcalError
-from flexcal.frequency import multisine
+from flexcal.frequency.multisine import excitation_torque, reference_trajectory, samples_per_period
 from flexcal.hard_cell.description import ArmDescription
 from flexcal.hard_cell.drawn import HardRobot, ideal_robot
 from flexcal.hard_cell.loop import ENCODER_COUNTS, Command, MovingArm, moving_arm, run_loop
@@ -107,7 +107,7 @@ def _excite(
     seed: int,
 ) -> Recording:
     joints = list(moving.free)
-    period = multisine.torque(plan, label.realisation, label.experiment, label.sign)
+    period = excitation_torque(plan, label.realisation, label.experiment, label.sign)
     added = np.tile(period[:, np.argsort(plan.joints)], (plan.periods, 1))
     command = Command(follow.torque + added, follow.angle, follow.rate)
     angle, asked = run_loop(moving, command, follow.rate[0], plan.kp[joints], plan.kd[joints])
@@ -122,17 +122,17 @@ def _excite(
 def _reference(described: ArmDescription, plan: MultisinePlan, pose: np.ndarray, payload: float) -> Command:
     """The slow motion of all excited joints about a pose, and the torque that would make the described robot follow it."""
     joints = sorted(plan.joints)
-    samples = plan.periods * multisine.samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
+    samples = plan.periods * samples_per_period(plan.base_frequency_hz, 1 / plan.rate_hz)
     time = np.arange(samples) / plan.rate_hz
     turns = np.linspace(0, 1, PHASES + 1)
     moved, rate, bent = (
         np.outer(x, np.isin(np.arange(len(pose)), joints))
-        for x in multisine.reference(plan, turns / max(plan.reference_frequency_hz, 1e-9))
+        for x in reference_trajectory(plan, turns / max(plan.reference_frequency_hz, 1e-9))
     )
     torque = rigid_torque(described, pose + moved, rate, bent, payload)
     torque[-1] = torque[0]
     course = CubicSpline(turns, torque, bc_type="periodic")((plan.reference_frequency_hz * time) % 1.0)
-    angle, speed, _ = (np.repeat(x[:, None], len(joints), axis=1) for x in multisine.reference(plan, time))
+    angle, speed, _ = (np.repeat(x[:, None], len(joints), axis=1) for x in reference_trajectory(plan, time))
     everywhere = np.zeros((samples, len(pose)))
     everywhere[:, joints] = speed
     torque = (course + friction(described, everywhere))[:, joints]

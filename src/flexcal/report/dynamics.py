@@ -16,7 +16,7 @@ from flexcal.report.dynamics_checks import (
     check_fit,
     check_joints,
     check_shown,
-    check_unseen,
+    check_unseen_torques,
     check_weight,
     check_weight_shares,
 )
@@ -137,7 +137,7 @@ def dynamics_verdict(study: DynamicsStudy) -> Verdict:
 def dynamics_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
     """The checks behind the verdict; `results` is the document of results.json."""
     return (
-        check_unseen(results["error_percent"], held_out(results)).named("held_out", independent=True),
+        check_unseen_torques(results["error_percent"], held_out(results)).named("held_out", independent=True),
         *([fit.named("torques")] if (fit := check_fit(results["error_percent"]["train"])) else []),
         check_joints(results["error_percent"]["per_joint"]).named("joints"),
         check_base(results).named("base_parameters"),

@@ -19,7 +19,7 @@ _SENSOR = 0.1
 """How far beside 1 the share of the external torques may lie outside its interval: axes turned by half a radian."""
 
 
-def check_unseen(error: Mapping[str, Any], held_out: str) -> Check:
+def check_unseen_torques(error: Mapping[str, Any], held_out: str) -> Check:
     """Whether torques outside the fit are predicted; `held_out` says which, empty for none."""
     question = "Does it predict torques outside the fit?"
     if not held_out:

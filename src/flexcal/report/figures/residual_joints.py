@@ -13,7 +13,7 @@ from flexcal.report.figures.canvas import canvas, panels, single
 from flexcal.report.gravity_loads import GravityLoads
 from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.palette import AXIS, ELASTIC, GRID, INK, NOMINAL
-from flexcal.report.palette import RIGID as RIGID_RESIDUAL_WORKSPACE
+from flexcal.report.palette import RIGID as RIGID_COLOUR
 from flexcal.units import DEGREE, MILLIMETRE
 
 _BINS = 12
@@ -61,7 +61,7 @@ def _binned(q: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return centres, np.array([values[number == k].mean() for k in filled])
 
 
-_RESIDUAL_TORQUE_COLUMNS = 3
+_TORQUE_COLUMNS = 3
 _LOADED = 0.01
 _LOOK = {RIGID: ("rigid geometry alone", NOMINAL), CALIBRATED: ("calibrated", ELASTIC)}
 
@@ -76,16 +76,16 @@ def loaded_joints(joints: Mapping[str, str], loads: GravityLoads) -> list[int]:
 def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> go.Figure:
     """Residual (mm) along the motion of the point by each loaded joint against its gravity torque (N m), with fitted lines by model."""
     chosen, names = loaded_joints(joints, loads), list(joints)
-    count = -(-len(chosen) // _RESIDUAL_TORQUE_COLUMNS)
+    count = -(-len(chosen) // _TORQUE_COLUMNS)
     figure = panels(
         count,
-        _RESIDUAL_TORQUE_COLUMNS,
+        _TORQUE_COLUMNS,
         230 * count + 70,
         [names[i] for i in chosen],
         row_gap=0.3 / max(count, 1),
     )
     for k, i in enumerate(chosen):
-        row, column = k // _RESIDUAL_TORQUE_COLUMNS + 1, k % _RESIDUAL_TORQUE_COLUMNS + 1
+        row, column = k // _TORQUE_COLUMNS + 1, k % _TORQUE_COLUMNS + 1
         torque = loads.torque[:, i]
         for model, (label, colour) in _LOOK.items():
             if model not in loads.along:
@@ -164,7 +164,7 @@ def residual_workspace(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
                 "color": single(distance),
                 "cmin": 0,
                 "cmax": float(np.quantile(distance, 0.99)) if len(distance) else 1.0,
-                "colorscale": [[0, GRID], [0.5, ELASTIC], [1, RIGID_RESIDUAL_WORKSPACE]],
+                "colorscale": [[0, GRID], [0.5, ELASTIC], [1, RIGID_COLOUR]],
                 "line": {"width": 0.5, "color": AXIS},
                 "colorbar": {"title": {"text": "error / mm", "side": "top"}, "thickness": 12, "len": 0.6, "x": 1, "xanchor": "right"},
             },
@@ -176,7 +176,7 @@ def residual_workspace(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
     return figure
 
 
-_ERROR_FIELD_BINS = 10
+_FIELD_BINS = 10
 _SHOWN = 0.998
 """Quantile of the sizes that the axis spans: single outliers would flatten the rest."""
 
@@ -218,7 +218,5 @@ def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:
 
 
 def _means(values: np.ndarray, errors: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    parts = np.array_split(
-        np.argsort(values, kind="stable"), min(_ERROR_FIELD_BINS, max(1, len(values) // 5))
-    )
+    parts = np.array_split(np.argsort(values, kind="stable"), min(_FIELD_BINS, max(1, len(values) // 5)))
     return np.array([values[p].mean() for p in parts]), np.array([errors[p].mean() for p in parts])

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from flexcal.calibration import ErrorStatistics
-from flexcal.report import palette
 from flexcal.report.before import BEFORE
 from flexcal.report.figures.calibration_errors import ErrorSeries, verification_errors
 from flexcal.report.figures.error_distribution import error_distribution, predicted_quantiles
 from flexcal.report.measured_points import CALIBRATED, RIGID
 from flexcal.report.notation import millimetres, ratio, statistics_cells
 from flexcal.report.page import Block, FigureBlock, Section, Table, Text
+from flexcal.report.palette import ELASTIC, NOMINAL
+from flexcal.report.palette import RIGID as RIGID_COLOUR
 from flexcal.report.study import TwoStageStudy
 
 
@@ -19,10 +20,10 @@ def verification_section(study: TwoStageStudy) -> Section:
     before, rigid = fresh.before, fresh.statistics(RIGID)
     assert before is not None and fresh.delivered is not None
     series = [
-        ErrorSeries("rigid calibration", palette.RIGID, fresh.errors[RIGID]),
-        ErrorSeries("elastic calibration", palette.ELASTIC, elastic.errors),
+        ErrorSeries("rigid calibration", RIGID_COLOUR, fresh.errors[RIGID]),
+        ErrorSeries("elastic calibration", ELASTIC, elastic.errors),
     ]
-    everything = [ErrorSeries("before, the robot's own", palette.NOMINAL, fresh.delivered), *series]
+    everything = [ErrorSeries("before, the robot's own", NOMINAL, fresh.delivered), *series]
     published = {}
     if paper is not None and paper.elastic is not None:
         published |= {"paper, 90 %": (paper.elastic.p90, 0.9), "paper, worst": (paper.elastic.max, 1.0)}
