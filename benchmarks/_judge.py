@@ -7,9 +7,11 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.design import CollisionChecker
-from flexcal.dynamics import CLASSIC, BaseParameters, Motion, Observation
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
+from flexcal.design.scene import CollisionChecker
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_parameters, torque_regressor
 
 
 @dataclass(frozen=True, eq=False)

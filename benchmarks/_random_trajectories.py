@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from flexcal.design import CollisionChecker
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.model.joint_space import joint_ranges
+from flexcal.design.scene import CollisionChecker
+from flexcal.model.kinematics import joint_ranges
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_parameters, torque_regressor
 
 INSTANTS = 200
 SHARE = 0.95

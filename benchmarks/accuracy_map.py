@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import accuracy_map, calibrate, predict, propagation, random_poses_in
-from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
-from flexcal.data import PoseSet
-from flexcal.estimation.gaussian_distance import distance_quantile, principal_variances
-from flexcal.model import RobotModel
-from flexcal.model.flank import certain_flank
-from flexcal.model.joint_space import joint_ranges
+from flexcal.calibration.accuracy import accuracy_map, random_poses_in
+from flexcal.calibration.fit import calibrate
+from flexcal.calibration.measurement import covariance_root, moving_parameters, predict, propagation
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import distance_quantile, principal_variances
+from flexcal.model.kinematics import joint_ranges
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import certain_flank
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
 POINTS = 1_000_000

@@ -20,18 +20,21 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics
-from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth
+from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.compensation import compensate
-from flexcal.data import PosePlan, ToolTargets
-from flexcal.design import MeasuringSetup, random_poses
-from flexcal.model import RobotModel, point_kinematics, tool_at_rest
-from flexcal.model.joint_space import joint_ranges
-from flexcal.model.rotations import rotation_vector, vector_rotation
-from flexcal.model.stored import apply_estimates
-from flexcal.workflow.results import read_results
-from flexcal.workflow.two_stage import run_two_stage
-from flexcal.yaml_reader import read_yaml
+from flexcal.data.plans import PosePlan
+from flexcal.data.poses import ToolTargets
+from flexcal.design.poses import random_poses
+from flexcal.design.scene import MeasuringSetup
+from flexcal.files.formats import read_yaml
+from flexcal.jobs.result_files import read_results
+from flexcal.jobs.two_stage import run_two_stage
+from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.parts import rotation_vector, vector_rotation
+from flexcal.model.robot import RobotModel
+from flexcal.model.robot.stored_estimates import apply_estimates
+from flexcal.model.statics import tool_at_rest
+from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth, read_truth
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
 TARGETS = 150

@@ -19,18 +19,12 @@ import numpy as np
 import pinocchio as pin
 
 from benchmarks.peers import PeerAbsentError, run_peer
-from flexcal.data import Recording, write_recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
-    JointLog,
-    Motion,
-    Observation,
-    observe,
-    weighted_least_squares,
-)
-from flexcal.model import RobotModel
+from flexcal.data.recordings import Decimation, Recording, write_recording
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.signals import JointLog, Motion
+from flexcal.model.robot import RobotModel
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "tx40"
 SAMPLES, SHORT, RATE_HZ, CUTOFF_HZ = 1_000_000, 10_000, 1000.0, 50.0

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.data import MultisinePlan, Recording, RecordingLabel
-from flexcal.frequency import frequency_response
-from flexcal.frequency.multisine import multisine_spectra, synthesise
+from flexcal.data.plans import MultisinePlan
+from flexcal.data.recordings import Recording, RecordingLabel
+from flexcal.frequency.periodic import frequency_response, multisine_spectra, synthesise
 
 AXES, REALISATIONS, PERIODS, SETTLE, LINES = 6, 4, 4, 2, 1000
 BASE_HZ, RATE_HZ = 0.25, 4000.0

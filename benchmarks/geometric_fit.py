@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.peers import run_peer
-from flexcal.calibration import calibrate, predict
-from flexcal.data import PoseSet
-from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY
+from flexcal.calibration.fit import calibrate
+from flexcal.calibration.measurement import predict
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 POSES = 200
 

@@ -20,13 +20,14 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration import calibrate, verify
-from flexcal.cell import CellConfig, VirtualCell
-from flexcal.data import PosePlan
+from flexcal.calibration.fit import calibrate
+from flexcal.calibration.verification import verify
+from flexcal.data.plans import PosePlan
+from flexcal.files.formats import read_yaml
 from flexcal.hard_cell import HardCell
-from flexcal.report.checks import CHANCE
-from flexcal.workflow.two_stage import run_two_stage
-from flexcal.yaml_reader import read_yaml
+from flexcal.jobs.two_stage import run_two_stage
+from flexcal.report.checks.pose_errors import CHANCE
+from flexcal.virtual_cell import CellConfig, VirtualCell
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
 PAPER = (0.23, 0.32)

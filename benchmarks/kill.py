@@ -25,14 +25,14 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.cli.main import main as flexcal
-from flexcal.publication import settle
+from flexcal.files.transaction import settle
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parent / "examples"
 LEDGER, STAGES = ".flexcal", ".flexcal-run-*"
 _SAID = "said.txt"
-_IMPORTED = ("calibrate_robot", "identify_dynamics", "two_stage")
-"""Modules of `flexcal.workflow`."""
+_IMPORTED = ("calibration.job", "dynamics.job", "two_stage.job")
+"""Modules of `flexcal.jobs`."""
 _RERUNS = {"demo": 8}
 """Of so many kills of a verb one is followed by a run to its end; of the others, by the one that is killed next."""
 
@@ -93,7 +93,7 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
     """How often each of these was found: old, new, finished (of both, and new once opened), torn, no rerun."""
     found: Counter[str] = Counter()
     for module in _IMPORTED:
-        import_module(f"flexcal.workflow.{module}")
+        import_module(f"flexcal.jobs.{module}")
     with tempfile.TemporaryDirectory(prefix="kill_") as place:
         folder = Path(shutil.copytree(case.robot, Path(place) / "robot"))
         out = folder / case.out

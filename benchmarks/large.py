@@ -25,12 +25,15 @@ from pathlib import Path
 import numpy as np
 import polars as pl
 
-from flexcal.data import MultisinePlan, Recording, labels, write_plan, write_recording
-from flexcal.estimates_file import write_estimates
+from flexcal.data.experiments import labels
+from flexcal.data.plans import MultisinePlan, write_plan
+from flexcal.data.recordings import Recording, write_recording
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.frequency.multisine import excitation_torque, reference_trajectory
-from flexcal.model import RobotModel, inertial_parameters, tool_at_rest, torque_regressor
-from flexcal.model.held_payload import carried_inertias
+from flexcal.files.formats import write_estimates
+from flexcal.frequency.periodic import excitation_torque, reference_trajectory
+from flexcal.model.robot import RobotModel, carried_inertias
+from flexcal.model.statics import tool_at_rest
+from flexcal.model.torques import inertial_parameters, torque_regressor
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 ROWS = (100_000, 1_000_000)

@@ -19,8 +19,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import Drift
-from flexcal.workflow.two_stage import run_two_stage
+from flexcal.calibration.diagnostics import Drift
+from flexcal.jobs.two_stage import run_two_stage
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "tx90l"
 MISMATCHES = {

@@ -19,18 +19,22 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.cell import CellConfig, draw_truth, write_truth
 from flexcal.compensation import compensate
-from flexcal.data import ToolTargets, write_plan
-from flexcal.design import MeasuringSetup, random_poses
+from flexcal.data.plans import write_plan
+from flexcal.data.poses import ToolTargets
+from flexcal.design.poses import random_poses
+from flexcal.design.scene import MeasuringSetup
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel, point_kinematics, tool_at_rest
+from flexcal.files.formats import read_yaml
+from flexcal.jobs.dynamics import identify_robot_inertials
+from flexcal.jobs.experiments import TrajectoryRequest, measure
+from flexcal.jobs.experiments.measurement import VIRTUAL
+from flexcal.jobs.payload import identify_robot_payload
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import tool_at_rest
 from flexcal.units import MILLIMETRE
-from flexcal.workflow.design_trajectory import TrajectoryRequest
-from flexcal.workflow.identify_inertials import identify_robot_inertials
-from flexcal.workflow.identify_payload import identify_robot_payload
-from flexcal.workflow.measure import VIRTUAL, measure
-from flexcal.yaml_reader import read_yaml
+from flexcal.virtual_cell import CellConfig, draw_truth, write_truth
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "tx90l"
 TARGETS = 60

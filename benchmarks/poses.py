@@ -13,22 +13,19 @@ from typing import Any, TypeVar
 import numpy as np
 
 from benchmarks.peers import PeerAbsentError, run_peer
-from flexcal.design import (
-    CollisionChecker,
-    DOptimal,
-    SpectralCriterion,
+from flexcal.design.optimality import DOptimal, SpectralCriterion, choose, exchange
+from flexcal.design.poses import (
     base_sensitivity,
-    exchange,
     pose_sensitivity,
     random_candidates,
     random_poses,
     visiting_order,
 )
-from flexcal.design.feasible_poses import tool_weight
-from flexcal.design.poses import criterion_named
-from flexcal.design.shortlist import choose
+from flexcal.design.poses.feasibility import tool_weight
+from flexcal.design.poses.selection import criterion_named
+from flexcal.design.scene import CollisionChecker
 from flexcal.estimation import Sensitivity
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 ROOT = Path(__file__).parents[1]
 POOL = ROOT / "tests" / "design" / "pose_pool.csv"

@@ -7,12 +7,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.dynamics import best_times
-from flexcal.design.condition import ColumnCondition
-from flexcal.design.criteria import Criterion, DOptimal
-from flexcal.design.motion_limits import MotionLimits
-from flexcal.design.motion_space import MotionSpace
-from flexcal.design.torque_columns import TorqueColumns
-from flexcal.model import RobotModel
+from flexcal.design.optimality import ColumnCondition, Criterion, DOptimal
+from flexcal.design.trajectories import TorqueColumns
+from flexcal.design.trajectories.limit_usage import MotionLimits
+from flexcal.design.trajectories.motion_space import MotionSpace
+from flexcal.model.robot import RobotModel
 
 ROBOT = Path(__file__).parents[1] / "examples" / "tx90l" / "robot.yaml"
 PERIOD, HARMONICS, SAMPLES = 5.0, 5, 500

@@ -9,9 +9,10 @@ from tempfile import TemporaryDirectory
 
 from benchmarks._chromium import PROGRAM, Tab, chromium
 from benchmarks.peers import PeerAbsentError
-from flexcal.workflow.calibrate_robot import calibrate_robot
-from flexcal.workflow.compare_folders import COMPARISON, compare_folders
-from flexcal.workflow.verify_robot import verify_robot
+from flexcal.jobs.accuracy import verify_robot
+from flexcal.jobs.calibration import calibrate_robot
+from flexcal.jobs.pages import compare_folders
+from flexcal.jobs.pages.comparison import COMPARISON
 
 RUNS = 5
 MEGABYTES, SECONDS = 6.5, 1.5

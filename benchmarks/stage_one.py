@@ -14,13 +14,17 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.elasticity import CovarianceWeighting, MultiStart, ResponseModel, stage_one_parameters
-from flexcal.elasticity.residual import StageOneResidual
+from flexcal.elasticity.identification import MultiStart
+from flexcal.elasticity.response_model import (
+    CovarianceWeighting,
+    ResponseModel,
+    StageOneResidual,
+    stage_one_parameters,
+)
 from flexcal.estimation import Problem, solve
-from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
-from flexcal.model.linearisation import linearise
-from flexcal.model.names import spring_names
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import RobotModel, spring_names
+from flexcal.model.vibration import linearise
 
 EXAMPLE = Path(__file__).parent.parent / "examples" / "tx90l"
 PEER_SECONDS = 200.0

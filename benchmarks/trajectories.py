@@ -27,9 +27,8 @@ import numpy as np
 from benchmarks._judge import Judge
 from benchmarks._random_trajectories import INSTANTS, fourier_motion, random_trajectories
 from benchmarks.peers import ENVIRONMENTS, HERE, environment, run_peer
-from flexcal.design import design_trajectories
-from flexcal.design.torque_goal import TrajectoryCriterion
-from flexcal.model import RobotModel
+from flexcal.design.trajectories import TrajectoryCriterion, design_trajectories
+from flexcal.model.robot import RobotModel
 
 DURATION, HARMONICS, RANDOM = 10.0, 5, 1000
 SECONDS = 200.0

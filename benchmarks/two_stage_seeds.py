@@ -19,18 +19,20 @@ from typing import Any, get_args
 
 import numpy as np
 
-from flexcal.cell import CellConfig, draw_truth, write_truth
-from flexcal.design.planned_responses import PlannedResponses
-from flexcal.elasticity import CovarianceWeighting, ResponseModel, Tolerances
-from flexcal.elasticity.experiment_effect import ExperimentEffect
-from flexcal.elasticity.model_error import ModelError
-from flexcal.elasticity.residual import StageOneResidual
-from flexcal.model import RobotModel
-from flexcal.model.names import spring_names, unit_of
-from flexcal.workflow.designed_frequency import PlanName, response_sensors
-from flexcal.workflow.two_stage import run_two_stage
-from flexcal.workflow.two_stage_run import TwoStageRun
-from flexcal.yaml_reader import read_yaml
+from flexcal.design.frequency import PlannedResponses
+from flexcal.elasticity.response_model import (
+    CovarianceWeighting,
+    ExperimentEffect,
+    ModelError,
+    ResponseModel,
+    StageOneResidual,
+    Tolerances,
+)
+from flexcal.files.formats import read_yaml
+from flexcal.jobs.experiments import PlanName, response_sensors
+from flexcal.jobs.two_stage import TwoStageRun, run_two_stage
+from flexcal.model.robot import RobotModel, spring_names, unit_of
+from flexcal.virtual_cell import CellConfig, draw_truth, write_truth
 
 ROBOT = Path(__file__).parent.parent / "examples" / "tx90l" / "robot.yaml"
 

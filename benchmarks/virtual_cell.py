@@ -8,10 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.cell import CellConfig, VirtualCell, draw_truth
-from flexcal.model import RobotModel
-from flexcal.workflow.frequency_plans import frequency_plan
-from flexcal.yaml_reader import read_yaml
+from flexcal.files.formats import read_yaml
+from flexcal.jobs.experiments import frequency_plan
+from flexcal.model.robot import RobotModel
+from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth
 
 FOLDER = Path(__file__).parent.parent / "examples" / "tx90l"
 

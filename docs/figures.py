@@ -3,8 +3,8 @@
 from plotly import io
 from plotly.io.base_renderers import MimetypeRenderer
 
-from flexcal.report.palette import dark_of
-from flexcal.report.render import script_json
+from flexcal.report.layout.palette import dark_of
+from flexcal.report.layout.rendering import script_json
 
 
 class PageRenderer(MimetypeRenderer):

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import settings
 
 if TYPE_CHECKING:
-    from flexcal.model import RobotModel
+    from flexcal.model.robot import RobotModel
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 settings.load_profile("repeatable")
@@ -45,7 +45,7 @@ def examples() -> Path:
 @pytest.fixture(scope="session")
 def tx90l(examples: Path) -> RobotModel:
     """The nominal TX90L (elastic axes 1-3, payload, backlash), without estimates."""
-    from flexcal.model import RobotModel
+    from flexcal.model.robot import RobotModel
 
     return RobotModel.from_yaml(examples / "tx90l" / "robot.yaml", estimates=False)
 
@@ -53,7 +53,7 @@ def tx90l(examples: Path) -> RobotModel:
 @pytest.fixture(scope="session")
 def ur5(examples: Path) -> RobotModel:
     """The nominal UR5 (all joints rigid), without estimates."""
-    from flexcal.model import RobotModel
+    from flexcal.model.robot import RobotModel
 
     return RobotModel.from_yaml(examples / "ur5_tracker" / "robot.yaml", estimates=False)
 
@@ -61,7 +61,7 @@ def ur5(examples: Path) -> RobotModel:
 @pytest.fixture(scope="session")
 def tree(tmp_path_factory: pytest.TempPathFactory) -> RobotModel:
     """Two branches on a trunk, with slides and skew axes, under tilted gravity."""
-    from flexcal.model import RobotModel
+    from flexcal.model.robot import RobotModel
 
     folder = tmp_path_factory.mktemp("tree")
     links = [LINK.format(child, 1.5 + i) for i, (_, child, *_) in enumerate(BRANCHES)]

@@ -6,8 +6,8 @@ from threading import Thread
 
 import pytest
 
-from flexcal.atomic import atomic_path, atomic_paths, write_text
 from flexcal.errors import InputError
+from flexcal.files.transaction import atomic_path, atomic_paths, write_text
 
 
 def test_writes_and_replaces(tmp_path: Path) -> None:

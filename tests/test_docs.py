@@ -22,14 +22,12 @@ import pytest
 
 import flexcal
 from flexcal.cli.main import main
-from flexcal.dynamics.gain_fit import gain_name
-from flexcal.elasticity import stage_one_parameters
-from flexcal.frequency import FrequencyResponse
-from flexcal.frequency.response import POOLED_LINES, SMALLEST_FREEDOM
-from flexcal.model import RobotModel
-from flexcal.model.arm_sensor import ArmSensor
-from flexcal.model.config import ArmSensorConfig
-from flexcal.model.names import unit_of
+from flexcal.dynamics.drives.gains import gain_name
+from flexcal.elasticity.response_model import stage_one_parameters
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.frequency.periodic.response import POOLED_LINES, SMALLEST_FREEDOM
+from flexcal.model.robot import ArmSensor, RobotModel, unit_of
+from flexcal.model.robot.config import ArmSensorConfig
 
 NUMBERS = {"nine": 9, "twelve": 12, "thirteen": 13, "fourteen": 14, "fifteen": 15}
 
@@ -101,7 +99,7 @@ def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel)
 
 
 def test_the_gap_is_as_wide_as_it_says(methods: str, tx90l: RobotModel, rng: np.random.Generator) -> None:
-    from flexcal.design import base_sensitivity, pose_sensitivity
+    from flexcal.design.poses import base_sensitivity, pose_sensitivity
 
     lower, upper = (np.array([getattr(joint, side) for joint in tx90l.joints]) for side in ("lower", "upper"))
     found = base_sensitivity(pose_sensitivity(tx90l, rng.uniform(lower, upper, (60, 6)))).identifiability
@@ -117,7 +115,7 @@ def test_the_pooling_is_as_wide_as_it_says(methods: str) -> None:
 
 
 def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
-    from flexcal.cli.verbs import VERBS
+    from flexcal.cli.arguments.verb_table import VERBS
 
     page = (root / "docs" / "command-line.md").read_text(encoding="utf-8")
     rows = [line for line in page.splitlines() if line.startswith("| `flexcal ")]
@@ -125,7 +123,7 @@ def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
 
 
 def test_the_page_on_files_has_those_that_verbs_leave(root: Path) -> None:
-    from flexcal.cli.verbs import VERBS
+    from flexcal.cli.arguments.verb_table import VERBS
 
     page = (root / "docs" / "file-formats.md").read_text(encoding="utf-8")
     table = page[page.index("## What verbs leave") :].split("\n\n")[1].splitlines()[2:]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.estimates_file import (
+from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
+from flexcal.files.formats import (
     block_sha256,
     provenance,
     read_estimates,
@@ -18,7 +19,6 @@ from flexcal.estimates_file import (
     sha256_of,
     write_estimates,
 )
-from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
 
 
 def make_estimate(size: int = 4, seed: int = 0, **changes: Any) -> Estimate:

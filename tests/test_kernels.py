@@ -5,7 +5,7 @@ import pytest
 
 from flexcal import _kernels
 from flexcal.kernels import append
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 
 @pytest.mark.skipif(not _kernels.avx2, reason="this processor runs only one of the builds")

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.npz_reader import ArrayForm, NpzFile
+from flexcal.files.formats import ArrayForm, NpzFile
 
 FORMS = {
     "q": ArrayForm("real", ("rows", 3)),

@@ -11,10 +11,9 @@ from pathlib import Path
 
 import pytest
 
-from flexcal.atomic import atomic_path, write_text
 from flexcal.errors import InputError
-from flexcal.publication import Publication, current, settle
-from flexcal.publication.stage import PREFIX, Stage
+from flexcal.files.transaction import Publication, Stage, atomic_path, current, settle, write_text
+from flexcal.files.transaction.staging_folder import PREFIX
 
 STEPS = {
     "os.rename",

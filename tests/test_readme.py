@@ -46,7 +46,7 @@ def test_verb_exists(verb: str, tmp_path: Path) -> None:
 
 
 def test_every_verb_is_listed() -> None:
-    from flexcal.cli.verbs import VERBS as KNOWN
+    from flexcal.cli.arguments.verb_table import VERBS as KNOWN
 
     assert sorted(verb.name for verb in KNOWN) == VERBS
 

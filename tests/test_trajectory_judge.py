@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks._judge import Judge
 from benchmarks._random_trajectories import fourier_motion, random_trajectories
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 TIME = np.arange(400) / 40
 

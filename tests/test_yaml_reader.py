@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.yaml_reader import read_yaml, read_yaml_file, write_yaml
-from flexcal.yaml_writer import yaml_text
+from flexcal.files.formats import read_yaml, read_yaml_file, write_yaml, yaml_text
 
 
 @dataclass(frozen=True)

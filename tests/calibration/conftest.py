@@ -8,10 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from flexcal.calibration import predict
-from flexcal.data import PoseSet
-from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY
+from flexcal.calibration.measurement import predict
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 
 @dataclass(frozen=True, eq=False)

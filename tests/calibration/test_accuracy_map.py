@@ -7,27 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration import (
-    ErrorCovariance,
-    ErrorScale,
-    Verification,
-    accuracy_map,
-    error_scale,
-    error_sources,
-    predict,
-    propagation,
-    random_poses_in,
-)
-from flexcal.calibration.propagated_covariance import covariance_root, moving_parameters
-from flexcal.calibration.sources import source_of
-from flexcal.data import PoseSet
+from flexcal.calibration.accuracy import accuracy_map, error_sources, random_poses_in
+from flexcal.calibration.accuracy.source_contributions import source_of
+from flexcal.calibration.measurement import covariance_root, moving_parameters, predict, propagation
+from flexcal.calibration.verification import ErrorCovariance, ErrorScale, Verification, error_scale
+from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.joint_space import joint_ranges
-from flexcal.model.names import unit_of
-from flexcal.model.posterior import Posterior
-from flexcal.model.tree import Bearings
+from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.parts import Bearings
+from flexcal.model.robot import Posterior, RobotModel, unit_of
 
 STD = {
     "offset": 3e-5, "misalignment_1": 3e-5, "misalignment_2": 3e-5, "length_x": 2e-5, "length_y": 2e-5, "length_z": 2e-5,

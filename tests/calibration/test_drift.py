@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration import Drift, calibrate
+from flexcal.calibration.diagnostics import Drift
+from flexcal.calibration.fit import calibrate
 
 TRAVEL = np.array([6e-5, -6e-5, 5e-5])
 

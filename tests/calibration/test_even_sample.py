@@ -6,9 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration import EvenSample, repeatability
-from flexcal.calibration.pose_repeatability import SAME_COMMAND
-from flexcal.data import PoseSet
+from flexcal.calibration.accuracy import repeatability
+from flexcal.calibration.accuracy.pose_repeatability import SAME_COMMAND
+from flexcal.calibration.fit import EvenSample
+from flexcal.data.poses import PoseSet
 
 
 def poses_of(

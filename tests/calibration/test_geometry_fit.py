@@ -7,20 +7,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.calibration import (
-    Calibration,
-    ElasticPrior,
-    ErrorStatistics,
-    calibrate,
-    moved_far,
-    predict,
-    verify,
-)
-from flexcal.data import read_poses
+from flexcal.calibration.diagnostics import moved_far
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.fit import Calibration, ElasticPrior, calibrate
+from flexcal.calibration.measurement import predict
+from flexcal.calibration.verification import verify
+from flexcal.data.poses import read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.model import RobotModel
-from flexcal.model.rotations import vector_rotation
+from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import RobotModel
 
 
 def test_rank_is_29_of_47_with_a_gap_of_many_decades(simulate: Callable) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.calibration.folds import order_folds, single_poses
-from flexcal.calibration.left_out import left_out
+from flexcal.calibration.error_model import order_folds, single_poses
+from flexcal.calibration.term_selection.leave_out_errors import left_out
 
 
 @pytest.mark.parametrize("folds", [40, 8, 3])

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration import PoseDrift, common_way, drift_of_poses, repeatability
-from flexcal.data import PoseSet
+from flexcal.calibration.accuracy import PoseDrift, common_way, drift_of_poses, repeatability
+from flexcal.data.poses import PoseSet
 
 MM = 1e-3
 

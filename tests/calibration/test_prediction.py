@@ -6,11 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration import predict
+from flexcal.calibration.measurement import predict
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY
-from flexcal.model.tree import kinematic_tree
+from flexcal.model.parts import kinematic_tree
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 
 @pytest.fixture(params=["after", "before"])

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexcal.calibration import noise_repeatability, repeatability
-from flexcal.data import PoseSet
+from flexcal.calibration.accuracy import noise_repeatability, repeatability
+from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 
 

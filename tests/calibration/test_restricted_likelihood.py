@@ -8,11 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from flexcal.calibration.error_cells import ErrorCells
-from flexcal.calibration.point_sums import PointSums
-from flexcal.calibration.restricted_likelihood import RestrictedLikelihood
-from flexcal.calibration.scatter import Scatter
-from flexcal.calibration.variance_components import LinearFit
+from flexcal.calibration.error_model import ErrorCells, LinearFit, Scatter
+from flexcal.calibration.error_model.point_sums import PointSums
+from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
 
 ONE_POINT = np.arange(30)
 SEVERAL_POINTS = np.r_[np.repeat(np.arange(9), 2), np.repeat([9, 10, 11], 3), 12, 12, 13]

@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.calibration import geometric_parameters, predict, select_terms
-from flexcal.calibration.folds import order_folds, workspace_folds
-from flexcal.data import PoseSet, read_poses
-from flexcal.model import RobotModel
+from flexcal.calibration.error_model import order_folds, workspace_folds
+from flexcal.calibration.fit import geometric_parameters
+from flexcal.calibration.measurement import predict
+from flexcal.calibration.term_selection import select_terms
+from flexcal.data.poses import PoseSet, read_poses
+from flexcal.model.robot import RobotModel
 
 
 def test_folds_in_measuring_order_are_blocks() -> None:

@@ -16,7 +16,7 @@ import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
-from flexcal.publication import Publication
+from flexcal.files.transaction import Publication
 
 
 @dataclass(frozen=True)

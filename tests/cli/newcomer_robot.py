@@ -6,8 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.rotations import rpy_rotation
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import rpy_rotation
+from flexcal.model.robot import RobotModel
 
 JOINTS = ("turntable", "shoulder", "elbow", "forearm_roll", "wrist", "flange_roll")
 _AXES = ("0 0 1", "0 1 0", "0 1 0", "1 0 0", "0 1 0", "1 0 0")

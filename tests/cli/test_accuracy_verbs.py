@@ -12,12 +12,13 @@ import polars as pl
 import pytest
 from cli_files import copied, read_csv, snapshot, write_csv
 
-from flexcal.calibration import predict
+from flexcal.calibration.measurement import predict
 from flexcal.cli.main import main
-from flexcal.data import read_poses, write_poses
-from flexcal.estimates_file import sha256_of
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.report.notation import millimetres
+from flexcal.data.poses import read_poses, write_poses
+from flexcal.files.formats import sha256_of
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.report.layout import millimetres
 
 Q = [f"q{i}" for i in range(1, 7)]
 SIGMA = 2e-5

@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from cli_files import read_csv, snapshot, write_csv
 
-from flexcal.data import write_poses
-from flexcal.data.pose_set import PoseSet
-from flexcal.model import RobotModel, gravity_torque, point_kinematics
+from flexcal.data.poses import PoseSet, write_poses
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import gravity_torque
 
 Table = tuple[list[str], np.ndarray]
 

@@ -134,7 +134,7 @@ def test_import_offers_the_place_of_the_point(run, tmp_path: Path) -> None:
 
 def test_points_in_blocks_and_in_quotes(tmp_path: Path) -> None:
     from flexcal.errors import InputError
-    from flexcal.workflow.point_place import write_point_place
+    from flexcal.jobs.setup import write_point_place
 
     robot = StrangerArm().write(tmp_path)
     robot.write_text(

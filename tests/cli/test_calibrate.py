@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 from cli_files import FLEXCAL, read_csv, snapshot, write_csv
 
-from flexcal.calibration import EvenSample
-from flexcal.data import PoseSet, write_poses
-from flexcal.estimates_file import read_estimates, write_estimates
+from flexcal.calibration.fit import EvenSample
+from flexcal.data.poses import PoseSet, write_poses
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.model import RobotModel, point_kinematics, static_equilibrium
+from flexcal.files.formats import read_estimates, write_estimates
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import static_equilibrium
 
 
 @pytest.fixture

@@ -11,7 +11,8 @@ import pytest
 from cli_files import copied, read_csv, snapshot, write_csv
 
 from flexcal.cli.main import main
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
 
 Q = [f"q{i}" for i in range(1, 7)]
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from flexcal.cli.verb_options import options_of
-from flexcal.cli.verbs import VERBS
+from flexcal.cli.arguments.verb_options import options_of
+from flexcal.cli.arguments.verb_table import VERBS
 
 TRIED = {
     ("ca",): {"calibrate"},

@@ -1,4 +1,4 @@
-"""How `flexcal demo` hands its arguments on, and what it prints; the run itself is tested in the workflow."""
+"""How `flexcal demo` hands its arguments on, and what it prints; the run itself is tested as a job."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ from typing import Any
 
 import pytest
 
-from flexcal.atomic import write_text
-from flexcal.report.trust import Trust
+from flexcal.files.transaction import write_text
+from flexcal.report.checks import Trust
 
 QUANTITY = {"estimate": 1.05e5, "std": 2e3, "low": 1.01e5, "high": 1.09e5, "truth": 1e5, "identifiable": True}
 UNKNOWN = {"estimate": 7e5, "std": None, "low": None, "high": None, "truth": 1.4e5, "identifiable": False}
@@ -46,9 +46,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
         write_text(out / "results.json", json.dumps(DOCUMENT))
         return SimpleNamespace(trust=Trust())
 
-    monkeypatch.setitem(
-        sys.modules, "flexcal.workflow.two_stage", SimpleNamespace(run_two_stage=run_two_stage)
-    )
+    monkeypatch.setattr("flexcal.jobs.two_stage.run_two_stage", run_two_stage)
     return made
 
 

@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.calibration import rigid_motion
-from flexcal.data import PosePlan, read_plan_of
-from flexcal.estimates_file import read_estimates
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.calibration.measurement import rigid_motion
+from flexcal.data.plans import PosePlan, read_plan_of
+from flexcal.files.formats import read_estimates
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture

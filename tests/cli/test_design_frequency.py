@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from test_bad_input import refused
 
-from flexcal.data import MultisinePlan, read_plan_of
+from flexcal.data.plans import MultisinePlan, read_plan_of
 
 
 def test_a_designed_plan_says_what_it_will_tell(run, tx90l_folder):

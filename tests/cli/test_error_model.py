@@ -11,10 +11,12 @@ import pytest
 from scipy.optimize import least_squares
 from stranger_arm import PANDA, SIX, StrangerArm
 
-from flexcal.calibration import Calibration, calibrate, error_scale, hardly_fits, verify, verify_jointly
-from flexcal.data import PoseSet, read_poses
-from flexcal.model import RobotModel
-from flexcal.workflow.calibration_remarks import calibration_remarks
+from flexcal.calibration.diagnostics import hardly_fits
+from flexcal.calibration.fit import Calibration, calibrate
+from flexcal.calibration.verification import error_scale, verify, verify_jointly
+from flexcal.data.poses import PoseSet, read_poses
+from flexcal.jobs.calibration.remarks import calibration_remarks
+from flexcal.model.robot import RobotModel
 
 TRACKER = 1.5e-5
 

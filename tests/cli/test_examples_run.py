@@ -15,13 +15,13 @@ from cli_files import read_csv, write_csv
 from newcomer_robot import urdf_text
 from two_links import HELD, PAYLOAD, swings, two_links
 
-from flexcal.calibration import predict
+from flexcal.calibration.measurement import predict
+from flexcal.cli.arguments.verb_table import VERBS
 from flexcal.cli.main import main
-from flexcal.cli.verbs import VERBS
-from flexcal.data import read_poses, write_poses
-from flexcal.dynamics import CLASSIC, Observation
-from flexcal.estimates_file import sha256_of
-from flexcal.model import RobotModel
+from flexcal.data.poses import read_poses, write_poses
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
+from flexcal.files.formats import sha256_of
+from flexcal.model.robot import RobotModel
 
 ran: list[str] = []
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 from test_bad_input import refused
 
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 FORMATS = {
     "urdf": "calibrated.urdf",

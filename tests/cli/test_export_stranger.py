@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from stranger_arm import SIX, StrangerArm
 
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 SLIDER = [
     ((0, 0, 1), (0, 0, 0.4)),
@@ -80,7 +80,7 @@ def test_tables_stay_near_nominal_and_mark_what_is_open(run, tmp_path: Path, con
 
 def test_theta_of_a_slide_stays(tmp_path: Path) -> None:
     """A SCARA, whose slide and last axis coincide: tenths of a millimetre between them must not turn its theta."""
-    from flexcal.export.dh import render_dh
+    from flexcal.export import render_dh
 
     arm = StrangerArm(seed=9, axes=tuple(SLIDER))
     robot = arm.write(tmp_path)

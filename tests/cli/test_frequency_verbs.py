@@ -16,15 +16,15 @@ import pytest
 from cli_files import FLEXCAL, copied
 from test_bad_input import refused
 
-from flexcal.cell import read_truth, write_truth
+from flexcal.cli.arguments.verb_table import find_verb
 from flexcal.cli.main import main
-from flexcal.cli.verbs import find_verb
-from flexcal.data import MultisinePlan, read_plan_of, write_plan
-from flexcal.elasticity import PopulationSearch
-from flexcal.estimates_file import read_estimates, sha256_of
+from flexcal.data.plans import MultisinePlan, read_plan_of, write_plan
+from flexcal.elasticity.identification import PopulationSearch
 from flexcal.estimation import Parameters
-from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
+from flexcal.files.formats import read_estimates, sha256_of
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import RobotModel
+from flexcal.virtual_cell import read_truth, write_truth
 
 LOG = "pose_2_realisation_1_experiment_3_minus.parquet"
 

@@ -14,7 +14,7 @@ import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture

@@ -9,8 +9,8 @@ import pytest
 from two_links import GAINS, HELD, PAYLOAD, swings, two_links
 
 from flexcal.cli.main import main
-from flexcal.dynamics import CLASSIC, Observation
-from flexcal.report.notation import significant
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
+from flexcal.report.layout import significant
 
 DECLARED = np.array([50.0, 20.0])
 ROBOT = (

@@ -12,10 +12,11 @@ import polars as pl
 import pytest
 from two_links import GAINS, HELD, swings, two_links
 
-from flexcal.dynamics import CLASSIC, Observation
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
 from flexcal.errors import InputError
-from flexcal.estimates_file import read_estimates
-from flexcal.model import RobotModel, gravity_torque
+from flexcal.files.formats import read_estimates
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import gravity_torque
 
 if TYPE_CHECKING:
     from conftest import Run

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from cli_files import read_csv, snapshot, write_csv
 
-from flexcal.data import read_poses, read_recording, read_recording_blocks
-from flexcal.model import RobotModel
+from flexcal.data.poses import read_poses
+from flexcal.data.recordings import read_recording, read_recording_blocks
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture
@@ -62,7 +63,7 @@ def test_a_log_and_its_signals(run, ur5_folder: Path, rng: np.random.Generator) 
     outcome = run("import", robot, log, "--map", *gains, "--out", out, "--write-signals", "--json")
     assert outcome.status == 0 and "flexcal identify dynamics" in outcome.err
     assert outcome.document["kind"] == "log" and outcome.document["left_out"] == {}
-    from flexcal.data import read_recording
+    from flexcal.data.recordings import read_recording
 
     model = RobotModel.from_yaml(robot, estimates=False)
     converted, direct = read_recording(out, model), read_recording(log, model)

@@ -15,16 +15,15 @@ import pytest
 from cli_files import copied
 from test_bad_input import refused
 
-from flexcal.cell import CellConfig, VirtualCell, draw_truth, read_truth
 from flexcal.cli.main import main
-from flexcal.data import FourierPaths, TrajectoryPlan, read_plan_of, write_plan
-from flexcal.estimates_file import read_estimates, sha256_of
-from flexcal.model import RobotModel
+from flexcal.data.plans import FourierPaths, TrajectoryPlan, read_plan_of, write_plan
+from flexcal.files.formats import read_estimates, read_yaml, sha256_of
+from flexcal.jobs.experiments import exciting_plan
+from flexcal.jobs.two_stage import inertial_stage as stage_zero
+from flexcal.model.robot import RobotModel
 from flexcal.progress import silent
-from flexcal.report.notation import significant
-from flexcal.workflow import stage_zero
-from flexcal.workflow.design_trajectory import exciting_plan
-from flexcal.yaml_reader import read_yaml
+from flexcal.report.layout import significant
+from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth, read_truth
 
 LOG = "pose_1_realisation_1_experiment_1_plus.parquet"
 

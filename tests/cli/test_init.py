@@ -8,7 +8,7 @@ import pytest
 from cli_files import snapshot
 from newcomer_robot import JOINTS, urdf_text
 
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 ARM = """<link name="{side}_{k}"/><joint name="{side}_joint_{k}" type="{kind}"><parent link="{parent}"/><child link="{side}_{k}"/>
 <axis xyz="0 {k} 1"/><origin xyz="0.1 0 0.2"/><limit lower="-1" upper="1" effort="1" velocity="1"/></joint>"""

@@ -12,7 +12,7 @@ import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
-from flexcal.dynamics import read_learned_residual
+from flexcal.dynamics.residual import read_learned_residual
 
 
 def arguments(folder: Path, *options: str) -> list[str]:

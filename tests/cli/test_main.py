@@ -10,7 +10,7 @@ import pytest
 from cli_files import FLEXCAL
 
 from flexcal.cli import main as cli
-from flexcal.cli.verbs import VERBS
+from flexcal.cli.arguments.verb_table import VERBS
 
 
 def test_help_lists_every_verb_with_an_example(run) -> None:
@@ -62,7 +62,7 @@ def test_every_example_parses(verb, monkeypatch: pytest.MonkeyPatch, tmp_path: P
 
     monkeypatch.chdir(tmp_path)
 
-    command = getattr(importlib.import_module(f"flexcal.cli.{verb.module}"), verb.command)
+    command = getattr(importlib.import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
     carried_out: list[object] = []
     monkeypatch.setattr(command, "run", lambda self: carried_out.append(self))
     assert cli.main(verb.example.split()[1:]) == 0
@@ -110,7 +110,7 @@ def test_interrupt_exits_130(run, monkeypatch: pytest.MonkeyPatch) -> None:
     def interrupted(self: object) -> None:
         raise KeyboardInterrupt
 
-    from flexcal.cli.verify import Verify
+    from flexcal.cli.verbs.verify import Verify
 
     monkeypatch.setattr(Verify, "run", interrupted)
     outcome = run("verify", "robot.yaml", "poses.csv")
@@ -123,14 +123,14 @@ def test_interrupt_inside_an_import_exits_130(run, monkeypatch: pytest.MonkeyPat
     def interrupted(self: object) -> None:
         raise ImportError("initialization failed") from KeyboardInterrupt()
 
-    from flexcal.cli.verify import Verify
+    from flexcal.cli.verbs.verify import Verify
 
     monkeypatch.setattr(Verify, "run", interrupted)
     assert run("verify", "robot.yaml", "poses.csv").status == 130
 
 
 def test_a_bug_keeps_its_traceback(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    from flexcal.cli.verify import Verify
+    from flexcal.cli.verbs.verify import Verify
 
     monkeypatch.setattr(Verify, "run", lambda self: 1 / 0)
     with pytest.raises(ZeroDivisionError):
@@ -138,7 +138,7 @@ def test_a_bug_keeps_its_traceback(run, monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_too_little_memory_is_said_in_a_sentence(run, monkeypatch: pytest.MonkeyPatch) -> None:
-    from flexcal.cli.verify import Verify
+    from flexcal.cli.verbs.verify import Verify
 
     monkeypatch.setattr(Verify, "run", lambda self: np.empty(2**59))
     outcome = run("verify", "robot.yaml", "poses.csv")

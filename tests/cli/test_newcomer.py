@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 from newcomer_robot import JOINTS, MARK, tracked, true_robot, urdf_text, write_foreign
 
-from flexcal.data import read_plan, read_poses
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.data.plans import read_plan
+from flexcal.data.poses import read_poses
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
 
 
 def following(outcome) -> str:

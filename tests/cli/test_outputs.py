@@ -9,10 +9,10 @@ import pytest
 from cli_files import snapshot
 from test_bad_input import refused
 
-from flexcal.atomic import write_text
-from flexcal.cli.ledger import LEDGER
-from flexcal.cli.outputs import outputs
+from flexcal.cli.folders.ledger import LEDGER
+from flexcal.cli.folders.overwrite_protection import outputs
 from flexcal.errors import InputError
+from flexcal.files.transaction import write_text
 
 
 def sha256(path: Path) -> str:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from flexcal.estimates_file import sha256_of
+from flexcal.files.formats import sha256_of
 
 BESIDE = "frequency_poses.csv", "cell.yaml"
 

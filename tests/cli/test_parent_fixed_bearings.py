@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from heavy_robot import REPEATABILITY, TRACKER, HeavyRobot, poses, write_poses, write_robot
 
-from flexcal.calibration import BearingAxes, calibrate, compare_bearings
-from flexcal.data import read_poses
-from flexcal.model import RobotModel
+from flexcal.calibration.diagnostics import BearingAxes, compare_bearings
+from flexcal.calibration.fit import calibrate
+from flexcal.data.poses import read_poses
+from flexcal.model.robot import RobotModel
 
 FLOOR = 1.596 * np.hypot(TRACKER, REPEATABILITY)
 """Mean distance (m) that the noise alone makes."""

@@ -11,8 +11,9 @@ import pytest
 from cli_files import write_csv
 from test_bad_input import refused
 
-from flexcal.data import PosePlan, read_plan_of
-from flexcal.model import RobotModel, point_kinematics
+from flexcal.data.plans import PosePlan, read_plan_of
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
 
 SMALL = ("--count", 14, "--candidates", 150)
 BOX = "--working=0.5:0.9,-0.2:0.2,0.3:0.7"

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 from stranger_arm import SIX, StrangerArm
 
-from flexcal.calibration import Calibration, calibrate, error_scale, verify, verify_jointly
-from flexcal.data import read_poses
-from flexcal.model import RobotModel
+from flexcal.calibration.fit import Calibration, calibrate
+from flexcal.calibration.verification import error_scale, verify, verify_jointly
+from flexcal.data.poses import read_poses
+from flexcal.model.robot import RobotModel
 
 REFLECTORS = {"smr": (0.05, 0.03, 0.08), "left": (-0.06, 0.05, 0.07), "right": (0.02, -0.07, 0.1)}
 TRUE = {"smr": (0.054, 0.027, 0.0833), "left": (-0.061, 0.051, 0.0695), "right": (0.021, -0.0702, 0.1005)}

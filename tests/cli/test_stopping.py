@@ -17,16 +17,16 @@ from typing import Any
 import pytest
 from cli_files import FLEXCAL, snapshot
 
-from flexcal.cli.ledger import LEDGER
-from flexcal.publication.stage import PREFIX
+from flexcal.cli.folders.ledger import LEDGER
+from flexcal.files.transaction.staging_folder import PREFIX
 
 PLAN = ("--random", "--count", "3")
 AT_WORK = """
 import sys, time
 from pathlib import Path
-from flexcal.atomic import write_text
+from flexcal.files.transaction import write_text
 from flexcal.cli.main import main
-from flexcal.cli.repeatability import Repeatability
+from flexcal.cli.verbs.repeatability import Repeatability
 
 def run(self):
     for name in ("results.json", "report.html"):

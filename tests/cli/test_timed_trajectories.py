@@ -101,9 +101,9 @@ def test_a_log_of_the_written_motion_identifies_the_robot(run, gantry: Path) -> 
 
 
 def test_seeds_end_at_like_conditions(gantry: Path) -> None:
-    from flexcal.design.condition import condition_number
-    from flexcal.model import RobotModel
-    from flexcal.workflow.design_trajectory import TrajectoryRequest
+    from flexcal.design.optimality import condition_number
+    from flexcal.jobs.experiments import TrajectoryRequest
+    from flexcal.model.robot import RobotModel
 
     model = RobotModel.from_yaml(gantry)
     conditions = []

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from ur10e_logs import COLUMNS, FOLDER, at_hand, log, published_gains
 
-from flexcal.dynamics import JointLog, Motion
-from flexcal.model import RobotModel
-from flexcal.workflow.identify_dynamics import identify_robot_dynamics
+from flexcal.dynamics.signals import JointLog, Motion
+from flexcal.jobs.dynamics import identify_robot_dynamics
+from flexcal.model.robot import RobotModel
 
 pytestmark = at_hand
 

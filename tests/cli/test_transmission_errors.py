@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from stranger_arm import SIX, StrangerArm
 
-from flexcal.calibration import Calibration, calibrate, error_scale, verify_jointly
-from flexcal.data import PoseSet, read_poses
-from flexcal.model import RobotModel
+from flexcal.calibration.fit import Calibration, calibrate
+from flexcal.calibration.verification import error_scale, verify_jointly
+from flexcal.data.poses import PoseSet, read_poses
+from flexcal.model.robot import RobotModel
 
 ORDERS = np.array([1, 2, 5])  # the model knows nothing of the last
 SCATTER = 5e-5

@@ -7,10 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flexcal.data import ToolTargets
-from flexcal.model import RobotModel
-from flexcal.model.joint_space import joint_ranges
-from flexcal.model.names import GEOMETRY
+from flexcal.data.poses import ToolTargets
+from flexcal.model.kinematics import joint_ranges
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 
 @pytest.fixture(scope="session")

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq, root
 
-from flexcal.calibration import predict
-from flexcal.cell import CellConfig, VirtualCell
+from flexcal.calibration.measurement import predict
 from flexcal.compensation import best_posture, compensate
-from flexcal.data import PosePlan, PoseSet, ToolTargets
+from flexcal.data.plans import PosePlan
+from flexcal.data.poses import PoseSet, ToolTargets
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, point_kinematics, tool_at_rest
-from flexcal.model.rotations import rotation_vector, vector_rotation
-from flexcal.model.tree import Bearings
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import Bearings, rotation_vector, vector_rotation
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import tool_at_rest
+from flexcal.virtual_cell import CellConfig, VirtualCell
 
 MICROMETRE = 1e-6
 EASY = np.array([0.3, 0.5, 1.2, 0.4, 0.9, -0.5])

@@ -10,10 +10,12 @@ import pytest
 from scipy.optimize import minimize
 
 from flexcal.compensation import compensate
-from flexcal.data import ToolTargets
+from flexcal.data.poses import ToolTargets
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, point_kinematics, tool_at_rest
-from flexcal.model.rotations import rotation_vector
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import rotation_vector
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import tool_at_rest
 
 JOINT = (
     '<joint name="j{0}" type="revolute"><parent link="l{1}"/><child link="l{0}"/><origin xyz="{2}" rpy="{3}"/>'

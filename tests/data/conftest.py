@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.model.config import SignalConfig
-from flexcal.yaml_reader import read_yaml_file
+from flexcal.files.formats import read_yaml_file
+from flexcal.model.robot import SignalConfig
 
 
 @dataclass(frozen=True)

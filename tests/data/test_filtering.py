@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import firwin
 
-from flexcal.data.filtering import Decimation, DecimationStream
+from flexcal.data.recordings import Decimation, DecimationStream
 from flexcal.errors import FlexcalError
 
 STEP = 1e-3

@@ -9,19 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexcal.data import (
-    Cell,
-    FolderCell,
-    MultisinePlan,
-    PosePlan,
-    PoseSet,
-    Recording,
-    RecordingLabel,
-    labels,
-    write_measured_poses,
-    write_plan,
-    write_recordings,
-)
+from flexcal.data.experiments import Cell, FolderCell, labels, write_measured_poses, write_recordings
+from flexcal.data.plans import MultisinePlan, PosePlan, write_plan
+from flexcal.data.poses import PoseSet
+from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.errors import FlexcalError, InputError
 
 

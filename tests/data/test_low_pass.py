@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfiltfilt
 
-from flexcal.data.low_pass import LowPass
+from flexcal.data.recordings import LowPass
 from flexcal.errors import FlexcalError
 
 STEP = 1e-3

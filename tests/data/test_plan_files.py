@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of, write_plan
+from flexcal.data.plans import MultisinePlan, PosePlan, read_plan, read_plan_of, write_plan
 from flexcal.errors import FlexcalError
-from flexcal.yaml_writer import to_plain
+from flexcal.files.formats import to_plain
 
 
 def make_plan(**changes: Any) -> MultisinePlan:

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexcal.data import PoseSet, concatenate, read_pose_pool, read_poses, write_poses
+from flexcal.data.poses import PoseSet, concatenate, read_pose_pool, read_poses, write_poses
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
 
 HEADER = "pose,q1,q2,x,y,z"

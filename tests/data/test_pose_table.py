@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data import MultisinePlan, PosePlan, read_plan, read_plan_of, read_working, write_plan
+from flexcal.data.plans import MultisinePlan, PosePlan, read_plan, read_plan_of, write_plan
+from flexcal.data.poses import read_working
 from flexcal.errors import InputError
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 
 @pytest.mark.parametrize("payload", [None, np.array([0.0, 2.5, 6.0])])

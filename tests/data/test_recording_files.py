@@ -11,7 +11,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from flexcal.data import Recording, read_recording, read_recording_blocks, write_recording
+from flexcal.data.recordings import Recording, read_recording, read_recording_blocks, write_recording
 from flexcal.errors import FlexcalError, InputError
 from flexcal.units import DEGREE
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexcal.data.signals import assign, read_matrix
-from flexcal.data.table import open_table
+from flexcal.data.tables import assign, open_table
+from flexcal.data.tables.signals import read_matrix
 from flexcal.units import DEGREE
 
 

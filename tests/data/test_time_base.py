@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from flexcal.data import TimeBase, TimeSummary
-from flexcal.data.scattered import interpolated
-from flexcal.data.time_base import gaps, uniform_blocks
+from flexcal.data.recordings import TimeBase, TimeSummary, uniform_blocks
+from flexcal.data.recordings.irregular_interpolation import interpolated
+from flexcal.data.recordings.time_base import gaps
 from flexcal.errors import FlexcalError
 
 FILL = 0.02

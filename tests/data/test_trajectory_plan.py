@@ -9,17 +9,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flexcal.data import (
+from flexcal.data.experiments import labels
+from flexcal.data.plans import (
     FourierPaths,
     MultisinePlan,
     SplinePaths,
     TrajectoryPlan,
-    labels,
     read_plan_of,
     write_plan,
 )
 from flexcal.errors import FlexcalError, InputError
-from flexcal.yaml_writer import to_plain
+from flexcal.files.formats import to_plain
 
 
 def make_trajectory(**changes: Any) -> TrajectoryPlan:

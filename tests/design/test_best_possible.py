@@ -2,8 +2,7 @@ from itertools import combinations
 
 import numpy as np
 
-from flexcal.design import TraceOptimal, exchange
-from flexcal.design.best_possible import least_trace
+from flexcal.design.optimality import TraceOptimal, exchange, least_trace
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 
 WEIGHT = np.diag([1.0, 5.0, 0.2]) + 0.1

@@ -1,11 +1,12 @@
 import numpy as np
 import pytest
 
-from flexcal.design import CollisionChecker, MeasuringSetup, preloaded, random_candidates, visible
+from flexcal.design.poses import preloaded, random_candidates
+from flexcal.design.scene import CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
-from flexcal.model import point_kinematics
-from flexcal.model.config import AcceptanceConfig
-from flexcal.model.joint_space import LIMIT_MARGIN, joint_ranges
+from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.model.kinematics.joint_space import LIMIT_MARGIN
+from flexcal.model.robot import AcceptanceConfig
 from flexcal.units import DEGREE
 
 

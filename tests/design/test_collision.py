@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from flexcal.design import CollisionChecker
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import InputError
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
 
 _LINK = '<link name="{name}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>{shape}</link>'

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from flexcal.design import DOptimal, SpectralCriterion, TraceOptimal, observability
+from flexcal.design.optimality import DOptimal, SpectralCriterion, TraceOptimal, observability
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 

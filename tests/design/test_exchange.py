@@ -3,8 +3,8 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from flexcal.design import DOptimal, SpectralCriterion, TraceOptimal, exchange, greedy
-from flexcal.design.rank_updates import RankUpdates
+from flexcal.design.optimality import DOptimal, SpectralCriterion, TraceOptimal, exchange, greedy
+from flexcal.design.optimality.rank_updates import RankUpdates
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 

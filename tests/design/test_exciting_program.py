@@ -8,18 +8,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.design import CollisionChecker, design_trajectories, sequence
-from flexcal.design.clearance import Clearance
-from flexcal.design.condition import condition_number
-from flexcal.design.exciting_program import NEAR, ExcitingProgram
-from flexcal.design.feasible_start import feasible_places, feasible_swing
-from flexcal.design.motion_limits import MotionLimits
-from flexcal.design.motion_space import MotionSpace
-from flexcal.design.torque_columns import TorqueColumns
-from flexcal.design.torque_goal import TrajectoryCriterion, torque_goal
+from flexcal.design.optimality import condition_number
+from flexcal.design.scene import Clearance, CollisionChecker
+from flexcal.design.trajectories import (
+    NEAR,
+    TorqueColumns,
+    TrajectoryCriterion,
+    design_trajectories,
+    sequence,
+)
+from flexcal.design.trajectories.criterion import torque_goal
+from flexcal.design.trajectories.excitation_problem import ExcitingProgram
+from flexcal.design.trajectories.feasible_start import feasible_places, feasible_swing
+from flexcal.design.trajectories.limit_usage import MotionLimits
+from flexcal.design.trajectories.motion_space import MotionSpace
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.config import BoxConfig, LimitsConfig
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.robot.config import BoxConfig, LimitsConfig
 
 
 def program(

@@ -8,23 +8,35 @@ from itertools import combinations
 import numpy as np
 import pytest
 
-from flexcal.design import CollisionChecker, exchange
-from flexcal.design.amplitude import MOST, ROOM, shaped
-from flexcal.design.frequency_candidates import ExcitablePoses
-from flexcal.design.frequency_poses import choose_frequency_poses, stiffness_curve
-from flexcal.design.gap_crossing import CREST, gap_load, share, share_at_rest, within_preload
-from flexcal.design.multisines import DROOP, EXCITATION, flat_multisine
-from flexcal.design.payload_placement import payload_placements
-from flexcal.design.planned_responses import PlannedResponses
-from flexcal.design.response_sensitivity import thinned
-from flexcal.design.spring_criterion import spring_criterion
+from flexcal.design.frequency import (
+    PlannedResponses,
+    choose_frequency_poses,
+    flat_multisine,
+    payload_placements,
+    shaped,
+    share_at_rest,
+    stiffness_curve,
+    within_preload,
+)
+from flexcal.design.frequency.amplitude_spectrum import MOST, ROOM
+from flexcal.design.frequency.backlash_limit import CREST, gap_load, share
+from flexcal.design.frequency.candidates import ExcitablePoses
+from flexcal.design.frequency.multisines import DROOP, EXCITATION
+from flexcal.design.frequency.response_jacobian import thinned
+from flexcal.design.frequency.spring_precision import spring_criterion
+from flexcal.design.optimality import exchange
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError
-from flexcal.frequency import leave_out_detection_lines
-from flexcal.frequency.multisine import crest_factor, excitation_torque, multisine_spectra, synthesise
-from flexcal.model import gravity_torque
-from flexcal.model.closed_loop import closed_loop_motion, drive_pull
-from flexcal.model.joint_space import joint_ranges
-from flexcal.model.linearisation import linearise
+from flexcal.frequency.periodic import (
+    crest_factor,
+    excitation_torque,
+    leave_out_detection_lines,
+    multisine_spectra,
+    synthesise,
+)
+from flexcal.model.kinematics import joint_ranges
+from flexcal.model.statics import gravity_torque
+from flexcal.model.vibration import closed_loop_motion, drive_pull, linearise
 
 
 @pytest.fixture(scope="module")

@@ -3,9 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data import PoseSet
-from flexcal.design import next_poses, pose_candidates, random_poses
-from flexcal.design.geometry_sensitivity import pose_sensitivity
+from flexcal.data.poses import PoseSet
+from flexcal.design.poses import next_poses, pose_candidates, pose_sensitivity, random_poses
 from flexcal.errors import FlexcalError
 
 
@@ -42,7 +41,7 @@ def _error(tx90l, found, measured, chosen):
 
 
 def _places(model, q):
-    from flexcal.model import point_kinematics
+    from flexcal.model.kinematics import point_kinematics
 
     return point_kinematics(model, q, jacobians=False).position
 

@@ -1,20 +1,15 @@
 import numpy as np
 import pytest
 
-from flexcal.design import (
-    MeasuringSetup,
-    Tolerances,
-    TraceOptimal,
-    TrackerNoise,
-    base_sensitivity,
-    geometry_jacobian,
-    pose_sensitivity,
-)
-from flexcal.design.feasible_poses import tool_weight
-from flexcal.design.poses import tool_error
+from flexcal.design.optimality import TraceOptimal
+from flexcal.design.poses import Tolerances, base_sensitivity, geometry_jacobian, pose_sensitivity
+from flexcal.design.poses.feasibility import tool_weight
+from flexcal.design.poses.selection import tool_error
+from flexcal.design.scene import MeasuringSetup, TrackerNoise
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
-from flexcal.model import point_kinematics, static_equilibrium
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.statics import static_equilibrium
 
 
 def _measured(model, q):

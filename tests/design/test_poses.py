@@ -3,26 +3,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data import PosePlan, PosePool
-from flexcal.design import (
-    CollisionChecker,
-    DOptimal,
-    MeasuringSetup,
-    SpectralCriterion,
+from flexcal.data.plans import PosePlan
+from flexcal.data.poses import PosePool
+from flexcal.design.optimality import DOptimal, SpectralCriterion, exchange, observability
+from flexcal.design.poses import (
     base_sensitivity,
     design_poses,
-    exchange,
-    observability,
     pose_curve,
     pose_sensitivity,
     preloaded,
     random_poses,
-    visible,
 )
-from flexcal.design.poses import tool_error
+from flexcal.design.poses.selection import tool_error
+from flexcal.design.scene import CollisionChecker, MeasuringSetup, visible
 from flexcal.errors import FlexcalError
-from flexcal.model import gravity_torque
-from flexcal.model.joint_space import joint_ranges
+from flexcal.model.kinematics import joint_ranges
+from flexcal.model.statics import gravity_torque
 
 POOL = Path(__file__).parent / "pose_pool.csv"
 
@@ -58,7 +54,7 @@ def test_29_directions_are_kept(design):
 
 
 def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design, rng):
-    from flexcal.design.feasible_poses import tool_weight
+    from flexcal.design.poses.feasibility import tool_weight
 
     fresh = tool_weight(design.base, tx90l, random_poses(tx90l, 400, rng).q)
     chosen = tool_error(design.base, fresh, design.selection.chosen)

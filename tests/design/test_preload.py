@@ -1,8 +1,8 @@
 import numpy as np
 
-from flexcal.design import preloaded
-from flexcal.design.preload import preload_joints
-from flexcal.model import gravity_torque
+from flexcal.design.poses import preloaded
+from flexcal.design.poses.gravity_preload import preload_joints
+from flexcal.model.statics import gravity_torque
 
 
 def test_preloaded_poses_keep_their_flank_whatever_the_inertials(tx90l, rng):

@@ -7,17 +7,24 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.design.multisines import Schedule, flat_multisine
-from flexcal.design.planned_responses import PlannedResponses
-from flexcal.design.response_noise import COMMON_SENSORS, FrictionDisturbance, equation_error
-from flexcal.design.response_sensitivity import friction_in, pose_response, response_parameters, thinned
-from flexcal.design.spring_criterion import largest_stiffness_std
+from flexcal.design.frequency import (
+    COMMON_SENSORS,
+    PlannedResponses,
+    Schedule,
+    flat_multisine,
+    largest_stiffness_std,
+)
+from flexcal.design.frequency.response_jacobian import (
+    friction_in,
+    pose_response,
+    response_parameters,
+    thinned,
+)
+from flexcal.design.frequency.response_noise import FrictionDisturbance, equation_error
 from flexcal.errors import FlexcalError
-from flexcal.model.arm_sensor import ArmSensor
-from flexcal.model.config import ArmSensorConfig
-from flexcal.model.declared import FRICTION_LOG_STD
-from flexcal.model.linearisation import linearise
-from flexcal.model.transfer import transfer_matrix
+from flexcal.model.robot import FRICTION_LOG_STD, ArmSensor
+from flexcal.model.robot.config import ArmSensorConfig
+from flexcal.model.vibration import linearise, transfer_matrix
 
 POSES = np.radians(
     [[0, 60.1, -105, 79.6, 67.5, 0], [0, -50.6, -73.8, 137.8, 50.7, 0], [0, 56, -8, -100, 41, 30]]

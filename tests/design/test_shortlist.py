@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from flexcal.design import DOptimal, SpectralCriterion, TraceOptimal, exchange, shortlist
-from flexcal.design.shortlist import choose, promises
+from flexcal.design.optimality import DOptimal, SpectralCriterion, TraceOptimal, choose, exchange, shortlist
+from flexcal.design.optimality.shortlist import promises
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 

@@ -1,7 +1,6 @@
 import numpy as np
 
-from flexcal.design import joint_origins, link_frames
-from flexcal.model import point_kinematics
+from flexcal.model.kinematics import joint_origins, link_frames, point_kinematics
 
 
 def test_frames_agree_with_pinocchio(tx90l, rng):

@@ -3,7 +3,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from flexcal.design.tour import short_tour
+from flexcal.design.poses.travelling_salesman import short_tour
 
 
 def _length(cost, order):

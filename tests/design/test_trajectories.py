@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.data import TrajectoryPlan
-from flexcal.design import CollisionChecker
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.workflow.design_trajectory import exciting_plan
-from flexcal.yaml_writer import to_plain
+from flexcal.data.plans import TrajectoryPlan
+from flexcal.design.scene import CollisionChecker
+from flexcal.files.formats import to_plain
+from flexcal.jobs.experiments import exciting_plan
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_parameters, torque_regressor
 
 
 @pytest.fixture(scope="module")

@@ -4,18 +4,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.design import (
-    CollisionChecker,
-    MeasuringSetup,
-    link_frames,
-    random_candidates,
-    visible,
-)
-from flexcal.design.visibility import blocked, station_position
+from flexcal.design.poses import random_candidates
+from flexcal.design.scene import CollisionChecker, MeasuringSetup, station_position, visible
+from flexcal.design.scene.visibility import blocked
 from flexcal.errors import FlexcalError
-from flexcal.model import point_kinematics
-from flexcal.model.config import AcceptanceConfig, StationConfig
-from flexcal.model.rotations import rpy_rotation
+from flexcal.model.kinematics import link_frames, point_kinematics
+from flexcal.model.parts import rpy_rotation
+from flexcal.model.robot import AcceptanceConfig
+from flexcal.model.robot.config import StationConfig
 from flexcal.units import DEGREE
 
 

@@ -3,9 +3,10 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 
-from flexcal.design import CollisionChecker, visiting_order
-from flexcal.design.visits import blocked, move_seconds
-from flexcal.model import RobotModel
+from flexcal.design.poses import visiting_order
+from flexcal.design.poses.ordering import blocked, move_seconds
+from flexcal.design.scene import CollisionChecker
+from flexcal.model.robot import RobotModel
 
 LINK = '<link name="{}"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" iyz="0" izz="1"/></inertial>{}</link>'
 BOX = '<collision><origin xyz="{}"/><geometry><box size="{}"/></geometry></collision>'
@@ -76,7 +77,7 @@ def test_the_order_against_every_order(checker):
 
 
 def test_the_tx90l_moves_half_as_long(tx90l, rng):
-    from flexcal.design import random_candidates
+    from flexcal.design.poses import random_candidates
 
     checker = CollisionChecker(tx90l)
     q = random_candidates(checker, 30, rng)

@@ -1,8 +1,7 @@
 import numpy as np
 import pytest
 
-from flexcal.design import (
-    CollisionChecker,
+from flexcal.design.poses import (
     base_sensitivity,
     design_poses,
     geometry_jacobian,
@@ -11,11 +10,11 @@ from flexcal.design import (
     working_box,
     working_points,
 )
-from flexcal.design.feasible_poses import tool_weight
-from flexcal.design.poses import tool_error
+from flexcal.design.poses.feasibility import tool_weight
+from flexcal.design.poses.selection import tool_error
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError
-from flexcal.model import point_kinematics
-from flexcal.model.joint_space import joint_ranges
+from flexcal.model.kinematics import joint_ranges, point_kinematics
 
 LOWER, UPPER = np.array([0.5, -0.2, 0.3]), np.array([0.9, 0.2, 0.7])
 

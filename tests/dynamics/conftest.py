@@ -6,8 +6,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.dynamics import CLASSIC, BaseParameters, Motion, Observation
-from flexcal.model import RobotModel
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture(scope="session")

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.dynamics.cone import Cone
+from flexcal.estimation import Cone
 
 LOW, HIGH = 0.79, 1.21  # a CAD mass, three times the default 7 % less and more
 

@@ -4,8 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import BaseParameters, Motion, Observation, RecordedRows, Window
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import RecordedRows
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])

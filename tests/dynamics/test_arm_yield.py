@@ -6,15 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.cell import write_truth
-from flexcal.data import read_recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import ArmYield, Motion
-from flexcal.dynamics.payload_body import of_frame
-from flexcal.dynamics.payload_equations import in_link
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.model.periodic_torque import yielding_torque
-from flexcal.workflow.measure import VIRTUAL, measure
+from flexcal.data.recordings import Decimation, read_recording
+from flexcal.dynamics.payload import ArmYield
+from flexcal.dynamics.payload.equations import in_link
+from flexcal.dynamics.payload.rigid_body import of_frame
+from flexcal.dynamics.signals import Motion
+from flexcal.jobs.experiments import measure
+from flexcal.jobs.experiments.measurement import VIRTUAL
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_parameters, torque_regressor
+from flexcal.model.vibration import yielding_torque
+from flexcal.virtual_cell import write_truth
 
 LAST = slice(50, 60)
 CUTOFF_HZ = 400.0

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.dynamics import CLASSIC, BaseParameters, Motion, Observation
-from flexcal.model import RobotModel
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel
 
 PUBLISHED = [  # thanhndv212/figaroh-examples, TX40_bp_5.csv, in the names used here
     "link_1.Izz + link_2.Iyy + 0.05185 link_3.mass + 0.07 link_3.mc_z + link_3.Iyy + 0.05185 link_4.mass + 0.05185 link_5.mass"

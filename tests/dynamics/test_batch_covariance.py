@@ -8,19 +8,12 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from flexcal.data import read_recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    BaseParameters,
-    Motion,
-    Observation,
-    RegressionData,
-    Window,
-    observe,
-    weighted_least_squares,
-)
-from flexcal.dynamics.batched_equations import BATCHES, batch_length, batched
-from flexcal.dynamics.rows import rows
+from flexcal.data.recordings import Decimation, read_recording
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData, batch_length, batched, observe, rows
+from flexcal.dynamics.regression.batches import BATCHES
+from flexcal.dynamics.signals import Motion, Window
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 RATE = 100.0

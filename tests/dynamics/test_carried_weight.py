@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data import Recording, write_recording
-from flexcal.dynamics import JointLog, Motion, Observation
+from flexcal.data.recordings import Recording, write_recording
+from flexcal.dynamics.inverse_model import Observation
+from flexcal.dynamics.signals import JointLog, Motion
 from flexcal.errors import InputError
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.workflow.log_payloads import require_joint_torques
+from flexcal.jobs.logs import require_joint_torques
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_parameters, torque_regressor
 
 STEP = 1 / 200
 

@@ -10,25 +10,22 @@ import pytest
 import recovery
 from two_links import CONTROLLER, RATE, driven, errors, recorded, true_values, two_links
 
-from flexcal.data import Recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    Motion,
-    Observation,
-    RegressionData,
-    SimulatedExperiment,
+from flexcal.data.recordings import Decimation, Recording
+from flexcal.dynamics.estimators import (
     direct_and_inverse,
     instrumental_variables,
-    observe,
-    simulated_experiment,
     simulated_iteration,
     weighted_least_squares,
 )
-from flexcal.dynamics.friction_library import CoulombWarmUp
+from flexcal.dynamics.friction.terms import CoulombWarmUp
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
+from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.signals import Motion
+from flexcal.dynamics.simulation import SimulatedExperiment
+from flexcal.dynamics.simulation import experiment as simulated_experiment
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 ENCODER = 1e-3
 TORQUE = 0.5

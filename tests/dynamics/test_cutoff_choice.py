@@ -9,11 +9,13 @@ import pinocchio as pin
 import polars as pl
 import pytest
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import CLASSIC, JointLog, Motion, Observation, observe, weighted_least_squares
-from flexcal.dynamics.base_parameters import BaseParameters
-from flexcal.model import RobotModel
-from flexcal.workflow.treatment import treatment_of
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.signals import JointLog, Motion
+from flexcal.jobs.logs import treatment_of
+from flexcal.model.robot import RobotModel
 
 RATE, SECONDS, TOP_HZ = 1000, 20, 3.0
 TURNS = [

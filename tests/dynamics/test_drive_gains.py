@@ -7,10 +7,11 @@ import numpy as np
 import pytest
 from two_links import GAINS, HELD, PAYLOAD, swings, two_links
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import CLASSIC, BaseParameters, Observation, RegressionData, drive_gains, observe
-from flexcal.dynamics.batched_equations import Batch
-from flexcal.dynamics.instrumental_fit import instrumental_fit
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.drives import drive_gains
+from flexcal.dynamics.estimators import instrumental_fit
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import Batch, RegressionData, observe
 from flexcal.errors import FlexcalError
 
 

@@ -7,22 +7,17 @@ import numpy as np
 import pytest
 from recovery import NOISE, covered, driven, errors, recorded
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    BaseParameters,
-    Motion,
-    Observation,
-    Window,
-    kalman_filter,
-    observe,
-    weighted_least_squares,
-)
-from flexcal.dynamics.ekf import POSITION_NOISE
-from flexcal.dynamics.forward_steps import forward_steps
-from flexcal.dynamics.friction_library import Presliding, WarmUp
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import kalman_filter, weighted_least_squares
+from flexcal.dynamics.estimators.ekf import POSITION_NOISE
+from flexcal.dynamics.friction import Presliding, WarmUp
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.signals import Motion, Window
+from flexcal.dynamics.simulation import forward_steps
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture(scope="module")

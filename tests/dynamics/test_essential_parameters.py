@@ -5,19 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
-    Motion,
-    Observation,
-    RegressionData,
-    essential_parameters,
-    observe,
-    weighted_least_squares,
-)
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.diagnostics import essential_parameters
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.signals import Motion
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 ABSENT = ("link_4.mc_x", "link_5.mc_x", "link_3.Ixy", "link_6.mc_x", "joint_2.torque_offset")
 

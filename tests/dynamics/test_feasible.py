@@ -9,26 +9,21 @@ import pytest
 from log_cholesky import LogCholesky
 from scipy.optimize import minimize
 
-from flexcal.data import read_recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
-    Motion,
-    Observation,
-    RegressionData,
-    Window,
+from flexcal.data.recordings import Decimation, read_recording
+from flexcal.dynamics.estimators import (
     feasible_least_squares,
-    observe,
+    noise_levels,
     weighted_least_squares,
+    weighted_system,
 )
-from flexcal.dynamics.feasible_set import feasible_set
-from flexcal.dynamics.linear_fit import weighted_system
-from flexcal.dynamics.wls import noise_levels
+from flexcal.dynamics.estimators.physical_constraints import feasible_set
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
 from flexcal.export import write_urdf
-from flexcal.model import RobotModel
-from flexcal.model.pseudo_inertia import PSEUDO_INERTIA, is_body, pseudo_inertia
+from flexcal.model.parts import PSEUDO_INERTIA, is_body, pseudo_inertia
+from flexcal.model.robot import RobotModel
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 

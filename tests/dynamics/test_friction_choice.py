@@ -6,29 +6,25 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
-    DriveTerm,
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.friction import Candidate, LoadCoulomb, SublinearViscous, Trial, WarmUp, select_friction
+from flexcal.dynamics.friction.stepwise import FrictionChoice
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, DriveTerm, Observation
+from flexcal.dynamics.regression import (
     ExperimentSystem,
-    Motion,
-    Observation,
     RegressionData,
-    SublinearViscous,
-    Window,
     experiment_system,
+    folds,
     observe,
-    rows,
-    select_friction,
-    weighted_least_squares,
+    prediction_errors,
 )
-from flexcal.dynamics.cross_validation import folds, prediction_errors
-from flexcal.dynamics.friction_choice import Candidate, FrictionChoice, Trial
-from flexcal.dynamics.friction_library import LoadCoulomb, WarmUp
+from flexcal.dynamics.regression import blocks as rows
+from flexcal.dynamics.signals import Motion, Window
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, inertial_parameters
-from flexcal.workflow.dynamics_remarks import dynamics_remarks
+from flexcal.jobs.dynamics.remarks import dynamics_remarks
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_parameters
 
 NOISE = np.array([0.6, 0.4, 0.2, 0.1, 0.1, 0.05])
 

@@ -6,25 +6,22 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.friction import (
     FRICTION_TERMS,
     AsymmetricCoulomb,
-    DriveTerm,
     LoadCoulomb,
-    Motion,
-    Observation,
     Stribeck,
     SublinearViscous,
     WarmUp,
-    Window,
-    rows,
 )
-from flexcal.dynamics.friction_library import dahl
-from flexcal.dynamics.friction_terms import LIBRARY, Scale, variants
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.model.names import unit_of
+from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, variants
+from flexcal.dynamics.friction.terms import dahl
+from flexcal.dynamics.inverse_model import CLASSIC, DriveTerm, Observation
+from flexcal.dynamics.regression import blocks as rows
+from flexcal.dynamics.signals import Motion, Window
+from flexcal.model.robot import RobotModel, unit_of
+from flexcal.model.torques import inertial_parameters, torque_regressor
 
 SHAPE = (0.3, 0.4, 0.5, 0.6, 0.7, 0.8)
 

@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 from recovery import NOISE, driven, errors, recorded
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    BaseParameters,
-    Motion,
-    Observation,
-    RecordedRows,
-    Window,
-    huber_least_squares,
-    observe,
-    weighted_least_squares,
-)
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import RecordedRows, huber_least_squares, weighted_least_squares
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
 
 

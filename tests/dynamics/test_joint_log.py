@@ -6,26 +6,17 @@ import joblib
 import numpy as np
 import pytest
 
-from flexcal.data import Recording, read_recording, write_recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    BaseParameters,
-    ExperimentSystem,
-    JointLog,
-    Motion,
-    Observation,
-    Window,
-    joint_log,
-    observe,
-    weighted_least_squares,
-)
-from flexcal.dynamics.noisy_columns import NoisyLog
-from flexcal.dynamics.rows import rows
+from flexcal.data.recordings import Decimation, Recording, read_recording, write_recording
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.estimators.column_noise import NoisyLog
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import ExperimentSystem, observe, rows
+from flexcal.dynamics.signals import JointLog, Motion, Window, joint_log
 from flexcal.errors import FlexcalError
+from flexcal.jobs.dynamics.remarks import dynamics_remarks
+from flexcal.jobs.logs import LogPart, Treatment, log_systems, read_logs
+from flexcal.jobs.logs.regression_systems import split
 from flexcal.progress import silent
-from flexcal.workflow.dynamics_remarks import dynamics_remarks
-from flexcal.workflow.log_systems import LogPart, log_systems, read_logs, split
-from flexcal.workflow.treatment import Treatment
 
 STEP = 1 / 200
 

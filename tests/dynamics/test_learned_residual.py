@@ -8,22 +8,18 @@ from recovery import driven, recorded
 from scipy.signal import lfilter
 from two_links import true_values, two_links
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData, experiment_system
+from flexcal.dynamics.residual import (
     BlockErrors,
     GaussianProcess,
     LearnedResidual,
-    Motion,
-    Observation,
-    RegressionData,
-    Window,
-    experiment_system,
     learn_residual,
     residual_errors,
-    weighted_least_squares,
 )
+from flexcal.dynamics.signals import Motion, Window
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 

@@ -10,24 +10,22 @@ import pytest
 from recovery import driven
 from two_links import true_values, two_links
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.residual import (
     LEARNED,
-    BaseParameters,
     GaussianProcess,
     LearnedMotor,
     LearnedResidual,
-    Motion,
-    Observation,
-    observe,
     read_learned_residual,
-    weighted_least_squares,
     write_learned_residual,
 )
+from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError, InputError
-from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate
+from flexcal.files.formats import write_estimates
 
 SHARES = np.array([[1.0, 0.0], [0.5, 1.0]])
 

@@ -7,23 +7,16 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    BaseParameters,
-    Motion,
-    Observation,
-    RegressionData,
-    Triangle,
-    Window,
-    essential_parameters,
-    observe,
-    ordinary_least_squares,
-    rows,
-    weighted_least_squares,
-)
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.diagnostics import essential_parameters
+from flexcal.dynamics.estimators import ordinary_least_squares, weighted_least_squares
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData, Triangle, observe
+from flexcal.dynamics.regression import blocks as rows
+from flexcal.dynamics.signals import Motion, Window
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import inertial_parameters
+from flexcal.model.torques import inertial_parameters
 
 ESTIMATORS = [ordinary_least_squares, weighted_least_squares]
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])

@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import CLASSIC, Motion, Observation, Window, experiment_system
-from flexcal.model import RobotModel
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
+from flexcal.dynamics.regression import experiment_system
+from flexcal.dynamics.signals import Motion, Window
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture(params=["tx40", "tx90l", "ur5", "tree"])

@@ -8,10 +8,12 @@ import numpy as np
 import polars as pl
 import pytest
 
-from flexcal.data import Recording, write_recording
-from flexcal.dynamics import JointLog, Motion, Observation
+from flexcal.data.recordings import Recording, write_recording
+from flexcal.dynamics.inverse_model import Observation
+from flexcal.dynamics.signals import JointLog, Motion
 from flexcal.errors import InputError
-from flexcal.model import RobotModel, torque_regressor
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import torque_regressor
 
 RATE = 200.0
 

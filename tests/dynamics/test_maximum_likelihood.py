@@ -7,22 +7,15 @@ import numpy as np
 import pytest
 from recovery import NOISE, covered, driven, errors, recorded
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
-    Motion,
-    Observation,
-    Window,
-    maximum_likelihood,
-    observe,
-    weighted_least_squares,
-)
-from flexcal.dynamics.friction_library import Presliding, WarmUp
-from flexcal.dynamics.repeated_motion import RepeatedMotion
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import maximum_likelihood, weighted_least_squares
+from flexcal.dynamics.friction import Presliding, WarmUp
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.signals import Motion, RepeatedMotion, Window
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 PERIOD = 1000
 
@@ -158,7 +151,7 @@ def test_what_cannot_tell_its_noise_is_refused(
 def test_a_motion_larger_than_the_memory_is_refused_beforehand(
     observation: Observation, base: BaseParameters, clean: Motion, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("flexcal.dynamics.periodic_likelihood.physical_memory", lambda: 500_000)
+    monkeypatch.setattr("flexcal.dynamics.estimators.periodic_likelihood.physical_memory", lambda: 500_000)
     with pytest.raises(
         FlexcalError, match=r"in memory, 0\.0 GB for 5000 samples, and this machine has 0\.0 GB"
     ):

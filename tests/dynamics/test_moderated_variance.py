@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import t as student
 
-from flexcal.dynamics.periodic_likelihood import moderated
+from flexcal.dynamics.estimators.periodic_likelihood import moderated
 
 
 @pytest.mark.parametrize("spread", [0.0, 1.0, 6.0], ids=["equal", "unlike", "unlike by orders"])

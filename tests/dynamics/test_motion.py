@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from scipy.signal import butter, savgol_filter, sosfiltfilt
 
-from flexcal.data import Recording
-from flexcal.dynamics import Motion
-from flexcal.dynamics.motion import filtered_motion
+from flexcal.data.recordings import Recording
+from flexcal.dynamics.signals import Motion, filtered_motion
 from flexcal.errors import FlexcalError
 
 STEP, CUTOFF = 1 / 500, 20.0

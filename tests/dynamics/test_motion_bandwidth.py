@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from flexcal.data import Recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import motion_bandwidth
+from flexcal.data.recordings import Decimation, Recording
+from flexcal.dynamics.signals import motion_bandwidth
 
 STEP = 1 / 400
 

@@ -11,26 +11,19 @@ import recovery
 from two_links import GAINS, HELD, two_links
 from two_links import swings as swing_of
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    CLASSIC,
-    BaseParameters,
-    Motion,
-    Observation,
-    PayloadEquations,
-    PayloadFit,
-    RobotPrior,
-    identify_payload,
-    observe,
-    weighted_least_squares,
-)
-from flexcal.dynamics.payload_body import nearest_body, of_body, of_frame, told_moments
-from flexcal.dynamics.payload_equations import in_link
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.payload import PayloadEquations, PayloadFit, RobotPrior, identify_payload
+from flexcal.dynamics.payload.equations import in_link
+from flexcal.dynamics.payload.rigid_body import nearest_body, of_body, of_frame, told_moments
+from flexcal.dynamics.regression import observe
+from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel, torque_regressor
-from flexcal.model.held_payload import holding
-from flexcal.model.pseudo_inertia import PSEUDO_INERTIA
+from flexcal.model.parts import PSEUDO_INERTIA
+from flexcal.model.robot import RobotModel, holding
+from flexcal.model.torques import torque_regressor
 
 BODY = np.array([2.0, 0.05, -0.03, 0.08, 0.02, 0.001, -0.002, 0.03, 0.003, 0.015])
 """kg, m, kg m² about the centre of mass."""

@@ -9,15 +9,17 @@ from itertools import repeat
 import numpy as np
 import pytest
 
-from flexcal.cell import CellConfig, VirtualCell, draw_truth
-from flexcal.data import FourierPaths, Recording, TrajectoryPlan
-from flexcal.dynamics import identify_with_prior, trajectory_error
+from flexcal.data.plans import FourierPaths, TrajectoryPlan
+from flexcal.data.recordings import Recording
+from flexcal.dynamics.inertials import identify_with_prior, trajectory_error
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel, inertial_parameters, torque_regressor
-from flexcal.model.config import PriorConfig
-from flexcal.model.periodic_torque import periodic_torque
-from flexcal.workflow.design_trajectory import exciting_plan
+from flexcal.jobs.experiments import exciting_plan
+from flexcal.model.robot import RobotModel
+from flexcal.model.robot.config import PriorConfig
+from flexcal.model.torques import inertial_parameters, torque_regressor
+from flexcal.model.vibration import periodic_torque
+from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.signal import butter, decimate, filtfilt
 
-from flexcal.data import read_recording
-from flexcal.dynamics import CLASSIC, BaseParameters, Motion, Observation
-from flexcal.model import RobotModel
+from flexcal.data.recordings import read_recording
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel
 
 RATE, BORDER = 5000.0, 20
 SLOW = np.array([0.05009095, 0.05009095, 0.07504916, 0.0715585, 0.05585054, 0.12217305])

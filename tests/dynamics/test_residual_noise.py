@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.dynamics.prior_fit import noise
-from flexcal.dynamics.trajectory_rows import TrajectoryRows
+from flexcal.dynamics.inertials.bayesian_fit import noise
+from flexcal.dynamics.inertials.linearised_equations import TrajectoryRows
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameter, Parameters
 

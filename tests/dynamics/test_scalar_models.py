@@ -7,17 +7,12 @@ import numpy as np
 import pytest
 from recovery import NOISE, covered, driven, errors, recorded
 
-from flexcal.dynamics import (
-    BaseParameters,
-    Motion,
-    Observation,
-    RecordedRows,
-    RegressionData,
-    energy_least_squares,
-    power_least_squares,
-)
-from flexcal.dynamics.energy_model import EnergyModel
-from flexcal.dynamics.power_model import PowerModel
+from flexcal.dynamics.estimators import RecordedRows, energy_least_squares, power_least_squares
+from flexcal.dynamics.estimators.energy_model import EnergyModel
+from flexcal.dynamics.estimators.power_model import PowerModel
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 

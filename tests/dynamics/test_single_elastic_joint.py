@@ -5,24 +5,22 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    ArmSide,
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.drives import attenuation
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import (
     BaseParameters,
     Coulomb,
     DriveSpring,
-    Motion,
     Observation,
     Play,
-    RegressionData,
     RotorInertia,
     Viscous,
-    attenuation,
-    observe,
-    weighted_least_squares,
 )
+from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.signals import ArmSide, Motion
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 M, FVA, FSA, K, OFFSET, JM, FVM, FSM = 1.7, 0.9, 0.4, 800.0, 2.5, 0.6, 3.0, 1.1
 EIGHT = {

@@ -7,23 +7,20 @@ import numpy as np
 import pytest
 from recovery import NOISE, covered, driven, errors, recorded
 
-from flexcal.data import Recording, write_recording
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import (
-    BaseParameters,
-    JointLog,
-    Motion,
-    Observation,
-    RegressionData,
+from flexcal.data.recordings import Decimation, Recording, write_recording
+from flexcal.dynamics.estimators import (
+    Unknowns,
     column_errors,
+    noise_levels,
     noisy_logs,
-    observe,
     total_least_squares,
     weighted_least_squares,
+    weighted_system,
 )
-from flexcal.dynamics.linear_fit import Unknowns, weighted_system
-from flexcal.dynamics.noisy_columns import position_noise
-from flexcal.dynamics.wls import noise_levels
+from flexcal.dynamics.estimators.column_noise import position_noise
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.signals import JointLog, Motion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 

@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from scipy.signal import welch
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import CLASSIC, Motion, Observation, TorquePrediction, predict_torques
-from flexcal.model import RobotModel
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.diagnostics import TorquePrediction, predict_torques
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel
 
 NOISE = 0.3
 

@@ -6,11 +6,13 @@ from pathlib import Path
 import numpy as np
 import recovery
 
-from flexcal.data.filtering import Decimation
-from flexcal.dynamics import BaseParameters, Motion, Observation, RecordedRows, Window
-from flexcal.dynamics.simulated_experiment import SimulatedExperiment
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.estimators import RecordedRows
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.signals import Motion, Window
+from flexcal.dynamics.simulation import SimulatedExperiment
 from flexcal.estimation import Estimate
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 LINK = """<link name="{name}"><inertial><origin xyz="0.2 0 0.02"/><mass value="{mass}"/>
 <inertia ixx="0.02" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"""

@@ -10,11 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
-from flexcal.model.linearisation import linearise
-from flexcal.model.names import spring_names
-from flexcal.model.transfer import transfer_matrix
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import RobotModel, spring_names
+from flexcal.model.vibration import linearise, transfer_matrix
 
 Synthesis = Callable[..., list[FrequencyResponse]]
 VISCOUS = np.array([1.6, 1.3, 1.8])

@@ -9,26 +9,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.elasticity import (
+from flexcal.elasticity.identification.fit import ResponseData, fit_responses
+from flexcal.elasticity.response_model import (
     CovarianceWeighting,
-    ReferenceMotion,
     ResponseModel,
+    StageOneResidual,
     Tolerances,
-    reference_shift,
+    check_sensors,
     stage_one_parameters,
 )
-from flexcal.elasticity.fit import ResponseData, fit_responses
-from flexcal.elasticity.parameters import check_sensors
-from flexcal.elasticity.residual import StageOneResidual
+from flexcal.elasticity.time_periodic import ReferenceMotion, reference_shift
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Estimate
-from flexcal.export.mjcf import mjcf_spec
-from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
-from flexcal.model.linearisation import linearise
-from flexcal.model.names import spring_names
-from flexcal.model.stored import with_blocks
-from flexcal.model.transfer import transfer_matrix
+from flexcal.export import mjcf_spec
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import RobotModel, spring_names, with_blocks
+from flexcal.model.vibration import linearise, transfer_matrix
 
 SENSORS = """
 sensors:

@@ -7,14 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data import MultisinePlan
-from flexcal.elasticity import ReferenceMotion, Tolerances, reference_shift
-from flexcal.elasticity.drive_torque import DriveTorque
-from flexcal.elasticity.model_error import LowRank
-from flexcal.model.closed_loop import multisine_torque
-from flexcal.model.linearisation import linearise
-from flexcal.model.motor_impedance import over_frequency
-from flexcal.model.transfer import transfer_matrix
+from flexcal.data.plans import MultisinePlan
+from flexcal.elasticity.response_model import Tolerances
+from flexcal.elasticity.response_model.model_error import LowRank
+from flexcal.elasticity.time_periodic import DriveTorque, ReferenceMotion, reference_shift
+from flexcal.model.vibration import linearise, multisine_torque, over_frequency, transfer_matrix
 
 FREE = np.zeros(3)
 STILL = np.zeros((3, 1))

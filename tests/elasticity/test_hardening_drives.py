@@ -7,10 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data import MultisinePlan
-from flexcal.elasticity import Tolerances, identify_stiffness
-from flexcal.elasticity.drive_torque import DriveTorque
-from flexcal.model import RobotModel, static_equilibrium
+from flexcal.data.plans import MultisinePlan
+from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.response_model import Tolerances
+from flexcal.elasticity.time_periodic import DriveTorque
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import static_equilibrium
 
 
 def still_plan(robot: RobotModel, poses: np.ndarray) -> MultisinePlan:

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.cell.config import CellConfig, FrictionConfig, MismatchConfig
-from flexcal.cell.plant import build_plant, linearise
-from flexcal.cell.rest import rest
-from flexcal.elasticity import identify_stiffness
-from flexcal.model.names import spring_names
+from flexcal.elasticity.identification import identify_stiffness
+from flexcal.model.robot import spring_names
+from flexcal.virtual_cell import CellConfig, FrictionConfig, MismatchConfig
+from flexcal.virtual_cell.equilibrium import rest
+from flexcal.virtual_cell.plant import build_plant, linearise
 
 mujoco = pytest.importorskip("mujoco")
 

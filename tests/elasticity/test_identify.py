@@ -7,25 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data import MultisinePlan
-from flexcal.elasticity import (
-    MultiStart,
+from flexcal.data.plans import MultisinePlan
+from flexcal.elasticity.identification import MultiStart, PopulationSearch, identify_stiffness
+from flexcal.elasticity.response_model import (
+    CovarianceWeighting,
     PaperWeighting,
-    PopulationSearch,
-    ReferenceMotion,
     ResponseModel,
+    StageOneResidual,
     Tolerances,
     UniformWeighting,
-    identify_stiffness,
-    reference_shift,
 )
-from flexcal.elasticity.drive_torque import DriveTorque
-from flexcal.elasticity.residual import StageOneResidual
-from flexcal.elasticity.weighting import CovarianceWeighting
+from flexcal.elasticity.time_periodic import DriveTorque, ReferenceMotion, reference_shift
 from flexcal.estimation import Parameters
-from flexcal.model.declared import declared, uncertain_inertials
-from flexcal.model.names import spring_names
-from flexcal.model.posterior import Posterior
+from flexcal.model.robot import Posterior, declared, spring_names, uncertain_inertials
 
 VISCOUS = np.array([1.6, 1.3, 1.8])
 """As in the synthetic responses."""

@@ -6,15 +6,17 @@ import numpy as np
 import pytest
 from axis_simulator import DAMPINGS, INERTIAS, STEP, STIFFNESSES, VISCOUS, Axis, chirp, multisine
 
-from flexcal.elasticity.axis_masses import identify_masses
-from flexcal.elasticity.mass_chain import MassChain, synthesise
-from flexcal.elasticity.modal_fit import identify_modes
-from flexcal.elasticity.resonances import antiresonances, resonances
-from flexcal.frequency.excitation import Channel, ExcitationRecord, equal_pieces
-from flexcal.frequency.excited_band import excited_band
-from flexcal.frequency.local_response import local_response
-from flexcal.frequency.period import find_period
-from flexcal.frequency.record_spectra import record_spectra
+from flexcal.elasticity.modal import antiresonances, identify_masses, identify_modes, resonances
+from flexcal.elasticity.modal.mass_chain import MassChain, synthesise
+from flexcal.frequency.arbitrary import (
+    Channel,
+    ExcitationRecord,
+    equal_pieces,
+    excited_band,
+    find_period,
+    local_response,
+    record_spectra,
+)
 
 
 def test_the_response_is_that_of_the_matrices() -> None:

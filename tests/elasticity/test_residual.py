@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.elasticity import (
+from flexcal.elasticity.response_model import (
     CovarianceWeighting,
     PaperWeighting,
     ResponseModel,
+    StageOneResidual,
     UniformWeighting,
     stage_one_parameters,
 )
-from flexcal.elasticity.residual import PoseResidual, StageOneResidual
-from flexcal.elasticity.weighting import extrema
+from flexcal.elasticity.response_model.residual import PoseResidual
+from flexcal.elasticity.response_model.weighting import extrema
 from flexcal.errors import FlexcalError
 
 

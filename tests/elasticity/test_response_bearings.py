@@ -7,10 +7,10 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from flexcal.elasticity import Tolerances, identify_stiffness
-from flexcal.model import RobotModel
-from flexcal.model.names import spring_names
-from flexcal.model.tree import Bearings
+from flexcal.elasticity.identification import identify_stiffness
+from flexcal.elasticity.response_model import Tolerances
+from flexcal.model.parts import Bearings
+from flexcal.model.robot import RobotModel, spring_names
 
 
 @pytest.mark.parametrize("true", ["before", "after"])

@@ -10,12 +10,10 @@ import pinocchio as pin
 import pytest
 from scipy.linalg import expm
 
-from flexcal.elasticity import ReferenceMotion, reference_shift
-from flexcal.elasticity.friction_pulses import FrictionPulses
-from flexcal.elasticity.reference_motion import ArmState
-from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.equilibrium import elastic_axes
-from flexcal.model.linearisation import Linearisation, linearise
+from flexcal.elasticity.time_periodic import FrictionPulses, ReferenceMotion, reference_shift
+from flexcal.elasticity.time_periodic.reference_motion import ArmState
+from flexcal.model.statics import elastic_axes
+from flexcal.model.vibration import ElasticArm, Linearisation, linearise
 
 STEPS = 600
 FREQUENCIES = np.array([7.25, 19.25, 33.75])

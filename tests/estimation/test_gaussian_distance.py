@@ -6,12 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi
 
-from flexcal.estimation.gaussian_distance import (
-    distance_probability,
-    distance_quantile,
-    mean_distance,
-    principal_variances,
-)
+from flexcal.estimation import distance_probability, distance_quantile, mean_distance, principal_variances
 
 
 @pytest.mark.parametrize("freedom", [1, 2, 3])

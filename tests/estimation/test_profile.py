@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.elasticity.profile import profile_stretch
+from flexcal.elasticity.identification.profile_std import profile_stretch
 from flexcal.estimation import Parameter, Parameters, Problem, profile_rise, solve
 
 TRUE = 2e5

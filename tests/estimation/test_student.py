@@ -3,7 +3,7 @@
 import pytest
 from scipy.special import stdtrit
 
-from flexcal.estimation.student import student_quantile
+from flexcal.estimation import student_quantile
 
 
 @pytest.mark.parametrize("freedom", [1.0, 1.5, 2.0, 4.71, 12.0, 38.4, 99.9])

@@ -10,8 +10,7 @@ import pinocchio as pin
 import pytest
 
 from flexcal.export import write_urdf
-from flexcal.model import RobotModel
-from flexcal.model.names import GEOMETRY
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 Kinematics = Callable[[np.ndarray], np.ndarray]
 

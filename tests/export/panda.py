@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 ORIGINS = [
     ("0 0 0.333", "0 0 0"),

@@ -12,10 +12,9 @@ from panda import ALPHA_QUARTERS, A, D, panda
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
-from flexcal.export.dh import render_dh
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.names import GEOMETRY
-from flexcal.model.posterior import Posterior
+from flexcal.export import render_dh
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import GEOMETRY, Posterior, RobotModel
 
 
 @pytest.fixture

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from flexcal.estimation import Parameter, Parameters
-from flexcal.export.json_document import render_json
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.posterior import Posterior
-from flexcal.model.tree import Bearings
+from flexcal.export import render_json
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import Bearings
+from flexcal.model.robot import Posterior, RobotModel
 
 
 def stand(

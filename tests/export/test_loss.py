@@ -8,13 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.export.loss import AT_REST, measure_loss, random_poses
-from flexcal.export.mjcf_file import mjcf_tool, render_mjcf
-from flexcal.export.sdf import render_sdf, sdf_tool
-from flexcal.export.urdf import render_urdf, urdf_tool, write_urdf
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.config import BoxConfig
-from flexcal.model.equilibrium import gravity_moments
+from flexcal.export import measure_loss, render_mjcf, render_sdf, render_urdf, write_urdf
+from flexcal.export.mjcf_file import mjcf_tool
+from flexcal.export.representation_error import AT_REST, random_poses
+from flexcal.export.sdf import sdf_tool
+from flexcal.export.urdf import urdf_tool
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.robot.config import BoxConfig
+from flexcal.model.statics import gravity_moments
 
 
 def test_backlash_of_one_joint_is_its_lever_times_the_gap(tx90l: RobotModel) -> None:

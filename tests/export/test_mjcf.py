@@ -8,10 +8,9 @@ import pytest
 from scipy.linalg import eigh
 
 from flexcal.errors import FlexcalError
-from flexcal.export import write_mjcf
-from flexcal.export.mjcf import mjcf_spec
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.held_payload import carried_inertias
+from flexcal.export import mjcf_spec, write_mjcf
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel, carried_inertias
 from flexcal.units import DEGREE
 
 mujoco = pytest.importorskip("mujoco")

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from flexcal.export import write_mjcf
-from flexcal.export.loss import random_poses, tool_positions
-from flexcal.model import RobotModel, static_equilibrium
+from flexcal.export.representation_error import random_poses, tool_positions
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import static_equilibrium
 
 mujoco = pytest.importorskip("mujoco")
 

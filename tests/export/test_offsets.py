@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from flexcal.estimation import Parameter, Parameters
-from flexcal.export.loss import measure_loss, random_poses, tool_positions
+from flexcal.export import measure_loss, render_offsets
 from flexcal.export.offset_fit import fit_offsets
-from flexcal.export.offsets import offsets_of, render_offsets
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.posterior import Posterior
+from flexcal.export.offset_table import offsets_of
+from flexcal.export.representation_error import random_poses, tool_positions
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import Posterior, RobotModel
 from flexcal.units import DEGREE
 
 

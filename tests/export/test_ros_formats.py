@@ -12,9 +12,9 @@ from panda import panda
 from scipy.spatial.transform import Rotation
 
 from flexcal.errors import FlexcalError
-from flexcal.export.kinematics import LINKS, render_kinematics
-from flexcal.export.sdf import render_sdf
-from flexcal.model import RobotModel
+from flexcal.export import render_kinematics, render_sdf
+from flexcal.export.universal_robots import LINKS
+from flexcal.model.robot import RobotModel
 
 UR5 = {
     "shoulder": (0, 0, 0.089159, 0, 0, 0),

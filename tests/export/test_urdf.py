@@ -8,9 +8,9 @@ import pinocchio as pin
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.export.urdf import write_urdf
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.names import GEOMETRY
+from flexcal.export import write_urdf
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 
 @pytest.mark.parametrize("robot", ["tx90l", "ur5"])

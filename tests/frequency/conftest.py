@@ -7,8 +7,9 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from flexcal.data import MultisinePlan, Recording, RecordingLabel
-from flexcal.frequency.multisine import (
+from flexcal.data.plans import MultisinePlan
+from flexcal.data.recordings import Recording, RecordingLabel
+from flexcal.frequency.periodic import (
     excitation_torque,
     half_integer_frequency,
     odd_lines,

@@ -5,7 +5,7 @@ from typing import get_args
 import numpy as np
 import pytest
 
-from flexcal.frequency import Average, averages, frequency_response
+from flexcal.frequency.periodic import Average, averages, frequency_response
 
 
 def complex_normal(rng, *shape):

@@ -3,12 +3,10 @@
 import numpy as np
 import pytest
 
-from flexcal.frequency import frequency_response
-from flexcal.frequency.covariance import (
+from flexcal.frequency.periodic import frequency_response, kronecker, pool_noise
+from flexcal.frequency.periodic.covariance import (
     input_gain,
-    kronecker,
     output_noise,
-    pool_noise,
     shrink_to_diagonal,
     transform_covariance,
 )

@@ -5,9 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.frequency.excitation import ExcitationRecord
-from flexcal.frequency.feedback import Feedback, feedback
-from flexcal.frequency.tones import tones
+from flexcal.frequency.arbitrary import ExcitationRecord, Feedback, feedback, tones
 
 POLE, GAIN, STEP = 0.9, 0.2, 1e-2
 """x' = 0.9 x + 0.2 u"""

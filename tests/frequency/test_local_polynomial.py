@@ -6,12 +6,16 @@ import numpy as np
 import pytest
 import scipy.linalg
 
-from flexcal.data import Recording, RecordingLabel
+from flexcal.data.recordings import Recording, RecordingLabel
 from flexcal.errors import FlexcalError
-from flexcal.frequency import frequency_response, local_polynomial_responses
-from flexcal.frequency.covariance import kronecker
-from flexcal.frequency.local_polynomial import local_polynomial, without_transient
-from flexcal.frequency.multisine import excitation_torque, odd_lines
+from flexcal.frequency.periodic import (
+    excitation_torque,
+    frequency_response,
+    kronecker,
+    local_polynomial_responses,
+    odd_lines,
+)
+from flexcal.frequency.periodic.local_polynomial import local_polynomial, without_transient
 
 
 def from_rest(mechanism, plan, experiments, rng, noise):

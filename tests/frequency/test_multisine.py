@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from flexcal.errors import FlexcalError
-from flexcal.frequency import (
+from flexcal.frequency.periodic import (
     crest_factor,
     excitation_torque,
     half_integer_frequency,

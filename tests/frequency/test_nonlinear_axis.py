@@ -5,9 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.data import Recording, RecordingLabel
-from flexcal.frequency import frequency_response, noise_lines, reference_trajectory, spectrum
-from flexcal.frequency.multisine import excitation_torque, odd_lines
+from flexcal.data.recordings import Recording, RecordingLabel
+from flexcal.frequency.periodic import (
+    excitation_torque,
+    frequency_response,
+    noise_lines,
+    odd_lines,
+    reference_trajectory,
+    spectrum,
+)
 
 INERTIA, GAIN, DAMPING = 8.0, 3000.0, 150.0
 

@@ -7,8 +7,12 @@ import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError, InputError
-from flexcal.frequency import FrequencyResponse, frequency_response, frequency_responses
-from flexcal.frequency.multisine import leave_out_detection_lines
+from flexcal.frequency.periodic import (
+    FrequencyResponse,
+    frequency_response,
+    frequency_responses,
+    leave_out_detection_lines,
+)
 
 
 def relative_error(response, mechanism):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.frequency import frequency_response, local_polynomial_responses
+from flexcal.frequency.periodic import frequency_response, local_polynomial_responses
 
 MIX = np.array([3.0, -2.0])
 """What the sensor reads is this mixture of the motors' displacements, and noise of its own."""

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.frequency import noise_lines, spectrum
-from flexcal.frequency.line_spectra import noise_in_half_sum, torque_hold
+from flexcal.frequency.periodic import noise_lines, spectrum, torque_hold
+from flexcal.frequency.periodic.line_spectra import noise_in_half_sum
 
 
 def test_spectrum_finds_phasors_on_whole_and_half_lines(rng):

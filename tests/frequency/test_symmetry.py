@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.frequency import FrequencyResponse, reciprocity
+from flexcal.frequency.periodic import FrequencyResponse, reciprocity
 
 LINES, POSES = 60, 4
 NOISE = 0.02

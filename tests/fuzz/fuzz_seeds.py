@@ -117,7 +117,7 @@ seed: 1
 
 def write_files(folder: Path) -> None:
     """robot.yaml, its URDF, cell.yaml, plan.yaml, and measured poses, logs and targets as the nominal arm would give them, with noise."""
-    from flexcal.model import RobotModel
+    from flexcal.model.robot import RobotModel
 
     folder.mkdir(parents=True, exist_ok=True)
     for name, text in (("arm.urdf", URDF), ("robot.yaml", ROBOT), ("cell.yaml", CELL), ("plan.yaml", PLAN)):
@@ -141,7 +141,7 @@ def write_files(folder: Path) -> None:
 
 
 def _points(model, q: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-    from flexcal.model import point_kinematics
+    from flexcal.model.kinematics import point_kinematics
 
     points = point_kinematics(model, q).position
     return np.column_stack([points + 5e-5 * rng.normal(size=points.shape), np.full(len(q), 5e-5)])

@@ -13,18 +13,18 @@ from fuzz_seeds import CELL, PLAN, ROBOT, URDF
 from hypothesis import HealthCheck, assume, given, settings
 from hypothesis import strategies as st
 
-from flexcal.cell import CellConfig
-from flexcal.data import read_plan
-from flexcal.data.table import open_table
+from flexcal.data.plans import read_plan
+from flexcal.data.tables import open_table
 from flexcal.errors import InputError
-from flexcal.estimates_file import StoredEstimates
-from flexcal.frequency import FrequencyResponse
-from flexcal.importing import read_foreign
-from flexcal.model.config import RobotConfig
+from flexcal.files.formats import read_yaml, read_yaml_file
+from flexcal.files.formats.estimates_file import StoredEstimates
+from flexcal.files.structuring import MisfitError, structure
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.importing.readers import read_foreign
+from flexcal.jobs.result_files import read_results
+from flexcal.model.robot import RobotConfig
 from flexcal.model.urdf import read_urdf
-from flexcal.plain_data import MisfitError, structure
-from flexcal.workflow.results import read_results
-from flexcal.yaml_reader import read_yaml, read_yaml_file
+from flexcal.virtual_cell import CellConfig
 
 pytestmark = pytest.mark.slow
 thorough = settings(

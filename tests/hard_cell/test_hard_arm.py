@@ -11,12 +11,13 @@ import pytest
 from scipy.linalg import eigh
 from scipy.optimize import brentq
 
-from flexcal.hard_cell import loop
-from flexcal.hard_cell.description import ArmDescription, Link, read_description
-from flexcal.hard_cell.drawn import HardRobot, ideal_robot
-from flexcal.hard_cell.loop import Command, moving_arm, run_loop
+from flexcal.hard_cell import ArmDescription, HardRobot, read_description
+from flexcal.hard_cell import closed_loop as loop
+from flexcal.hard_cell.closed_loop import Command, moving_arm, run_loop
+from flexcal.hard_cell.description import Link
+from flexcal.hard_cell.equilibrium import stand
 from flexcal.hard_cell.multibody import Multibody, build
-from flexcal.hard_cell.standing import stand
+from flexcal.hard_cell.true_parameters import ideal_robot
 
 POSES = {"A": [0, 90, 0, 0, 0, 0], "B": [0, 45, 60, 0, 45, 0], "C": [0, 0, 90, 0, 0, 0]}
 NOTES = {  # Hz, all motors locked, bearing axes fixed in the parent: the table of the TX90L's notes

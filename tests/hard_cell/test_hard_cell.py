@@ -10,14 +10,15 @@ import numpy as np
 import pytest
 
 import flexcal.hard_cell
-from flexcal.calibration import predict
-from flexcal.data import Cell, MultisinePlan, PosePlan
+from flexcal.calibration.measurement import predict
+from flexcal.data.experiments import Cell
+from flexcal.data.plans import MultisinePlan, PosePlan
 from flexcal.errors import FlexcalError
 from flexcal.hard_cell import HardCell, counterparts, draw_robot, read_description
-from flexcal.hard_cell.drawn import ideal_robot
-from flexcal.model import RobotModel
-from flexcal.workflow.demo_cells import open_cell
-from flexcal.workflow.frequency_plans import frequency_plan
+from flexcal.hard_cell.true_parameters import ideal_robot
+from flexcal.jobs.experiments import frequency_plan
+from flexcal.jobs.two_stage.cells import open_cell
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture(scope="module")
@@ -39,21 +40,27 @@ def anywhere(count: int, seed: int = 0) -> PosePlan:
 def test_it_shares_no_robot_with_the_identification() -> None:
     """Of the model it takes the words of robot.yaml alone; nothing of the export and of the virtual cell."""
     folder = Path(flexcal.hard_cell.__file__).parent
-    taken = set()
+    taken, names = set(), set()
     for file in folder.glob("*.py"):
         for node in ast.walk(ast.parse(file.read_text())):
             if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("flexcal"):
                 taken.add(node.module)
+                names |= {alias.name for alias in node.names if node.module == "flexcal.model.robot"}
             assert not isinstance(node, ast.Import) or "flexcal" not in {a.name for a in node.names}
     known = {
         "flexcal",
-        "flexcal.data",
+        "flexcal.data.experiments",
+        "flexcal.data.plans",
+        "flexcal.data.poses",
+        "flexcal.data.recordings",
         "flexcal.errors",
-        "flexcal.frequency",
-        "flexcal.model.config",
-        "flexcal.mujoco_step",
+        "flexcal.files.formats",
+        "flexcal.frequency.periodic",
+        "flexcal.model.robot",
+        "flexcal.mujoco_library",
     }
-    assert {name for name in taken if ".hard_cell" not in name} <= known | {"flexcal.yaml_reader"}
+    assert {name for name in taken if ".hard_cell" not in name} <= known
+    assert names == {"RobotConfig"}
 
 
 def test_it_is_a_cell(robot: Path) -> None:

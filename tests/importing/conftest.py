@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data.table import Table, TableFile
-from flexcal.importing import ForeignTable
+from flexcal.data.tables import Table, TableFile
+from flexcal.importing.tables import ForeignTable
 
 MakeTable = Callable[..., ForeignTable]
 

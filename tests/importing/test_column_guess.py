@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.importing import guess_columns, reasons_of
-from flexcal.importing.column_names import parse_name
-from flexcal.model import RobotModel
+from flexcal.importing.columns import guess_columns, reasons_of
+from flexcal.importing.tables import parse_name
+from flexcal.model.robot import RobotModel
 
 SIX = range(1, 7)
 XYZ = ["x", "y", "z"]

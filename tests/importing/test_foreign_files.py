@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.importing import read_foreign
+from flexcal.importing.readers import read_foreign
 
 VALUES = np.array([[1, -12.5, 0.001], [2, 3.25, 7.0], [3, 4e-7, 8.125]])
 

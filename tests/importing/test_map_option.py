@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.importing import apply_map, guess_columns
+from flexcal.importing.columns import apply_map, guess_columns
 
 
 @pytest.fixture
@@ -50,9 +50,9 @@ def test_the_signals_block_says_the_same(ur5, foreign, tmp_path) -> None:
     """What is printed for robot.yaml, read by the reader of robot.yaml, gives the same numbers."""
     import shutil
 
-    from flexcal.data.signals import mapped_signals
-    from flexcal.model import RobotModel
-    from flexcal.workflow.signals_block import add_signals
+    from flexcal.data.tables import mapped_signals
+    from flexcal.jobs.setup import add_signals
+    from flexcal.model.robot import RobotModel
 
     shutil.copytree(ur5.path.parent, tmp_path / "ur5")
     placed = mapped(

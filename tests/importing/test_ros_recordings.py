@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.importing import guess_columns, read_foreign
-from flexcal.model import point_kinematics
+from flexcal.importing.columns import guess_columns
+from flexcal.importing.readers import read_foreign
+from flexcal.model.kinematics import point_kinematics
 
 pytest.importorskip("rosbags")
 ORDER = [3, 1, 5, 0, 2, 4]

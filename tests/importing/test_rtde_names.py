@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from flexcal.importing import guess_columns, reasons_of
+from flexcal.importing.columns import guess_columns, reasons_of
 
 VECTORS = [
     "target_q",

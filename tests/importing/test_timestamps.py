@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.data.timestamps import seconds_of
-from flexcal.importing import guess_columns, read_foreign
+from flexcal.data.tables import seconds_of
+from flexcal.importing.columns import guess_columns
+from flexcal.importing.readers import read_foreign
 
 FIRST = datetime.datetime(2026, 2, 28, 23, 59, 58, 250_000)
 LATER = np.array([0.0, 0.008, 1.75, 2.0, 86_400.125])

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.importing import guess_columns, read_foreign
+from flexcal.importing.columns import guess_columns
+from flexcal.importing.readers import read_foreign
 
 pyuff = pytest.importorskip("pyuff")
 

@@ -9,13 +9,15 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.calibration import calibrate, predict
-from flexcal.data import PoseSet
-from flexcal.design import CollisionChecker
-from flexcal.export.urdf import write_urdf
-from flexcal.model import RobotModel, gravity_torque, point_kinematics
-from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.names import GEOMETRY
+from flexcal.calibration.fit import calibrate
+from flexcal.calibration.measurement import predict
+from flexcal.data.poses import PoseSet
+from flexcal.design.scene import CollisionChecker
+from flexcal.export import write_urdf
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import GEOMETRY, RobotModel
+from flexcal.model.statics import gravity_torque
+from flexcal.model.vibration import ElasticArm
 
 LINK = (
     '<link name="{0}"><inertial><origin xyz="0.1 0.02 0"/><mass value="2"/>'

@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, energy_regressor, inertial_parameters, torque_regressor
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import energy_regressor, inertial_parameters, torque_regressor
 
 
 @pytest.fixture(params=["tx90l", "ur5"])

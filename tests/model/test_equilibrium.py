@@ -5,9 +5,10 @@ import pinocchio as pin
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, gravity_torque, point_kinematics, static_equilibrium
-from flexcal.model.elastic_arm import ElasticArm
-from flexcal.model.equilibrium import elastic_axes
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import elastic_axes, gravity_torque, static_equilibrium
+from flexcal.model.vibration import ElasticArm
 
 Q = np.random.default_rng(0).uniform(-2, 2, (30, 6))
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model import RobotModel, gravity_torque
-from flexcal.model.equilibrium import gravity_regressor
-from flexcal.model.flank import certain_flank, gravity_torque_std
-from flexcal.model.posterior import Posterior
+from flexcal.model.robot import Posterior, RobotModel
+from flexcal.model.statics import certain_flank, gravity_torque
+from flexcal.model.statics.equilibrium import gravity_regressor
+from flexcal.model.statics.flank import gravity_torque_std
 
 
 def test_std_against_inertials_drawn_from_the_prior(tx90l: RobotModel, rng: np.random.Generator) -> None:

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from flexcal.model import RobotModel, static_equilibrium
-from flexcal.model.hardening import tangent_ratio, twist_by_hardening, twist_of
-from flexcal.model.linearisation import linearise
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import static_equilibrium, tangent_ratio, twist_by_hardening, twist_of
+from flexcal.model.vibration import linearise
 
 POSE = np.array([0.4, 1.0, -0.3, 0.7, -0.5, 0.2])
 

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, point_kinematics, reach_points
+from flexcal.model.kinematics import point_kinematics, reach_points
+from flexcal.model.robot import RobotModel
 
 LIMIT = 2.5
 

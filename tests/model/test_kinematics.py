@@ -5,9 +5,9 @@ import pinocchio as pin
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.names import GEOMETRY
-from flexcal.model.rotations import axis_rotation
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import axis_rotation
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 NAMES_OF_GEOMETRY = [f"joint_{i}.{key}" for i in range(1, 7) for key in GEOMETRY] + [
     f"tool.{key}" for key in GEOMETRY

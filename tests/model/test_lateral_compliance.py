@@ -9,10 +9,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.model import RobotModel, point_kinematics, static_equilibrium
-from flexcal.model.equilibrium import gravity_moments
-from flexcal.model.names import LATERAL
-from flexcal.model.tree import Bearings
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import Bearings
+from flexcal.model.robot import LATERAL, RobotModel
+from flexcal.model.statics import gravity_moments, static_equilibrium
 
 Q = np.random.default_rng(4).uniform(-2, 2, (20, 6))
 

@@ -5,10 +5,9 @@ import pytest
 from scipy.linalg import eigh
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
-from flexcal.model.linearisation import linearise
-from flexcal.model.transfer import transfer_matrix
-from flexcal.model.tree import Bearings
+from flexcal.model.parts import Bearings
+from flexcal.model.robot import RobotModel
+from flexcal.model.vibration import linearise, transfer_matrix
 from flexcal.units import DEGREE
 
 LINES = np.arange(3.25, 80, 2.0)

@@ -8,10 +8,10 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from flexcal.design import CollisionChecker
+from flexcal.design.scene import CollisionChecker
 from flexcal.errors import InputError
 from flexcal.export import write_urdf
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 LINK = """<link name="{0}"><inertial><origin xyz="0.01 -0.02 {1}"/><mass value="{2}"/>
   <inertia ixx="0.04" ixy="0.005" ixz="-0.003" iyy="0.05" iyz="0.002" izz="0.03"/></inertial>{3}</link>"""

@@ -7,14 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.model import (
-    RobotModel,
-    gravity_torque,
-    inertial_parameters,
-    static_equilibrium,
-    torque_regressor,
-)
-from flexcal.model.periodic_torque import periodic_torque
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import gravity_torque, static_equilibrium
+from flexcal.model.torques import inertial_parameters, torque_regressor
+from flexcal.model.vibration import periodic_torque
 
 PERIOD = 5.0
 

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.names import GEOMETRY
-from flexcal.model.placement import link_placement, point_placement
-from flexcal.model.tree import kinematic_tree
+from flexcal.model.kinematics import link_placement, point_kinematics, point_placement
+from flexcal.model.parts import kinematic_tree
+from flexcal.model.robot import GEOMETRY, RobotModel
 
 
 @pytest.mark.parametrize("slides", [(), (0,), (2, 4), (5,)])

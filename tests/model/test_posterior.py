@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.posterior import Posterior
+from flexcal.model.robot import Posterior
 
 
 def test_estimated_parameters_keep_their_joint_covariance() -> None:

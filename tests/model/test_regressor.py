@@ -7,7 +7,8 @@ import pinocchio as pin
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, inertial_names, inertial_parameters, torque_regressor
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_names, inertial_parameters, torque_regressor
 
 PINOCCHIO_ORDER = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # its Iyy comes before Ixz
 

@@ -7,10 +7,14 @@ import pinocchio as pin
 import pytest
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel, torque_regressor, torque_regressor_adjoint
-from flexcal.model.regressor import write_torque_regressor
-from flexcal.model.regressor_adjoint import placed_regressor_adjoint
-from flexcal.model.tree import kinematic_tree
+from flexcal.model.parts import kinematic_tree
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import (
+    placed_regressor_adjoint,
+    torque_regressor,
+    torque_regressor_adjoint,
+    write_torque_regressor,
+)
 
 TO_PINOCCHIO = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]  # its Iyy comes before Ixz
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 
 @pytest.fixture

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from flexcal.model.rotations import (
+from flexcal.model.parts import (
     rotation_rpy,
     rotation_vector,
     rotation_wxyz,

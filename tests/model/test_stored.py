@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.estimates_file import write_estimates
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.model import RobotModel, static_equilibrium
-from flexcal.model.names import unit_of
-from flexcal.model.stored import apply_estimates
+from flexcal.files.formats import write_estimates
+from flexcal.model.robot import RobotModel, unit_of
+from flexcal.model.robot.stored_estimates import apply_estimates
+from flexcal.model.statics import static_equilibrium
 
 
 def estimate(*parameters: Parameter) -> Estimate:

@@ -10,12 +10,12 @@ import pytest
 from two_links import GAINS, HELD, swings, two_links
 from virtual_study import leave_run, simulate_run
 
-from flexcal.dynamics import CLASSIC, Observation
-from flexcal.model import RobotModel
-from flexcal.report import TwoStageStudy
-from flexcal.workflow.identify_payload import identify_robot_payload
-from flexcal.workflow.report_folder import report_folder, two_stage_study
-from flexcal.workflow.two_stage_run import TwoStageRun
+from flexcal.dynamics.inverse_model import CLASSIC, Observation
+from flexcal.jobs.pages import report_folder, two_stage_study
+from flexcal.jobs.payload import identify_robot_payload
+from flexcal.jobs.two_stage import TwoStageRun
+from flexcal.model.robot import RobotModel
+from flexcal.report.results import TwoStageStudy
 
 ROBOT = "dynamics: {cutoff_hz: 20, decimation: 2, friction: classic}\n"
 DECLARED = "payload: {frame: lower, mass: 3.0, com: [0.3, 0.07, 0], mass_std: 0.05}\n"

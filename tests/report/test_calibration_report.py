@@ -12,17 +12,17 @@ import pytest
 from outline import Outline
 from scipy.spatial.transform import Rotation
 
-from flexcal.calibration import ConsideredTerm
+from flexcal.calibration.term_selection import ConsideredTerm, considered_document
+from flexcal.calibration.verification import CALIBRATED
 from flexcal.errors import InputError
-from flexcal.report import CalibrationStudy, write_calibration_report
-from flexcal.report.calibration import calibration_page
-from flexcal.report.considered_terms import considered_document
-from flexcal.report.measured_points import CALIBRATED
-from flexcal.report.notation import millimetres
-from flexcal.workflow.calibrate_robot import RobotCalibration, calibrate_robot
-from flexcal.workflow.point_files import read_arm, read_points
-from flexcal.workflow.report_folder import calibration_study, report_folder
-from flexcal.workflow.verify_robot import verify_robot
+from flexcal.jobs.accuracy import verify_robot
+from flexcal.jobs.calibration import RobotCalibration, calibrate_robot
+from flexcal.jobs.pages import report_folder
+from flexcal.jobs.pages.report import calibration_study
+from flexcal.jobs.result_files import read_arm, read_points
+from flexcal.report.layout import millimetres
+from flexcal.report.pages import CalibrationStudy, write_calibration_report
+from flexcal.report.pages.calibration import calibration_page
 
 COMMAND = "flexcal calibrate robot.yaml grid.csv --out fit"
 

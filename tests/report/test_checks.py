@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration import Calibration, Drift, predict, prediction_document
-from flexcal.calibration.propagated_covariance import moving_parameters
-from flexcal.report import TwoStageStudy
+from flexcal.calibration.diagnostics import Drift
+from flexcal.calibration.fit import Calibration
+from flexcal.calibration.measurement import moving_parameters, predict
+from flexcal.calibration.verification import CALIBRATED, prediction_document
+from flexcal.jobs.two_stage import TwoStageRun
 from flexcal.report.checks import (
-    CHANCE,
     check_claimed_uncertainty,
     check_drift,
     check_error_budget,
@@ -21,9 +22,10 @@ from flexcal.report.checks import (
     check_residual,
     check_truth,
 )
-from flexcal.report.measured_points import CALIBRATED
-from flexcal.report.two_stage import two_stage_checks, two_stage_verdict
-from flexcal.workflow.two_stage_run import TwoStageRun
+from flexcal.report.checks.pose_errors import CHANCE
+from flexcal.report.pages import two_stage_checks
+from flexcal.report.pages.two_stage import two_stage_verdict
+from flexcal.report.results import TwoStageStudy
 
 
 def test_a_good_study_passes_every_check(study: TwoStageStudy) -> None:

@@ -11,10 +11,10 @@ import pytest
 from outline import Outline
 
 from flexcal.cli.main import main
-from flexcal.report.customer import uncertainty_rows
-from flexcal.report.particulars import Particulars
-from flexcal.workflow.customer_report import customer_report
-from flexcal.workflow.report_folder import read_results
+from flexcal.jobs.pages import customer_report
+from flexcal.jobs.result_files import read_results
+from flexcal.report.pages.customer import uncertainty_rows
+from flexcal.report.results import Particulars
 
 CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
 GIVEN = Particulars(robot_serial="R-17", instrument="tracker T", instrument_serial="T-9", operator="A. Meier")

@@ -14,17 +14,16 @@ import polars as pl
 import pytest
 from outline import Outline
 
-from flexcal.dynamics import TorquePrediction
-from flexcal.estimates_file import read_estimates
-from flexcal.report import DynamicsStudy
-from flexcal.report.dynamics import dynamics_checks, dynamics_verdict
-from flexcal.report.figures.torque_traces import torque_traces
-from flexcal.report.notation import significant
+from flexcal.dynamics.diagnostics import TorquePrediction
+from flexcal.files.formats import read_estimates
+from flexcal.jobs.dynamics import identify_robot_dynamics
+from flexcal.jobs.pages import report_folder
+from flexcal.report.figures import torque_traces
+from flexcal.report.layout import significant
+from flexcal.report.pages import DynamicsStudy, dynamics_checks
+from flexcal.report.pages.dynamics import dynamics_verdict
+from flexcal.report.sections import friction_section, signals_table
 from flexcal.report.sections.base_parameters import base_correlation
-from flexcal.report.sections.friction import friction_section
-from flexcal.report.sections.signals import signals_table
-from flexcal.workflow.identify_dynamics import identify_robot_dynamics
-from flexcal.workflow.report_folder import report_folder
 
 
 @pytest.fixture(scope="module")

@@ -10,16 +10,23 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from flexcal.calibration.arm_shapes import skeletons
-from flexcal.design.skeleton import joint_origins
-from flexcal.model import RobotModel
-from flexcal.report import TwoStageStudy
-from flexcal.report.figures.calibration_errors import ErrorSeries, error_components, verification_errors
-from flexcal.report.figures.canvas import canvas, decades
-from flexcal.report.figures.error_distribution import expected_quantiles, predicted_quantiles
-from flexcal.report.figures.parameter_bars import singular_values, spring_intervals
-from flexcal.report.figures.response_fit import response_fit, response_levels, sensor_fit
-from flexcal.report.palette import INK, PAGE
+from flexcal.calibration.verification.arm_poses import skeletons
+from flexcal.model.kinematics import joint_origins
+from flexcal.model.robot import RobotModel
+from flexcal.report.figures import (
+    ErrorSeries,
+    error_components,
+    predicted_quantiles,
+    response_fit,
+    response_levels,
+    sensor_fit,
+    singular_values,
+    spring_intervals,
+    verification_errors,
+)
+from flexcal.report.figures.error_distributions import expected_quantiles
+from flexcal.report.layout import INK, PAGE, canvas, decades
+from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections.geometry import exaggeration
 
 

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.report.link_surface import LinkSurface
-from flexcal.report.primitives import box, capsule, cylinder, decimated, ellipsoid
+from flexcal.model.kinematics import LinkSurface, point_kinematics
+from flexcal.model.kinematics.triangle_meshes import box, capsule, cylinder, decimated, ellipsoid
+from flexcal.model.robot import RobotModel
 
 
 def volume(vertices: np.ndarray, triangles: np.ndarray) -> float:

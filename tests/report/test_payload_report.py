@@ -14,12 +14,13 @@ import pytest
 from outline import Outline
 
 from flexcal.errors import InputError
-from flexcal.estimates_file import read_estimates
-from flexcal.report.notation import to_half_width
-from flexcal.report.payload import PayloadStudy, payload_page
-from flexcal.report.payload_checks import payload_checks
-from flexcal.workflow.prediction_files import read_predictions
-from flexcal.workflow.report_folder import report_folder
+from flexcal.files.formats import read_estimates
+from flexcal.jobs.pages import report_folder
+from flexcal.jobs.result_files import read_predictions
+from flexcal.report.checks import payload_checks
+from flexcal.report.layout import to_half_width
+from flexcal.report.pages import PayloadStudy
+from flexcal.report.pages.payload import payload_page
 
 
 @pytest.fixture(scope="module")

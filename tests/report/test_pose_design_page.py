@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.design import joint_origins
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.report.figures.arm_poses import links_at
-from flexcal.report.figures.joint_positions import joint_positions, plan_space, pose_numbers
-from flexcal.report.pose_design import PoseStudy, pose_checks, pose_page
+from flexcal.model.kinematics import joint_origins, point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.report.figures import joint_positions, links_at, plan_space, pose_numbers
+from flexcal.report.pages import PoseStudy
+from flexcal.report.pages.pose_design import pose_checks, pose_page
 
 ORIGIN = {"provenance": {"input.robot.yaml": "0123"}, "command": "flexcal design poses robot.yaml"}
 

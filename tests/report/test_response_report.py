@@ -11,13 +11,14 @@ from typing import Any
 import numpy as np
 from outline import Outline
 
-from flexcal.frequency import FrequencyResponse
-from flexcal.report.response import ResponseStudy, response_page
-from flexcal.report.response_checks import limit_of, response_checks
-from flexcal.workflow.identify_response import IdentifiedResponses
-from flexcal.workflow.report_folder import report_folder
-from flexcal.workflow.results import read_results, write_results
-from flexcal.workflow.two_stage_run import TwoStageRun
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.jobs.pages import report_folder
+from flexcal.jobs.response.planned import IdentifiedResponses
+from flexcal.jobs.result_files import read_results, write_results
+from flexcal.jobs.two_stage import TwoStageRun
+from flexcal.report.checks import limit_of, response_checks
+from flexcal.report.pages import ResponseStudy
+from flexcal.report.pages.frequency_response import response_page
 
 AXES = ("joint_1", "joint_2")
 

@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 from outline import Outline
 
-from flexcal.report import TwoStageStudy
-from flexcal.report.stiffness import StiffnessStudy, stiffness_page, write_stiffness_report
-from flexcal.workflow.two_stage_run import TwoStageRun
+from flexcal.jobs.two_stage import TwoStageRun
+from flexcal.report.pages import StiffnessStudy, write_stiffness_report
+from flexcal.report.pages.stiffness import stiffness_page
+from flexcal.report.results import TwoStageStudy
 
 
 @pytest.fixture

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration import ErrorScale
-from flexcal.report import TwoStageStudy
-from flexcal.report.checks import check_left_out
-from flexcal.report.page import Check, Status
-from flexcal.report.prediction_checks import prediction_checks
-from flexcal.report.trust import NO_INDEPENDENT_CHECK, PHRASES, Trust
-from flexcal.report.two_stage import truth_checks, two_stage_checks, two_stage_page
+from flexcal.calibration.verification import ErrorScale
+from flexcal.report.checks import Trust, check_left_out, prediction_checks
+from flexcal.report.checks.verdict import NO_INDEPENDENT_CHECK, PHRASES
+from flexcal.report.layout import Check, Status
+from flexcal.report.pages import two_stage_checks
+from flexcal.report.pages.two_stage import truth_checks, two_stage_page
+from flexcal.report.results import TwoStageStudy
 
 
 def judged(status: Status, code: str, *, independent: bool = False) -> Check:

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from flexcal.estimates_file import BLOCKS
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters
-from flexcal.report.render import page_html
-from flexcal.report.run_difference import mean_difference, parameter_changes
-from flexcal.report.runs import Comparison, Run
-from flexcal.report.two_runs import comparison_page, comparison_verdict
+from flexcal.files.formats import BLOCKS
+from flexcal.report.layout.rendering import page_html
+from flexcal.report.pages.run_comparison import comparison_page, comparison_verdict
+from flexcal.report.results import Comparison, Run, parameter_changes
+from flexcal.report.results.run_significance import mean_difference
 
 
 def along_x(sizes: np.ndarray) -> np.ndarray:

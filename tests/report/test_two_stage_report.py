@@ -13,16 +13,17 @@ import numpy as np
 import pytest
 from outline import Outline
 
-from flexcal.calibration import ErrorStatistics, Verification
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.verification import CALIBRATED, Verification
 from flexcal.errors import InputError
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model import RobotModel
-from flexcal.report import TX90L_PAPER, TwoStageStudy, write_two_stage_report
-from flexcal.report.measured_points import CALIBRATED
-from flexcal.report.notation import document_millimetres, millimetres, significant
-from flexcal.workflow.report_folder import report_folder
-from flexcal.workflow.results import quantities
-from flexcal.workflow.two_stage_run import TwoStageRun
+from flexcal.jobs.pages import report_folder
+from flexcal.jobs.result_files import quantities
+from flexcal.jobs.two_stage import TwoStageRun
+from flexcal.model.robot import RobotModel
+from flexcal.report.layout import document_millimetres, millimetres, significant
+from flexcal.report.pages import write_two_stage_report
+from flexcal.report.results import TX90L_PAPER, TwoStageStudy
 
 MEBIBYTE = 1e6
 

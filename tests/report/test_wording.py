@@ -6,9 +6,19 @@ import math
 
 import pytest
 
-from flexcal.report.ladder import ladder
-from flexcal.report.notation import NOTHING, millimetres, percent, ratio, significant
-from flexcal.report.page import Check, Rung, Table, tally, worst
+from flexcal.report.layout import (
+    NOTHING,
+    Check,
+    Rung,
+    Table,
+    millimetres,
+    percent,
+    ratio,
+    significant,
+    tally,
+    worst,
+)
+from flexcal.report.layout.error_axis import ladder
 
 
 def test_millimetres() -> None:

@@ -8,27 +8,32 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.calibration import ErrorStatistics, calibrate, predict, robot_before, verify, verify_jointly
-from flexcal.calibration.arm_shapes import arms_at
-from flexcal.data import MultisinePlan, PoseSet, write_plan
-from flexcal.elasticity import StiffnessResult
-from flexcal.estimates_file import Block, write_estimates
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.fit import calibrate
+from flexcal.calibration.measurement import predict
+from flexcal.calibration.verification import (
+    CALIBRATED,
+    MeasuredPoints,
+    arms_at,
+    errors_before,
+    robot_before,
+    verify,
+    verify_jointly,
+)
+from flexcal.data.plans import MultisinePlan, write_plan
+from flexcal.data.poses import PoseSet
+from flexcal.elasticity.identification import StiffnessResult
 from flexcal.estimation import Estimate, Parameter, Parameters
-from flexcal.export.urdf import write_urdf
-from flexcal.frequency import FrequencyResponse
-from flexcal.model import RobotModel
-from flexcal.model.linearisation import linearise
-from flexcal.model.names import GEOMETRY, SPRINGS, spring_names
-from flexcal.model.transfer import transfer_matrix
-from flexcal.report.fitted_response import fitted_responses
-from flexcal.report.measured_points import CALIBRATED, MeasuredPoints, errors_before
+from flexcal.export import write_urdf
+from flexcal.files.formats import Block, write_estimates
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.jobs.result_files import write_arm, write_fitted, write_points, write_results, write_verification
+from flexcal.jobs.two_stage import TwoStageRun
+from flexcal.jobs.two_stage.document import two_stage_document
+from flexcal.model.robot import GEOMETRY, SPRINGS, RobotModel, spring_names
+from flexcal.model.vibration import linearise, transfer_matrix
+from flexcal.report.results import fitted_responses
 from flexcal.units import DEGREE
-from flexcal.workflow.fitted_files import write_fitted
-from flexcal.workflow.point_files import write_arm, write_points
-from flexcal.workflow.results import write_results
-from flexcal.workflow.two_stage_results import two_stage_document
-from flexcal.workflow.two_stage_run import TwoStageRun
-from flexcal.workflow.verification_points import write_verification
 
 DEFAULT_POSES_DEG = (
     (0, -28.6, -94.3, 37.3, -98.1, 0),

@@ -1,1 +1,1 @@
-"""The command line: one module a verb, which parses arguments and prints; everything else is in `flexcal.workflow`."""
+"""The command line: `entry` starts the program, `main` runs a verb; everything that is computed is in `flexcal.jobs`."""

@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from contextlib import redirect_stderr, suppress
 from importlib import import_module
 
-from flexcal.cli.command_line import keep_command_line
-from flexcal.cli.letters import show_near_letters
-from flexcal.cli.printable import sentence
-from flexcal.cli.stopping import Stopping, stoppable
-from flexcal.cli.streams import held_output, provide_streams
-from flexcal.cli.verbs import Verb, find_verb, overview, unknown_verb
+from flexcal.cli.arguments.invocation import keep_command_line
+from flexcal.cli.arguments.verb_table import Verb, find_verb, overview, unknown_verb
+from flexcal.cli.terminal.encoding import show_near_letters
+from flexcal.cli.terminal.escaping import sentence
+from flexcal.cli.terminal.standard_streams import held_output, provide_streams
+from flexcal.cli.terminal.stop_signals import Stopping, stoppable
 from flexcal.errors import FlexcalError
 
 FAILED = 2
@@ -108,10 +108,10 @@ def _was_interrupted(problem: BaseException | None) -> bool:
 def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
-    from flexcal.cli.outputs import outputs, settle_inputs
-    from flexcal.cli.refusal import refusal, refuse_unknown_options
+    from flexcal.cli.arguments.parse_errors import refusal, refuse_unknown_options
+    from flexcal.cli.folders.overwrite_protection import outputs, settle_inputs
 
-    command = getattr(import_module(f"flexcal.cli.{verb.module}"), verb.command)
+    command = getattr(import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
     refuse_unknown_options(verb, arguments)
     said = io.StringIO()
     try:

@@ -1,4 +1,4 @@
-"""Calibrated model and tool targets to the motor commands that put the real tool there."""
+"""Motor commands that bring the calibrated robot's tool to its targets."""
 
 import lazy_loader
 

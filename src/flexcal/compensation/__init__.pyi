@@ -1,5 +1,10 @@
-from .commands import Compensation, compensate
-from .postures import best_posture
-from .wanted import wanted_pose
+from .desired_poses import wanted_pose
+from .start_postures import best_posture
+from .target_commands import Compensation, compensate
 
-__all__ = ["Compensation", "best_posture", "compensate", "wanted_pose"]
+__all__ = [
+    "Compensation",
+    "best_posture",
+    "compensate",
+    "wanted_pose",
+]

@@ -6,10 +6,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexcal.compensation.aim import Aim
-from flexcal.model import RobotModel
-from flexcal.model.inverse_kinematics import damped_step
-from flexcal.model.joint_space import joint_limits
+from flexcal.compensation.tool_target import Aim
+from flexcal.model.kinematics import damped_step, joint_limits
+from flexcal.model.robot import RobotModel
 
 Forward = Callable[[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]
 """Numbers (k,) of rows of an aim and joint positions (k, n) to residuals (k, m) and their negative Jacobians (k, m, n)."""

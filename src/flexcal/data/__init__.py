@@ -1,5 +1,1 @@
-"""Recordings, measured poses, plans and targets, and their files."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+"""Measured poses, joint logs, experiment plans and their files."""

@@ -1,15 +1,25 @@
+from .conic_constraint import Cone
+from .conic_least_squares import ConicFit
 from .estimate import Dropped, Estimate
-from .identifiability import Identifiability, analyse, name_direction
-from .loss import Cauchy, Huber, Loss, Squares
+from .gaussian_distance import distance_probability, distance_quantile, mean_distance, principal_variances
+from .identifiability import RANK_TOLERANCE, Identifiability, analyse, name_direction
+from .loss import Cauchy, Huber, Loss, Squares, loss_named
 from .misfit import Misfit
 from .parameter import Parameter, Parameters
 from .problem import Problem
-from .profile import profile_rise
+from .profile_likelihood import profile_rise
 from .sensitivity import Sensitivity
 from .solver import solve
+from .student_t import student_quantile
+from .uncertainty import LOG_STD_LIMIT, known_to_a_factor_of_two
+from .vuong_test import vuong_statistic
 
 __all__ = [
+    "LOG_STD_LIMIT",
+    "RANK_TOLERANCE",
     "Cauchy",
+    "Cone",
+    "ConicFit",
     "Dropped",
     "Estimate",
     "Huber",
@@ -22,7 +32,15 @@ __all__ = [
     "Sensitivity",
     "Squares",
     "analyse",
+    "distance_probability",
+    "distance_quantile",
+    "known_to_a_factor_of_two",
+    "loss_named",
+    "mean_distance",
     "name_direction",
+    "principal_variances",
     "profile_rise",
     "solve",
+    "student_quantile",
+    "vuong_statistic",
 ]

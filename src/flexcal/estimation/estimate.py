@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.estimation.misfit import Misfit
 from flexcal.estimation.parameter import Parameters
-from flexcal.estimation.student import student_quantile
+from flexcal.estimation.student_t import student_quantile
 
 NORMAL_QUANTILE = 1.959963984540054
 

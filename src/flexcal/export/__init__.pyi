@@ -1,15 +1,17 @@
-from .dh import render_dh
-from .exported import Exported, Rendered, write_rendered
-from .json_document import render_json
-from .kinematics import render_kinematics
-from .loss import Distances, Loss, LostTerm, measure_loss
-from .mjcf import mjcf_spec
+from .dh_table import Convention, render_dh
+from .json_model import render_json
 from .mjcf_file import render_mjcf, write_mjcf
-from .offsets import render_offsets
+from .mujoco_spec import mjcf_spec
+from .offset_fit import undetermined_offsets
+from .offset_table import render_offsets
+from .representation_error import Distances, Loss, LostTerm, measure_loss
 from .sdf import render_sdf
+from .universal_robots import render_kinematics
 from .urdf import render_urdf, write_urdf
+from .written_file import Exported, Rendered, write_rendered
 
 __all__ = [
+    "Convention",
     "Distances",
     "Exported",
     "Loss",
@@ -24,6 +26,7 @@ __all__ = [
     "render_offsets",
     "render_sdf",
     "render_urdf",
+    "undetermined_offsets",
     "write_mjcf",
     "write_rendered",
     "write_urdf",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexcal.errors import FlexcalError
-from flexcal.model import RobotModel
+from flexcal.model.robot import RobotModel
 
 
 def chain_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.export.exported import Exported, Rendered, write_rendered
-from flexcal.export.loss import (
+from flexcal.export.mujoco_spec import mjcf_spec
+from flexcal.export.representation_error import (
     BACKLASH,
     GRAVITY_COMPLIANCE,
     HARDENING,
@@ -18,9 +18,8 @@ from flexcal.export.loss import (
     TRANSMISSION,
     ToolMap,
 )
-from flexcal.export.mjcf import mjcf_spec
-from flexcal.model import RobotModel
-from flexcal.model.names import SPRINGS
+from flexcal.export.written_file import Exported, Rendered, write_rendered
+from flexcal.model.robot import SPRINGS, RobotModel
 
 if TYPE_CHECKING:
     import mujoco

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.export.loss import Distances, random_poses, tool_positions
-from flexcal.export.spread import posterior_spread
-from flexcal.model import RobotModel, point_kinematics
-from flexcal.model.rotations import rotation_vector, vector_rotation
+from flexcal.export.representation_error import Distances, random_poses, tool_positions
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import rotation_vector, vector_rotation
+from flexcal.model.robot import RobotModel, posterior_spread
 
 _STEPS = 8
 _SMALL = 1e-8

@@ -7,13 +7,13 @@ import xml.etree.ElementTree as ET
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.export.exported import Rendered
-from flexcal.export.frames import SIX, from_six, shifted, six_numbers, transform, turned
-from flexcal.export.loss import AT_REST, ToolMap
+from flexcal.export.representation_error import AT_REST, ToolMap
+from flexcal.export.transforms import SIX, from_six, shifted, six_numbers, transform, turned
 from flexcal.export.urdf_inertials import bodiless_links, bodiless_remark
-from flexcal.model import Inertia, RobotModel
-from flexcal.model.joint import Joint
-from flexcal.model.placement import link_placement, point_placement
+from flexcal.export.written_file import Rendered
+from flexcal.model.kinematics import link_placement, point_placement
+from flexcal.model.parts import Inertia, Joint
+from flexcal.model.robot import RobotModel
 
 VERSION = "1.7"
 BASE = "base"

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.export.exported import Exported, Rendered, write_rendered
-from flexcal.export.loss import AT_REST, ToolMap
+from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.urdf_inertials import bodiless_remark, write_inertials
-from flexcal.model import RobotModel
-from flexcal.model.placement import link_placement, point_placement
-from flexcal.model.rotations import rotation_rpy, rpy_rotation
+from flexcal.export.written_file import Exported, Rendered, write_rendered
+from flexcal.model.kinematics import link_placement, point_placement
+from flexcal.model.parts import rotation_rpy, rpy_rotation
+from flexcal.model.robot import RobotModel
 
 
 def write_urdf(model: RobotModel, path: str | Path) -> Exported:

@@ -7,8 +7,8 @@ from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
-from flexcal.model import Inertia, RobotModel
-from flexcal.model.pseudo_inertia import is_body
+from flexcal.model.parts import Inertia, is_body
+from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import read_urdf
 
 _MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}

@@ -1,4 +1,4 @@
-"""A virtual cell that is independent of the identified model, with effects that the model lacks."""
+"""Independently implemented simulated robot cell, for tests of the virtual one."""
 
 import lazy_loader
 

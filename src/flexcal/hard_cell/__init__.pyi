@@ -1,5 +1,12 @@
 from .cell import HardCell
 from .description import ArmDescription, read_description
-from .drawn import HardRobot, counterparts, draw_robot
+from .true_parameters import HardRobot, counterparts, draw_robot
 
-__all__ = ["ArmDescription", "HardCell", "HardRobot", "counterparts", "draw_robot", "read_description"]
+__all__ = [
+    "ArmDescription",
+    "HardCell",
+    "HardRobot",
+    "counterparts",
+    "draw_robot",
+    "read_description",
+]

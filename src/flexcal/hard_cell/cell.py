@@ -8,12 +8,14 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.data import MultisinePlan, PosePlan, PoseSet, Recording, TrajectoryPlan
+from flexcal.data.plans import MultisinePlan, PosePlan, TrajectoryPlan
+from flexcal.data.poses import PoseSet
+from flexcal.data.recordings import Recording
 from flexcal.errors import FlexcalError
 from flexcal.hard_cell.description import ArmDescription, read_description
-from flexcal.hard_cell.drawn import HardRobot, draw_robot
-from flexcal.hard_cell.moving import multisine_recordings, trajectory_recordings
-from flexcal.hard_cell.pointing import measured_points, true_points
+from flexcal.hard_cell.pose_measurement import measured_points, true_points
+from flexcal.hard_cell.recordings import multisine_recordings, trajectory_recordings
+from flexcal.hard_cell.true_parameters import HardRobot, draw_robot
 
 
 class HardCell:

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flexcal.errors import FlexcalError
-from flexcal.model.config import RobotConfig
-from flexcal.yaml_reader import read_yaml
+from flexcal.files.formats import read_yaml
+from flexcal.model.robot import RobotConfig
 
 TYPICAL_RATIO = 100.0
 """Gear ratio where robot.yaml declares none."""

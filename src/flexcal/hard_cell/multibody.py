@@ -11,8 +11,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flexcal.hard_cell.description import ArmDescription
-from flexcal.hard_cell.drawn import PAYLOAD_RADIUS, HardRobot
-from flexcal.mujoco_step import log_mujoco_warnings
+from flexcal.hard_cell.true_parameters import PAYLOAD_RADIUS, HardRobot
+from flexcal.mujoco_library import log_mujoco_warnings
 
 if TYPE_CHECKING:
     import mujoco

@@ -1,5 +1,1 @@
-"""The self-contained HTML reports: results, uncertainty, checks and provenance."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+"""Report pages of identification, calibration and design, in HTML."""

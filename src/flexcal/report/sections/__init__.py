@@ -1,1 +1,5 @@
-"""Sections of a report, one per file: functions from result objects to `Section`."""
+"""Sections of a report: functions from result objects to `Section`."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

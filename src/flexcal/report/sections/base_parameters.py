@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 
 from flexcal.estimation import Estimate
-from flexcal.report.figures.parameter_bars import correlation_map
-from flexcal.report.notation import NOTHING, significant
-from flexcal.report.page import Block, FigureBlock, Section, Table, Text
+from flexcal.report.figures import correlation_map
+from flexcal.report.layout import NOTHING, Block, FigureBlock, Section, Table, Text, significant
 
 _STRONGEST = 10
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.report.notation import NOTHING, significant
-from flexcal.report.page import Block, Section, Table, Text
+from flexcal.report.layout import NOTHING, Block, Section, Table, Text, significant
 
 LONG = 12
 """Rows from which the table of what was tried is folded away: the terms taken are said above it."""

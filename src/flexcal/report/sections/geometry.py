@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.arm_shapes import ArmPoses
-from flexcal.data import PoseSet
-from flexcal.report.figures.arm_poses import arm_poses
-from flexcal.report.figures.calibration_errors import calibration_errors, error_components
-from flexcal.report.figures.error_distribution import error_histogram
-from flexcal.report.measured_points import CALIBRATED, NOMINAL
-from flexcal.report.notation import millimetres
-from flexcal.report.page import FigureBlock, Section, Selector, Slider
-from flexcal.report.sections.budget import budget_table
+from flexcal.calibration.verification import CALIBRATED, NOMINAL, ArmPoses
+from flexcal.data.poses import PoseSet
+from flexcal.report.figures import arm_poses, calibration_errors, error_components, error_histogram
+from flexcal.report.layout import FigureBlock, Section, Selector, Slider, millimetres
+from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections.identifiability import identifiability_blocks
 from flexcal.report.sections.parameters import parameter_table
-from flexcal.report.study import TwoStageStudy
+from flexcal.report.sections.uncertainty_budget import budget_table
 
 _ARROW_LENGTH = 0.25
 """Length (m) at which the largest error is drawn, about, where points are few."""

@@ -5,10 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from flexcal.estimation import Dropped
-from flexcal.report.figures.parameter_bars import singular_values
-from flexcal.report.identifiable import Determined
-from flexcal.report.page import Block, FigureBlock, Table, Text
-from flexcal.report.publication import Publication
+from flexcal.report.figures import singular_values
+from flexcal.report.layout import Block, FigureBlock, Table, Text
+from flexcal.report.results import Determined, Publication
 
 _MOST = 4
 

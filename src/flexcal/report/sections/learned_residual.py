@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import PurePath
 from typing import Any
 
-from flexcal.report.notation import significant
-from flexcal.report.page import Section, Table, Text
+from flexcal.report.layout import Section, Table, Text, significant
 
 
 def learned_section(learned: Mapping[str, Any], held_out: str) -> Section:

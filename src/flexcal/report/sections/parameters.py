@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from flexcal.estimation import Estimate
-from flexcal.report.figures.parameter_bars import parameter_bars, shown_parameters
-from flexcal.report.notation import scaled, significant
-from flexcal.report.page import FigureBlock, Table
+from flexcal.report.figures import parameter_bars, shown_parameters
+from flexcal.report.layout import FigureBlock, Table, scaled, significant
 
 
 def parameter_figures(estimate: Estimate, names: tuple[str, ...]) -> tuple[FigureBlock, ...]:

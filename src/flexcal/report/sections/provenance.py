@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from importlib.metadata import version
 
-from flexcal.estimates_file import Block
 from flexcal.estimation import Estimate
-from flexcal.report.page import Block as PageBlock
-from flexcal.report.page import Section, Table, Text
+from flexcal.files.formats import Block
+from flexcal.report.layout import Block as PageBlock
+from flexcal.report.layout import Section, Table, Text
 
 _MANY = 20
 """Input files from which they have a table of their own, folded: an experiment of several poses has hundreds."""

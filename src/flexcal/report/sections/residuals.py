@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from flexcal.data import PoseSet
-from flexcal.report.figures.residual_joints import (
+from flexcal.calibration.diagnostics import GravityLoads
+from flexcal.data.poses import PoseSet
+from flexcal.report.figures import (
     error_field,
     loaded_joints,
     residual_joints,
@@ -15,9 +16,7 @@ from flexcal.report.figures.residual_joints import (
     residual_trend,
     residual_workspace,
 )
-from flexcal.report.gravity_loads import GravityLoads
-from flexcal.report.notation import millimetres
-from flexcal.report.page import Block, FigureBlock, Section, Table
+from flexcal.report.layout import Block, FigureBlock, Section, Table, millimetres
 
 _MOST = 12
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from flexcal.estimation import Estimate
-from flexcal.report.notation import NOTHING, percent, scaled, significant, spring_label
-from flexcal.report.page import Table
+from flexcal.report.layout import NOTHING, Table, percent, scaled, significant, spring_label
 
 
 def spring_table(

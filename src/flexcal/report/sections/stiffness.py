@@ -7,14 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.estimation import Estimate
-from flexcal.report.figures.parameter_bars import spring_intervals
-from flexcal.report.figures.response_fit import response_fit, sensor_fit
-from flexcal.report.fitted_response import FittedResponse
-from flexcal.report.notation import percent, significant
-from flexcal.report.page import Block, FigureBlock, Section, Selector, Table, Text
-from flexcal.report.sections.responses import levels_block
+from flexcal.report.figures import response_fit, sensor_fit, spring_intervals
+from flexcal.report.layout import Block, FigureBlock, Section, Selector, Table, Text, percent, significant
+from flexcal.report.results import FittedResponse, TwoStageStudy
+from flexcal.report.sections.response_levels import levels_block
 from flexcal.report.sections.springs import hardening_sentence, spring_table, unseen_springs
-from flexcal.report.study import TwoStageStudy
 from flexcal.units import DEGREE
 
 

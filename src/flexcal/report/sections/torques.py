@@ -6,10 +6,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import PurePath
 from typing import Any
 
-from flexcal.dynamics import TorquePrediction
-from flexcal.report.figures.torque_traces import torque_spectra, torque_traces
-from flexcal.report.notation import significant
-from flexcal.report.page import Block, FigureBlock, Selector, Table
+from flexcal.dynamics.diagnostics import TorquePrediction
+from flexcal.report.figures import torque_spectra, torque_traces
+from flexcal.report.layout import Block, FigureBlock, Selector, Table, significant
 
 
 def recording_labels(predictions: Sequence[TorquePrediction]) -> tuple[str, ...]:

@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
-from flexcal.calibration import ErrorStatistics
-from flexcal.report.before import BEFORE
-from flexcal.report.figures.calibration_errors import ErrorSeries, verification_errors
-from flexcal.report.figures.error_distribution import error_distribution, predicted_quantiles
-from flexcal.report.measured_points import CALIBRATED, RIGID
-from flexcal.report.notation import millimetres, ratio, statistics_cells
-from flexcal.report.page import Block, FigureBlock, Section, Table, Text
-from flexcal.report.palette import ELASTIC, NOMINAL
-from flexcal.report.palette import RIGID as RIGID_COLOUR
-from flexcal.report.study import TwoStageStudy
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.verification import CALIBRATED, RIGID
+from flexcal.report.figures import ErrorSeries, error_distribution, predicted_quantiles, verification_errors
+from flexcal.report.layout import (
+    ELASTIC,
+    NOMINAL,
+    Block,
+    FigureBlock,
+    Section,
+    Table,
+    Text,
+    millimetres,
+    ratio,
+    statistics_cells,
+)
+from flexcal.report.layout import RIGID as RIGID_COLOUR
+from flexcal.report.results import TwoStageStudy
+from flexcal.report.sections.uncalibrated import BEFORE
 
 
 def verification_section(study: TwoStageStudy) -> Section:

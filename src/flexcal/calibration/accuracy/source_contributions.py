@@ -1,0 +1,70 @@
+"""Error sources: reduction of the predicted tool error by kind of parameter."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.calibration.error_model import joint_turns
+from flexcal.calibration.measurement import Propagation, covariance_root, moving_parameters, predict
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import INERTIALS
+
+PARAMETERS = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")
+REPEATABILITY, MODEL_ERROR = "repeatability", "model error"
+SOURCES = (*PARAMETERS, REPEATABILITY, MODEL_ERROR)
+
+
+def source_of(name: str) -> str:
+    """The kind of a parameter that moves a point, one of `PARAMETERS`."""
+    owner, _, key = name.rpartition(".")
+    if owner.startswith("station."):
+        return "instrument's place"
+    if owner == "payload":
+        return "payload"
+    if key in ("stiffness", "hardening"):
+        return "springs"
+    if key in INERTIALS:
+        return "link masses"
+    return "backlash" if key == "backlash" else "geometry"
+
+
+def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
+    """By how much of itself the variance of the tool's error at poses `q` (N, n) would fall if one kind of parameter were known exactly.
+
+    (N,) between 0 and 1 for each of the `SOURCES` that were estimated; the variance of the others given these is Gaussian conditioning.
+    Where kinds are correlated the shares do not add up to one.
+    """
+    model, size = reach.model, len(q)
+    names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
+    root = covariance_root(model, names)
+    poses = PoseSet(
+        q=q,
+        position=np.zeros((size, 3)),
+        sigma=np.ones((size, 3)),
+        torque=None,
+        payload=None,
+        target=np.full(size, reach.target),
+        station=np.full(size, reach.station),
+        temperature=None,
+        pose=np.arange(size),
+    )
+    at = predict(model, poses, jacobians=True)
+    roots = at.jacobian(names) @ root
+    turned = (joint_turns(at) ** 2).sum(axis=(1, 2))
+    scatter = {
+        REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + model.value("scatter.angular") ** 2 * turned,
+        MODEL_ERROR: np.full(size, 3 * model.value("scatter.model") ** 2),
+    }
+    variance = (roots**2).sum(axis=(1, 2)) + sum(scatter.values())
+    kinds = np.array([source_of(name) for name in names])
+    shares = {}
+    for kind in PARAMETERS:
+        if (kinds == kind).any():
+            # what knowing the kind takes away: the part of the root's columns that its rows span
+            basis = np.linalg.svd(root[kinds == kind] / _sizes(root[kinds == kind]), full_matrices=False)[2]
+            shares[kind] = ((roots @ basis.T) ** 2).sum(axis=(1, 2)) / variance
+    return shares | {kind: own / variance for kind, own in scatter.items() if own.any()}
+
+
+def _sizes(rows: np.ndarray) -> np.ndarray:
+    return np.linalg.norm(rows, axis=1, keepdims=True)

@@ -1,0 +1,105 @@
+"""Predicted accuracy of the calibrated robot over the working volume."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.measurement import Propagation
+from flexcal.errors import FlexcalError
+from flexcal.estimation import distance_quantile, mean_distance, principal_variances
+from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.progress import Progress, silent
+
+_BATCH = 256
+"""Poses at once: their derivatives stay in the processor's cache, and in memory that need not be asked for again every time."""
+_DRAWN = 100_000
+_FEWEST = 1e-4
+"""Share of all random poses below which a box counts as out of reach."""
+
+
+@dataclass(frozen=True, eq=False)
+class AccuracyMap:
+    """At each pose `q` (N, n), rad or m: the point's `position` (N, 3), base frame, `mean` and 95 % quantile `p95` (N,) of its error, m.
+
+    The error is the distance between where the calibrated model has the point and where an instrument at the station finds it, from the
+    uncertainty of the parameters alone.
+    """
+
+    q: np.ndarray
+    position: np.ndarray
+    mean: np.ndarray
+    p95: np.ndarray
+
+    def scaled(self, factor: float) -> AccuracyMap:
+        """With every error `factor` times as large."""
+        return AccuracyMap(self.q, self.position, factor * self.mean, factor * self.p95)
+
+
+def accuracy_map(
+    reach: Propagation, q: np.ndarray, *, threads: int | None = None, progress: Progress = silent
+) -> AccuracyMap:
+    """Mean and 95 % quantile of the tool's error at poses `q` (N, n), to first order in the parameters; `threads` None takes all cores."""
+    found = AccuracyMap(q, np.empty((len(q), 3)), np.empty(len(q)), np.empty(len(q)))
+    starts = range(0, len(q), _BATCH)
+
+    def fill(start: int) -> None:
+        rows = slice(start, start + _BATCH)
+        found.position[rows], roots = reach.roots(q[rows])
+        variances = principal_variances(roots @ np.swapaxes(roots, 1, 2))
+        found.mean[rows], found.p95[rows] = mean_distance(variances), distance_quantile(variances)
+
+    with ThreadPoolExecutor(threads or os.cpu_count()) as pool:
+        for number, _ in enumerate(pool.map(fill, starts), start=1):
+            progress("accuracy map", number / len(starts))
+    return found
+
+
+def random_poses_in(
+    reach: Propagation,
+    count: int,
+    rng: np.random.Generator,
+    box: np.ndarray | None = None,
+    progress: Progress = silent,
+) -> np.ndarray:
+    """`count` poses (count, n), uniform over the joint ranges, that put the target into a `box` (2, 3), m, base frame; None: anywhere.
+
+    Neither collisions nor the floor are looked at. Raises `FlexcalError` for a box that is hardly or not at all in reach.
+    """
+    model = reach.model
+    lower, upper = joint_ranges(model)
+    if box is None:
+        return rng.uniform(lower, upper, (count, model.n))
+    if not np.all(box[0] < box[1]):
+        raise FlexcalError(
+            f"the working volume from {_told(box[0])} to {_told(box[1])} is no box; give every smallest coordinate before the largest."
+        )
+    found: list[np.ndarray] = []
+    have = drawn = 0
+    for q in _draws(rng, lower, upper):
+        at = point_kinematics(model, q, point=reach.target, jacobians=False).position
+        inside = q[np.all((at >= box[0]) & (at <= box[1]), axis=1)]
+        found.append(inside)
+        have, drawn = have + len(inside), drawn + len(q)
+        progress("poses", min(have / count, 1.0))
+        if have >= count:
+            break
+        if have < _FEWEST * drawn and drawn >= 10 * _DRAWN:
+            raise FlexcalError(
+                f"of {drawn} random poses of {model.name} {have} reach the working volume from {_told(box[0])} to {_told(box[1])} m (it "
+                f"reaches {model.reach:.3g} m); give a larger box in the robot's base frame, or a file of the poses to look at."
+            )
+    return np.concatenate(found)[:count]
+
+
+def _draws(rng: np.random.Generator, lower: np.ndarray, upper: np.ndarray) -> Iterator[np.ndarray]:
+    while True:
+        yield rng.uniform(lower, upper, (_DRAWN, len(lower)))
+
+
+def _told(position: np.ndarray) -> str:
+    return ", ".join(f"{value:g}" for value in position)

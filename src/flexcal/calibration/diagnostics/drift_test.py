@@ -1,0 +1,70 @@
+"""Score test for a drift of robot or instrument during the measurement."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.fit import Calibration
+from flexcal.units import MILLIMETRE
+
+_CHANCE = 0.0027
+"""How often an arm that stays is said to drift: three standard deviations of a Gaussian."""
+
+
+@dataclass(frozen=True, eq=False)
+class Drift:
+    """Way (3,) m that the points went in the first station's frame while they were measured, at an even pace; `covariance` (3, 3).
+
+    `freedom` are the degrees of freedom of the scatter in that covariance.
+    """
+
+    travel: np.ndarray
+    covariance: np.ndarray
+    freedom: int
+
+    @property
+    def distance(self) -> float:
+        """How far they went (m)."""
+        return float(np.linalg.norm(self.travel))
+
+    @property
+    def probability(self) -> float:
+        """How often points that stay show as long a way, p of the F test."""
+        from scipy.special import fdtrc
+
+        size = len(self.travel)
+        statistic = self.travel @ np.linalg.solve(self.covariance, self.travel) / size
+        return float(fdtrc(size, max(self.freedom, 1), statistic))
+
+    @property
+    def certain(self) -> bool:
+        """Whether chance explains it in less than 0.27 % of all sessions without a drift."""
+        return self.probability < _CHANCE
+
+    def document(self) -> dict[str, float | bool]:
+        """For JSON documents."""
+        return {
+            "distance_mm": self.distance / MILLIMETRE,
+            "p": self.probability,
+            "certain": self.certain,
+        }
+
+    @classmethod
+    def of(cls, fit: Calibration) -> Drift:
+        """From the residuals of a fit, by Rao's score test: what a drift of three coordinates more would estimate, to first order.
+
+        The covariance of the errors is that of the fit without what stretches of the measuring order share, scaled by the chi-square
+        that is left. Rows are in measuring order; outliers do not count.
+        """
+        poses = fit.poses
+        share = np.linspace(-0.5, 0.5, len(poses))
+        kept = ~np.isin(np.arange(len(poses)), fit.estimate.outliers)
+        ramp = share[kept][:, None, None] * np.eye(3)
+        products = fit.linear.products(replace(fit.scatter, order=0.0), ramp)
+        covariance = np.linalg.inv(products[:-1, :-1])
+        travel = covariance @ products[:-1, -1]
+        freedom = fit.linear.residual.size - fit.linear.free.shape[2] - len(travel)
+        left = float(products[-1, -1] - products[:-1, -1] @ travel)
+        return cls(travel, covariance * max(1.0, left / max(freedom, 1)), freedom)

@@ -1,0 +1,70 @@
+"""Plausibility of a fit from the change of its parameters: data with a wrong sign or unit can be fitted perfectly."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.fit import Calibration, tolerances
+
+FAR = 50.0
+"""Tolerances by which no geometric parameter should be off: 15 mm, 25 mrad."""
+
+FAR_POINT = 0.05
+"""m: a reflector's place on the tool, which is often guessed, should not be farther off than this."""
+
+FAR_FROM_PRIOR = 5.0
+"""Standard deviations of its prior by which no stiffness, mass or centre of mass should be off."""
+
+SCATTERED = 0.01
+"""Errors after the fit over the extent of the points (root mean square both) from which data and robot hardly belong together."""
+
+
+@dataclass(frozen=True)
+class Moved:
+    """A parameter that ended at `value`, `times` its tolerance (or the standard deviation of its prior) from its start."""
+
+    name: str
+    start: float
+    value: float
+    unit: str
+    times: float
+
+
+def hardly_fits(found: Calibration) -> bool:
+    """Whether data and robot are inconsistent, so that the fit must not be used."""
+    return bool(moved_far(found)) or scattered(found)
+
+
+def scattered(found: Calibration) -> bool:
+    """Whether the residuals, without outliers, are larger than plausible for any robot."""
+    rows = ~np.isin(np.arange(len(found.poses)), found.estimate.outliers)
+    position = found.poses.position[rows]
+    extent = np.sqrt(np.mean((position - position.mean(axis=0)) ** 2))
+    return bool(np.sqrt(np.mean(found.residuals[rows] ** 2)) > SCATTERED * extent)
+
+
+def moved_far(found: Calibration) -> tuple[Moved, ...]:
+    """Parameters with an implausibly large change from their start values, the largest first."""
+    estimate, prior = found.estimate.parameters, found.prior
+    kept = [name for name in found.identifiability.kept_names if _has_size(name)]
+    named = [*kept, *prior.parameters.names]
+    end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
+    size = np.concatenate([tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))])
+    limit = np.concatenate([_limits(kept, size), np.full(len(prior.parameters), FAR_FROM_PRIOR)])
+    times = np.abs(end - start) / size
+    far = [k for k in np.argsort(-times / limit) if times[k] > limit[k]]
+    items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
+    return tuple(Moved(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
+
+
+def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:
+    """How many tolerances each geometric parameter may be off."""
+    points = [name.startswith(("tool.length", "point.")) for name in kept]
+    return np.where(points, FAR_POINT / size[: len(kept)], FAR)
+
+
+def _has_size(name: str) -> bool:
+    """Whether robot.yaml or the URDF say how large a parameter may be: not of the place of the instrument, nor of a compliance."""
+    return not name.startswith("station.") and ".gravity_compliance" not in name

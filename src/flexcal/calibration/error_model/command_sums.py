@@ -1,0 +1,85 @@
+"""Sums over the visits of every command that was visited again."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.calibration.error_model.groups import ErrorCells
+from flexcal.calibration.error_model.incidence_matrices import incidence, pairs_of
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class CommandSums:
+    """K commands visited again, of which only those that some visit has together (its targets') have scalar products.
+
+    `once` (G, 3 T) is 1 at the points of the other commands, whose error is each visit's own. `sums` (K, G T) adds rows of a command;
+    `cells` (K c, G T T) pairs of rows of a visit, of a command and one of c cells, the `count`; `groups` (k s s, G T T) pairs of rows of
+    sets of commands that visits tie together, by their size s: they follow each other.
+    """
+
+    once: np.ndarray
+    sums: csr_matrix
+    cells: csr_matrix
+    count: int
+    groups: tuple[tuple[int, csr_matrix], ...]
+
+    @classmethod
+    def of(cls, points: ErrorCells, cell: np.ndarray, cells: int) -> CommandSums:
+        """Of `points` that have commands; `cell` (G, T, kinds) are the cells of their visits, -1 where there is no point."""
+        assert points.command is not None
+        visits = points.visits
+        again = np.bincount(points.command) > 1
+        number = np.where(again, np.cumsum(again) - 1, -1)
+        command = np.where(visits >= 0, number[points.command[visits]], -1)
+        once = np.repeat((visits >= 0) & (command < 0), 3, axis=1).astype(float)
+        group = _tied(command, int(again.sum()))
+        size = np.bincount(group)
+        order = np.lexsort([group, size[group]])
+        place = np.full(len(group) + 1, -1)
+        place[order] = np.arange(len(group))
+        command = place[command]
+        size = size[group[order]]
+        groups, first = [], 0
+        for width in np.unique(size):
+            last = first + int((size == width).sum())
+            own = np.where((command >= first) & (command < last), command - first, -1)[:, :, None]
+            pairs = pairs_of(own, np.where(own >= 0, own % width, -1), last - first, int(width))
+            groups.append((int(width), pairs))
+            first = last
+        sums = incidence(command, np.arange(visits.size).reshape(visits.shape), (len(group), visits.size))
+        crossed = pairs_of(command[:, :, None], cell, len(group), cells)
+        return cls(once, sums, crossed, cells, tuple(groups))
+
+    def crossed(self, entries: np.ndarray) -> np.ndarray:
+        """Scalar products (3 K, 3 c) of commands and cells, from the 3 × 3 `entries` (G T T, 9) of all visits' blocks."""
+        commands = len(self.sums.indptr) - 1
+        own = (self.cells @ entries).reshape(commands, self.count, 3, 3)
+        return own.transpose(0, 2, 1, 3).reshape(3 * commands, 3 * self.count)
+
+    def blocks(self, entries: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Scalar products (k, 3 s, 3 s) of the commands of each size of group."""
+        found = []
+        for size, pairs in self.groups:
+            own = (pairs @ entries).reshape(-1, size, size, 3, 3)
+            found.append(own.transpose(0, 1, 3, 2, 4).reshape(-1, 3 * size, 3 * size))
+        return tuple(found)
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Errors (G T, 3) of all points from those (3 K,) of the commands."""
+        return self.sums.T @ values.reshape(-1, 3)
+
+
+def _tied(command: np.ndarray, count: int) -> np.ndarray:
+    """Number (count,) of the group of every command, `command` (G, T) being those of the visits, or -1."""
+    from scipy.sparse.csgraph import connected_components
+
+    if not count:
+        return np.zeros(0, dtype=int)
+    visit = incidence(command, np.arange(len(command))[:, None], (count, len(command)))
+    return connected_components(visit @ visit.T, directed=False)[1]

@@ -1,0 +1,129 @@
+"""Covariance of the errors of measured points beside the fitted parameters: instrument, robot and model error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.error_model.groups import ErrorCells
+from flexcal.calibration.error_model.incidence_matrices import incidence
+from flexcal.calibration.measurement import Prediction
+from flexcal.model.robot import RobotModel
+
+_SMALLEST = 1e-6
+"""Standard deviation (m) that no instrument on an arm goes below: it stands beside priors where simulated points have no noise."""
+_SMALLEST_TURN = 1e-7
+"""Angle (rad) beside which a change of an error of the joints is judged."""
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """Standard deviations of the error components of measured points, each a coordinate (1σ).
+
+    `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
+    from measurement to measurement, `pose` m and `angular` rad at every revolute joint, common to the points of one visit to a pose:
+    repeatability; `workspace`, `order` and `command` m: model error common to a cell of the workspace, to a stretch of the measuring
+    order, and to all visits of one command; `transmission` rad, of a wave of order 1 of a joint's transmission error (`waves`).
+    """
+
+    share: float
+    robot: float = 0.0
+    pose: float = 0.0
+    angular: float = 0.0
+    workspace: float = 0.0
+    order: float = 0.0
+    command: float = 0.0
+    transmission: float = 0.0
+
+    @property
+    def model(self) -> float:
+        """Standard deviation of the model error of a coordinate, m."""
+        return float(np.sqrt(self.workspace**2 + self.order**2 + self.command**2))
+
+    def settled(self, before: Scatter, tolerance: float) -> bool:
+        """Whether every component is where it was, to a share `tolerance` of the whole."""
+        own, other = (np.array([s.robot, s.pose, s.workspace, s.order, s.command]) for s in (self, before))
+        same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
+        angles = ((self.angular, before.angular), (self.transmission, before.transmission))
+        turned = all(abs(a - b) <= tolerance * (a + _SMALLEST_TURN) for a, b in angles)
+        return bool(same) and turned and abs(self.share - before.share) <= tolerance
+
+    def independent(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Covariance (N, 3, 3), m², of instrument and repeatability at each measurement.
+
+        `sigma` (N, 3) m is the stated one, `turns` (N, 3, r) m/rad how the revolute joints move the points.
+        """
+        diagonal = (self.share * sigma) ** 2 + self.robot**2 + self.pose**2 + _SMALLEST**2
+        return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
+
+    def jointly(self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorCells) -> np.ndarray:
+        """The same (G, 3 T, 3 T), m², of all measurements of a visit to a pose together, which are independent of other visits'.
+
+        The diagonal is 1 where a visit lacks a point.
+        """
+        diagonal = cells.gathered((self.share * sigma) ** 2 + self.robot**2 + _SMALLEST**2)
+        single = np.where(diagonal > 0, diagonal, 1.0)[:, :, None] * np.eye(diagonal.shape[1])
+        common = cells.gathered(self.common(turns))
+        return single + common @ np.swapaxes(common, 1, 2)
+
+    def common(self, turns: np.ndarray) -> np.ndarray:
+        """Columns (N, 3, 3 + r) m of the repeatability that the points of a visit share, each times a standard normal number."""
+        moved = np.broadcast_to(self.pose * np.eye(3), (len(turns), 3, 3))
+        return np.concatenate([moved, self.angular * turns], axis=2)
+
+    def whitening(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """W (N, 3, 3) 1/m with WᵀW the inverse of the sum of all variances of single measurements."""
+        whole = self.independent(sigma, turns) + self.model**2 * np.eye(3)
+        return np.linalg.inv(np.linalg.cholesky(whole))
+
+    def weights(self, sigma: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """The same (N, 3, 3) with the repeatability of the joints spread evenly over points and directions.
+
+        What is taken for it may be an error of the model, and weights that follow it would fit the points of short levers only.
+        """
+        even = replace(self, robot=self.evenly(turns), pose=0.0, angular=0.0)
+        return even.whitening(sigma, turns)
+
+    def evenly(self, turns: np.ndarray) -> float:
+        """Standard deviation of a coordinate, m, from the robot's repeatability, root mean square over the points."""
+        turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
+        return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
+
+    def shared(self, cells: ErrorCells, rows: np.ndarray) -> np.ndarray:
+        """Sums (k, m) of `rows` (N, 3, m) over the points that share each coordinate of a model error, times its standard deviation."""
+        flat = rows.reshape(len(rows), -1)
+        sums = [np.zeros((0, flat.shape[1]))]
+        for name, labels in cells.blocks.items():
+            if (std := getattr(self, name)) > 0:
+                sums.append(
+                    std * (incidence(labels, np.arange(len(rows)), (int(labels.max()) + 1, len(rows))) @ flat)
+                )
+        return np.concatenate(sums).reshape(-1, rows.shape[2])
+
+
+def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
+    """W (N, 3, 3) times `rows` (N, 3) or (N, 3, m), stacked: (3 N,) or (3 N, m)."""
+    if rows.ndim == 2:
+        return np.matmul(whitening, rows[:, :, None]).ravel()
+    return np.matmul(whitening, rows).reshape(3 * len(rows), rows.shape[2])
+
+
+def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
+    """What a calibration found of the errors of a robot's points; without a calibration the instrument alone where its sigma is `stated`.
+
+    A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
+    """
+    instrument, share, robot, angular, _, pose, _ = model.scatter
+    if not model.scatter.any():
+        return Scatter(share=1.0, robot=0.0) if stated else None
+    if not stated:
+        share = 1.0 if instrument > 0 else 0.0
+    alone = np.sqrt(max(robot**2 - pose**2, 0.0))
+    return Scatter(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
+
+
+def joint_turns(at: Prediction) -> np.ndarray:
+    """How every revolute joint, turned by one radian, moves the points: (N, 3, r), m/rad, in the instrument's frame."""
+    joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
+    return at.jacobian([f"{joint.name}.offset" for joint in joints])

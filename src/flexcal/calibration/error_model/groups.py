@@ -1,0 +1,109 @@
+"""Groups of measured points with a common error: visits to a pose, regions of the workspace, sections in time, commands."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.error_model.folds import order_folds, workspace_folds
+from flexcal.data.poses import PoseSet
+
+COMMAND = "command"
+"""The model error common to all visits of a command."""
+_CELL_VISITS, _MOST_CELLS, _FEWEST_CELLS = 5, 16, 4
+"""Visits to poses a block of the model error, and bounds on the number of blocks."""
+SAME_COMMAND = 1e-4
+"""Joint positions (rad or m) closer than this are one command."""
+_FEWEST_REPEATED = 5
+"""Commands visited more than once that a variance between commands needs."""
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorCells:
+    """Labels (N,) of points that share an error, whole numbers from 0.
+
+    `pose`: measured in one visit to a pose, each another target; the robot's scatter is common to them. The others share a model error:
+    a cell of the `workspace`, a stretch of the measuring `order`, a `command` with its target; None where there are too few poses, or too
+    few commands that were visited again.
+    """
+
+    pose: np.ndarray
+    workspace: np.ndarray | None = None
+    order: np.ndarray | None = None
+    command: np.ndarray | None = None
+
+    @classmethod
+    def of(cls, poses: PoseSet) -> ErrorCells:
+        """Rows of one pose number are a visit; those of a target that the visit already has begin another."""
+        _, target = np.unique(poses.target, return_inverse=True)
+        visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
+        commands = distinct(np.column_stack([np.round(poses.q / SAME_COMMAND), target]))
+        repeated = int((np.bincount(commands) > 1).sum())
+        command = commands if repeated >= _FEWEST_REPEATED else None
+        size = np.bincount(visit)
+        count = min(len(size) // _CELL_VISITS, _MOST_CELLS)
+        if count < _FEWEST_CELLS:
+            return cls(visit, command=command)
+        place = np.column_stack([np.bincount(visit, coordinate) for coordinate in poses.position.T])
+        workspace = workspace_folds(place / size[:, None], count)
+        return cls(visit, workspace[visit], order_folds(len(size), count)[visit], command)
+
+    def subset(self, rows: np.ndarray) -> ErrorCells:
+        """Those of the rows with these indices, or where this mask is true."""
+        blocks = {name: distinct(labels[rows]) for name, labels in self.blocks.items()}
+        return ErrorCells(distinct(self.pose[rows]), **blocks)
+
+    @property
+    def blocks(self) -> dict[str, np.ndarray]:
+        """The labels (N,) of a common model error that there are, by name."""
+        named = {"workspace": self.workspace, "order": self.order, COMMAND: self.command}
+        return {name: labels for name, labels in named.items() if labels is not None}
+
+    @property
+    def several(self) -> bool:
+        """Whether any pose has several points."""
+        return self.visits.shape[1] > 1
+
+    @cached_property
+    def visits(self) -> np.ndarray:
+        """Rows (G, T) of every visit to a pose, in measuring order; -1 where it has fewer than T."""
+        place = occurrence(self.pose)
+        result = np.full((self.pose.max() + 1, place.max() + 1), -1)
+        result[self.pose, place] = np.arange(len(self.pose))
+        return result
+
+    def gathered(self, rows: np.ndarray) -> np.ndarray:
+        """Values (N, 3, …) of all points by visits, (G, 3 T, …); zero for points that a visit lacks."""
+        found = rows[self.visits]
+        found[self.visits < 0] = 0.0
+        return found.reshape(len(found), -1, *rows.shape[2:])
+
+    @cached_property
+    def common(self) -> np.ndarray:
+        """Covariance (G, 3 T, 3 T) of a unit error in every coordinate that is common to the points of a visit."""
+        unit = self.gathered(np.broadcast_to(np.eye(3), (len(self.pose), 3, 3)))
+        return unit @ np.swapaxes(unit, 1, 2)
+
+
+def block_columns(labels: np.ndarray) -> np.ndarray:
+    """Columns (N, 3, 3 K) of an error that is common to each of K blocks."""
+    rows = (labels[:, None] == np.unique(labels)[None]).astype(float)
+    return np.kron(rows, np.eye(3)).reshape(len(labels), 3, -1)
+
+
+def distinct(*columns: np.ndarray) -> np.ndarray:
+    """Numbers (N,) from 0 of the distinct rows, in the order in which they first appear."""
+    _, first, inverse = np.unique(np.column_stack(columns), axis=0, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[inverse.ravel()]
+
+
+def occurrence(labels: np.ndarray) -> np.ndarray:
+    """How many earlier rows (N,) have the same label."""
+    order = np.argsort(labels, kind="stable")
+    starts = np.flatnonzero(np.diff(labels[order], prepend=labels[order][0] - 1))
+    counts = np.diff(np.append(starts, len(labels)))
+    result = np.empty(len(labels), dtype=int)
+    result[order] = np.arange(len(labels)) - np.repeat(starts, counts)
+    return result

@@ -1,0 +1,107 @@
+"""Scalar products of the columns of a linear fit and of the blocks that share an error, from sums over visits to poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead
+from flexcal.calibration.error_model.command_sums import CommandSums
+from flexcal.calibration.error_model.groups import COMMAND
+from flexcal.calibration.error_model.incidence_matrices import added, by_axes, incidence, pairs_of
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+    from flexcal.calibration.error_model.variance_components import LinearFit
+
+
+@dataclass(frozen=True, eq=False)
+class PointSums:
+    """Columns of a linear fit by visits to poses, and the sums that make scalar products of the columns that blocks share.
+
+    `columns` (G, 3 T, p + w + k + 1) are those of the fit, w waves of transmission errors, k further ones and, the last, its residual;
+    `structures` are ∂V/∂variance of the components that visits have on their own, (G, 3 T, 3 T) or as diagonals (G, 3 T); `blocks` says
+    which of K cells and stretches are a component's; `sums` (K, G T) and `pairs` (K K, G T T) add rows, and pairs of rows of one visit,
+    that belong to one, and to a pair of them. `commands` does so for errors of commands, of which there may be half as many as points.
+    """
+
+    fit: LinearFit
+    columns: np.ndarray
+    structures: dict[str, np.ndarray]
+    blocks: dict[str, np.ndarray]
+    sums: csr_matrix
+    pairs: csr_matrix
+    commands: CommandSums | None
+
+    @classmethod
+    def of(cls, fit: LinearFit, further: np.ndarray | None = None) -> PointSums:
+        """Of a fit, with `further` columns (N, 3, k) that are not of it."""
+        more = np.zeros((*fit.residual.shape, 0)) if further is None else further
+        cells = fit.cells
+        columns = cells.gathered(
+            np.concatenate([fit.free, fit.tied, fit.waves, more, fit.residual[:, :, None]], axis=2)
+        )
+        turned = cells.gathered(fit.turns)
+        structures = {
+            "robot": cells.gathered(np.ones(fit.residual.shape)),
+            "share": cells.gathered(fit.sigma**2),
+            "pose": cells.common,
+            "angular": turned @ np.swapaxes(turned, 1, 2),
+        }
+        blocks, labels, count = {}, [], 0
+        for name, own in cells.blocks.items():
+            if name != COMMAND:
+                size = int(own.max()) + 1
+                blocks[name] = np.arange(count, count + size)
+                labels.append(np.where(cells.visits >= 0, own[cells.visits] + count, -1))
+                count += size
+        label = np.stack(labels, axis=2) if labels else np.zeros((*cells.visits.shape, 0), dtype=int)
+        rows = np.arange(cells.visits.size).reshape(*cells.visits.shape, 1)
+        sums = incidence(label, rows, (count, cells.visits.size))
+        commands = None if cells.command is None else CommandSums.of(cells, label, count)
+        return cls(fit, columns, structures, blocks, sums, pairs_of(label, label, count, count), commands)
+
+    def gram(self, inner: np.ndarray, *, commands: bool) -> Arrowhead:
+        """CᵀQC of all columns C with Q by its blocks `inner` (G, 3 T, 3 T).
+
+        The corner is of `columns` and of the cells and stretches (three columns each, 1 where a point belongs to it); the blocks are of
+        the commands, where they are asked for.
+        """
+        size, count = self.columns.shape[2], self.count
+        moved = np.matmul(inner, self.columns)
+        corner = np.empty((size + 3 * count, size + 3 * count))
+        corner[:size, :size] = self.columns.reshape(-1, size).T @ moved.reshape(-1, size)
+        entries = by_axes(inner)
+        if count:
+            corner[size:, :size] = added(self.sums, moved)
+            corner[:size, size:] = corner[size:, :size].T
+            own = (self.pairs @ entries).reshape(count, count, 3, 3)
+            corner[size:, size:] = own.transpose(0, 2, 1, 3).reshape(3 * count, 3 * count)
+        if self.commands is None or not commands:
+            return Arrowhead((), np.zeros((0, len(corner))), corner)
+        border = np.concatenate([added(self.commands.sums, moved), self.commands.crossed(entries)], axis=1)
+        return Arrowhead(self.commands.blocks(entries), border, corner)
+
+    @property
+    def count(self) -> int:
+        """Number of cells and stretches."""
+        return sum(len(own) for own in self.blocks.values())
+
+    def spread(self, values: np.ndarray) -> np.ndarray:
+        """Errors (G, 3 T) of all points from those (3 K,) of each cell and stretch."""
+        return (self.sums.T @ values.reshape(-1, 3)).reshape(len(self.columns), -1)
+
+    @property
+    def fixed(self) -> int:
+        """Number of the columns of the fit, the first."""
+        return self.fit.free.shape[2] + self.fit.tied.shape[2]
+
+    def index(self, name: str) -> np.ndarray:
+        """Numbers of the columns of a component in the corner: of its cells or stretches, or of the waves."""
+        if name not in self.blocks:
+            return self.fixed + np.arange(self.fit.waves.shape[2])
+        first = self.columns.shape[2] + 3 * self.blocks[name]
+        return (first[:, None] + np.arange(3)).ravel()

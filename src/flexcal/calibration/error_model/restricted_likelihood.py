@@ -1,0 +1,144 @@
+"""Restricted likelihood of variance components of measured points, from sums over visits to poses and over blocks."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead, ArrowheadFactor
+from flexcal.calibration.error_model.error_components import Scatter
+from flexcal.calibration.error_model.groups import COMMAND
+from flexcal.calibration.error_model.incidence_matrices import added
+from flexcal.calibration.error_model.point_sums import PointSums
+
+
+@dataclass(frozen=True, eq=False)
+class RestrictedLikelihood:
+    """Restricted likelihood at some components: with P = V⁻¹ - V⁻¹X(XᵀV⁻¹X)⁻¹XᵀV⁻¹ of the parameters X, the shared errors being in V.
+
+    `inverse` (G, 3 T, 3 T) is that of the visits' own covariance; `used` are the columns of X, of what is known of them beforehand and of
+    the cells, `sizes` their standard deviations (1 for X), `outer` that of the commands, whose columns go first; `factor` L with
+    L Lᵀ = S Cᵀ V₀⁻¹ C S + (0 for X, else 1).
+    """
+
+    sums: PointSums
+    names: tuple[str, ...]
+    inverse: np.ndarray
+    gram: Arrowhead
+    used: np.ndarray
+    sizes: np.ndarray
+    outer: float
+    factor: ArrowheadFactor
+    solution: np.ndarray
+    deviance: float
+
+    @classmethod
+    def of(cls, sums: PointSums, names: Sequence[str], scatter: Scatter) -> RestrictedLikelihood:
+        """At a scatter, to be derived by the variances of the components `names`."""
+        fit = sums.fit
+        own = scatter.jointly(fit.sigma, fit.turns, fit.cells)
+        if sums.commands is not None and COMMAND in names:
+            diagonal = np.arange(own.shape[1])
+            own[:, diagonal, diagonal] += scatter.command**2 * sums.commands.once
+        factor = np.linalg.cholesky(own)
+        whitening = np.linalg.inv(factor)
+        inverse = np.swapaxes(whitening, 1, 2) @ whitening
+        gram = sums.gram(inverse, commands=COMMAND in names)
+        shared = {name: sums.index(name) for name in names if name not in (*sums.structures, COMMAND)}
+        used = np.concatenate([np.arange(sums.fixed), *shared.values()])
+        stds = [np.full(len(index), getattr(scatter, name)) for name, index in shared.items()]
+        sizes, outer = np.concatenate([np.ones(sums.fixed), *stds]), scatter.command
+        whole = gram.scaled(outer, sizes, used).plus_identity(np.arange(len(used)) >= fit.free.shape[2])
+        lower, first, last = whole.factored(), len(gram.border), sums.columns.shape[2] - 1
+        half = lower.half(gram.rows(outer, sizes, used, np.array([last])))
+        effects = -lower.other_half(half)[:, 0]
+        solution = np.zeros(first + len(gram.corner))
+        solution[:first] = outer * effects[:first]
+        solution[first + used] = sizes * effects[first:]
+        solution[first + last] = 1.0
+        deviance = 2 * float(np.log(np.diagonal(factor, axis1=1, axis2=2)).sum()) + lower.log_determinant
+        deviance += float(gram.corner[last, last] - np.sum(half**2))
+        return cls(sums, tuple(names), inverse, gram, used, sizes, outer, lower, solution, deviance)
+
+    def products(self, columns: np.ndarray) -> np.ndarray:
+        """CᵀPC (k, k) of the `columns` (k,) with these numbers."""
+        half = self.factor.half(self.gram.rows(self.outer, self.sizes, self.used, columns))
+        return self.gram.corner[np.ix_(columns, columns)] - half.T @ half
+
+    @cached_property
+    def slopes(self) -> np.ndarray:
+        """Derivatives of the deviance by the variances (k,): tr P V' - yᵀ P V' P y."""
+        sums, result = self.sums, np.empty(len(self.names))
+        for k, name in enumerate(self.names):
+            if name == COMMAND and sums.commands is not None:
+                result[k] = self._slope_by_commands() + self._slope_by_visits(sums.commands.once)
+            elif name in sums.structures:
+                result[k] = self._slope_by_visits(sums.structures[name])
+            else:
+                own = sums.index(name)
+                pushed = self.gram.times(self.solution)[len(self.gram.border) + own]
+                result[k] = float(np.trace(self.products(own)) - pushed @ pushed)
+        return result
+
+    def _slope_by_commands(self) -> float:
+        """Derivative by an error that all visits of commands share."""
+        gram, outer = self.gram, self.outer
+        trace = sum(float(np.trace(own, axis1=1, axis2=2).sum()) for own in gram.blocks)
+        blocks = tuple(outer * own for own in gram.blocks)
+        across = Arrowhead(blocks, gram.border[:, self.used] * self.sizes, np.zeros((len(self.used), 0)))
+        pushed = gram.times(self.solution)[: len(gram.border)]
+        return trace - self.factor.squares(across) - float(pushed @ pushed)
+
+    def _slope_by_visits(self, structure: np.ndarray) -> float:
+        """Derivative by an error that every visit has on its own, (G, 3 T, 3 T) or its diagonal (G, 3 T)."""
+        if structure.ndim == 2:
+            inner = (self.inverse * structure[:, None]) @ self.inverse
+            trace = float(np.sum(np.diagonal(self.inverse, axis1=1, axis2=2) * structure))
+        else:
+            inner = self.inverse @ structure @ self.inverse
+            trace = float(np.sum(self.inverse * structure))
+        pushed = self.sums.gram(inner, commands=COMMAND in self.names)
+        trace -= self.factor.trace(pushed.scaled(self.outer, self.sizes, self.used))
+        return trace - float(self.solution @ pushed.times(self.solution))
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        """Average information yᵀ P V' P V'' P y of the variances (k, k), of the deviance (Gilmour, Thompson & Cullis 1995)."""
+        sums, size, first = self.sums, self.sums.columns.shape[2], len(self.gram.border)
+        errors = sums.columns @ self.solution[first : first + size] + sums.spread(
+            self.solution[first + size :]
+        )
+        if sums.commands is not None and COMMAND in self.names:
+            errors += sums.commands.spread(self.solution[:first]).reshape(errors.shape)
+        weighted = np.matmul(self.inverse, errors[:, :, None])
+        pushed = np.concatenate([self._pushed(name, weighted) for name in self.names], axis=2)
+        moved = np.matmul(self.inverse, pushed)
+        along = np.concatenate(
+            [sums.columns.reshape(-1, size).T @ moved.reshape(-1, len(self.names)), added(sums.sums, moved)]
+        )
+        along = self.sizes[:, None] * along[self.used]
+        if sums.commands is not None and COMMAND in self.names:
+            along = np.concatenate([self.outer * added(sums.commands.sums, moved), along])
+        inside = self.factor.half(along)
+        flat = (part.reshape(-1, len(self.names)) for part in (pushed, moved))
+        return next(flat).T @ next(flat) - inside.T @ inside
+
+    def _pushed(self, name: str, weighted: np.ndarray) -> np.ndarray:
+        """V' (G, 3 T, 1) of one component times P y."""
+        sums = self.sums
+        if name == COMMAND and sums.commands is not None:
+            again = sums.commands.spread(added(sums.commands.sums, weighted)).reshape(weighted.shape)
+            return again + sums.commands.once[:, :, None] * weighted
+        if name in sums.blocks:
+            every = np.zeros(3 * sums.count)
+            own = sums.index(name) - sums.columns.shape[2]
+            every[own] = added(sums.sums, weighted)[own, 0]
+            return sums.spread(every)[:, :, None]
+        if name not in sums.structures:
+            waves = sums.columns[:, :, sums.index(name)]
+            return waves @ np.einsum("gik,gij->kj", waves, weighted)
+        structure = sums.structures[name]
+        return structure[:, :, None] * weighted if structure.ndim == 2 else np.matmul(structure, weighted)

@@ -1,0 +1,213 @@
+"""Variance components of the errors of measured points, by restricted maximum likelihood (Patterson & Thompson 1971)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.error_model.error_components import Scatter
+from flexcal.calibration.error_model.groups import ErrorCells
+from flexcal.calibration.error_model.point_sums import PointSums
+from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
+
+_CLEAR_GAIN = 3.0
+"""Gain in log-likelihood from which a stated sigma counts as too large (p = 0.01, one parameter at its bound)."""
+_SUPPORTED = 2.7
+"""Gain in log-likelihood by which a component counts as found (p = 0.01, one variance at its bound of zero)."""
+_LARGEST = 30.0
+"""Variance over that about the fit, which no component exceeds."""
+_NEGLIGIBLE = 1e-4
+"""Share of the total variance below which a component is zero."""
+TRANSMISSION = "transmission"
+"""The component of transmission errors."""
+_SMALLEST = 1e-9
+"""Share of the total variance that bounds a component from below."""
+_STEPS, _HALVINGS = 60, 30
+_STILL = 1e-6
+"""Change of the deviance, by its slope, below which the greatest likelihood is found."""
+_ARMIJO = 1e-4
+"""Share of the change by the slope that a step must bring (Armijo 1966)."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFit:
+    """A fit linearised at its solution: `residual` (N, 3) m = `free` x + `tied` z + error, z standard normal a priori.
+
+    `free` (N, 3, p) and `tied` (N, 3, t) m; `waves` (N, 3, w) m/rad move the points with the waves of transmission errors; `sigma` (N, 3) m
+    as stated, `turns` (N, 3, r) m/rad; `cells` say which points share an error.
+    """
+
+    residual: np.ndarray
+    free: np.ndarray
+    tied: np.ndarray
+    waves: np.ndarray
+    sigma: np.ndarray
+    turns: np.ndarray
+    cells: ErrorCells
+
+    def products(self, scatter: Scatter, columns: np.ndarray) -> np.ndarray:
+        """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, the last, the residual, less what the parameters explain.
+
+        They are weighted by the inverse of the residual's marginal covariance, the `tied` numbers and shared errors integrated out.
+        """
+        shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
+        names = [name for name in shared if getattr(scatter, name) > 0]
+        sums = PointSums.of(self, columns)
+        last = sums.columns.shape[2]
+        own = np.arange(last - columns.shape[2] - 1, last)
+        return RestrictedLikelihood.of(sums, names, scatter).products(own)
+
+    def scatter(self, *, stated: bool) -> tuple[Scatter, dict[str, float]]:
+        """The components, and the standard deviation of each of them that is not zero.
+
+        Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
+        """
+        shared = [*([TRANSMISSION] if self.waves.size else []), *self.cells.blocks]
+        names = ["robot", *(["pose"] if self.cells.several else []), "angular", *shared]
+        total = self._mean_square()
+        levers = {
+            name: _lever(moved) for name, moved in (("angular", self.turns), (TRANSMISSION, self.waves))
+        }
+        scale = np.array([total / levers.get(name, 1.0) for name in names])
+        share = 1.0 if stated else 0.0
+        variances, likelihood = self._maximum(names, scale, share)
+        if stated:
+            # the points may scatter less than the instrument alone should, even if nothing else errs
+            own = scale[len(names) - len(shared) :]
+            sizes = np.append(own, total / float(np.mean(self.sigma**2)))
+            alone = self._maximum([*shared, "share"], sizes, None, favour=False)[1]
+            if alone - self._maximum(names, scale, share, favour=False)[1] > _CLEAR_GAIN:
+                names, scale = ["robot", *shared], np.append(total, own)
+                sizes = np.append(scale, sizes[-1])
+                narrower, likelihood = self._maximum([*names, "share"], sizes, None)
+                variances, share = narrower[:-1], float(np.sqrt(narrower[-1]))
+        names, scale, variances = self._supported(names, scale, variances, likelihood, share)
+        variances = np.where(variances > _NEGLIGIBLE * scale, variances, 0.0)
+        stds = dict(zip(names, np.sqrt(variances).tolist(), strict=True))
+        found = Scatter(share=share, **stds)
+        return found, self._uncertainties(names, variances, share)
+
+    def _supported(
+        self, names: list[str], scale: np.ndarray, variances: np.ndarray, likelihood: float, share: float
+    ) -> tuple[list[str], np.ndarray, np.ndarray]:
+        """Model error, and the components of repeatability that the data support: others are taken out one by one while that costs no
+        more than chance gains.
+        """
+        seen = [k for k in range(len(names)) if k == 0 or variances[k] > _NEGLIGIBLE * scale[k]]
+        names, scale, variances = [names[k] for k in seen], scale[seen], variances[seen]
+        while len(names) > 1:
+            trials = []
+            for k in range(1, len(names)):
+                if self._favour(names[k]):
+                    continue
+                rest = [i for i in range(len(names)) if i != k]
+                near = variances[rest] / scale[rest]
+                near[0] += variances[k] / scale[k] / 2
+                found = self._maximum([names[i] for i in rest], scale[rest], share, near)
+                trials.append((found[1], found[0], rest))
+            if not trials:
+                break
+            best, kept, rest = max(trials, key=lambda trial: trial[0])
+            if likelihood - best > _SUPPORTED:
+                break
+            names, scale, variances, likelihood = [names[i] for i in rest], scale[rest], kept, best
+        return names, scale, variances
+
+    def _favour(self, name: str) -> float:
+        """Power of a standard deviation by which the likelihood is multiplied: 1 of transmission errors, together 1 of other model errors.
+
+        Few poses would often put these at zero, which claims to know that there are none (Chung, Rabe-Hesketh, Dorie, Gelman & Liu 2013).
+        """
+        if name == TRANSMISSION:
+            return 1.0
+        return 1.0 / len(self.cells.blocks) if name in self.cells.blocks else 0.0
+
+    def _mean_square(self) -> float:
+        """Variance of a coordinate about the fit, m²; the parameters take their degrees of freedom."""
+        rows, size = self.residual.size, self.free.shape[2]
+        basis = np.linalg.qr(self.free.reshape(rows, size))[0]
+        left = self.residual.ravel() - basis @ (basis.T @ self.residual.ravel())
+        return float(left @ left) / max(rows - size, 1) + 1e-24
+
+    def _maximum(
+        self,
+        names: list[str],
+        scale: np.ndarray,
+        share: float | None,
+        near: np.ndarray | None = None,
+        *,
+        favour: bool = True,
+    ) -> tuple[np.ndarray, float]:
+        """Variances (k,) of the greatest restricted likelihood, and its logarithm; `share` None: it is the last of the variances.
+
+        Newton's steps with the average information, cut at the bounds. `near` (k,) is where to begin, in units of `scale`. The
+        likelihood is multiplied by each standard deviation to the power of `_favour`, unless not to `favour` any.
+        """
+        start = np.full(len(names), 0.7 / len(names)) if near is None else near
+        largest = np.full(len(names), _LARGEST)
+        if share is None:
+            start[-1], largest[-1] = 0.5, min(1.0 / float(scale[-1]), _LARGEST)
+        x = np.clip(start, _SMALLEST, largest)
+        at = self._at(names, x * scale, share)
+        favoured = np.array([self._favour(name) if favour else 0.0 for name in names])
+
+        def deviance(x: np.ndarray, at: RestrictedLikelihood) -> float:
+            return at.deviance - float(favoured @ np.log(x))
+
+        for _ in range(_STEPS):
+            slope = at.slopes * scale - favoured / x
+            information = at.information * scale * scale[:, None] + np.diag(favoured / x**2)
+            step = _step(x, slope, information, largest)
+            for _ in range(_HALVINGS):
+                tried = np.clip(x + step, _SMALLEST, largest)
+                after = self._at(names, tried * scale, share)
+                if deviance(tried, after) <= deviance(x, at) + _ARMIJO * float(slope @ (tried - x)):
+                    break
+                step /= 2
+            else:
+                break
+            still = abs(float(slope @ (tried - x))) < _STILL
+            x, at = tried, after
+            if still:
+                break
+        return x * scale, -0.5 * deviance(x, at)
+
+    @cached_property
+    def _sums(self) -> PointSums:
+        return PointSums.of(self)
+
+    def _at(self, names: list[str], variances: np.ndarray, share: float | None) -> RestrictedLikelihood:
+        known = dict(zip(names, variances.tolist(), strict=True))
+        squared = known.get("share", 0.0) if share is None else share**2
+        stds = {name: float(np.sqrt(value)) for name, value in known.items() if name != "share"}
+        return RestrictedLikelihood.of(self._sums, names, Scatter(share=float(np.sqrt(squared)), **stds))
+
+    def _uncertainties(self, names: list[str], variances: np.ndarray, share: float) -> dict[str, float]:
+        """Standard deviations of the components, from the average information."""
+        seen = variances > 0
+        named = [name for name, own in zip(names, seen, strict=True) if own]
+        if not named:
+            return {}
+        information = 0.5 * self._at(named, variances[seen], share).information
+        spread = np.sqrt(np.maximum(np.diag(np.linalg.pinv(information)), 0.0))
+        stds = spread / (2 * np.sqrt(variances[seen]))
+        return dict(zip(named, stds.tolist(), strict=True))
+
+
+def _lever(moved: np.ndarray) -> float:
+    """Mean square of a coordinate (m²) that columns (N, 3, k) make together; 1 where there are none."""
+    return float((moved**2).sum()) / (3 * len(moved)) or 1.0
+
+
+def _step(x: np.ndarray, slope: np.ndarray, information: np.ndarray, largest: np.ndarray) -> np.ndarray:
+    """Newton's step (k,) of the variances that do not rest on a bound which it would cross."""
+    free = ~(((x <= _SMALLEST) & (slope > 0)) | ((x >= largest) & (slope < 0)))
+    while True:
+        step = np.zeros(len(x))
+        step[free] = -np.linalg.lstsq(information[np.ix_(free, free)], slope[free], rcond=None)[0]
+        crossing = ((x <= _SMALLEST) & (step < 0)) | ((x >= largest) & (step > 0))
+        if not crossing.any():
+            return step
+        free &= ~crossing

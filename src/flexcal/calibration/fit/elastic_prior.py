@@ -1,0 +1,70 @@
+"""Prior of stiffness and inertia for the geometric calibration: posterior of stage 1, or CAD."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.robot import SPRINGS, RobotModel, declared, uncertain_inertials, uncertain_payload, unit_of
+
+
+@dataclass(frozen=True, eq=False)
+class ElasticPrior:
+    """Stiffness, inertia and payload parameters that deflection depends on, and their joint covariance (estimation coordinates)."""
+
+    parameters: Parameters
+    covariance: np.ndarray
+
+    @classmethod
+    def of(cls, model: RobotModel, poses: PoseSet, *, secant_scale: float = 0.0) -> ElasticPrior:
+        """What the model's posterior holds of these parameters, and the declared priors of the others.
+
+        `secant_scale` is the relative 1σ by which a drive's stiffness under gravity may differ from the tangent one of a frequency
+        response: it widens the drive stiffnesses by one scale each.
+        """
+        names = _names(model, poses)
+        items = [declared(model, name) for name in names]
+        held = model.posterior
+        covariance = held.prior(Parameters(items))[1]
+        items = [replace(i, prior_std=np.inf) if held.determines(i.name) else i for i in items]
+        for k, name in enumerate(names):
+            if name.endswith("drive.stiffness"):
+                covariance[k, k] += secant_scale**2
+        return cls(Parameters(items), covariance)
+
+    def beside(self, waves: Mapping[str, float], std: float) -> ElasticPrior:
+        """With the `waves` of transmission errors, each with its size over that of order 1, whose 1σ is `std` rad; none where that is 0."""
+        if not waves or std == 0:
+            return self
+        items = Parameters(Parameter(name, unit_of(name), 0.0) for name in waves)
+        size, own = len(self.parameters), std * np.array(list(waves.values()))
+        covariance = np.diag(np.concatenate([np.zeros(size), own**2]))
+        covariance[:size, :size] = self.covariance
+        return ElasticPrior(self.parameters + items, covariance)
+
+
+NOTHING_ELASTIC = ElasticPrior(Parameters(), np.zeros((0, 0)))
+
+
+def _names(model: RobotModel, poses: PoseSet) -> list[str]:
+    if not model.elastic:
+        return []
+    names = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
+    names += [name for e in model.elastic if model.posterior.determines(name := f"{e.name}.drive.hardening")]
+    names += uncertain_inertials(model, [i for i in range(model.n) if _carried(model, i)])
+    if poses.payload is None or poses.payload.any():
+        names += uncertain_payload(model)
+    return names
+
+
+def _carried(model: RobotModel, link: int) -> bool:
+    """Whether a link hangs on a spring."""
+    while link >= 0:
+        if link in model.bearing_frames:
+            return True
+        link = model.joints[link].parent
+    return False

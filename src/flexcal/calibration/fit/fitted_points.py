@@ -1,0 +1,376 @@
+"""Fit of the geometry to measured points for one error model, and the likelihood of that error model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.error_model import (
+    TRANSMISSION,
+    ErrorCells,
+    LinearFit,
+    Scatter,
+    are_different,
+    joint_turns,
+    whitened,
+)
+from flexcal.calibration.fit.elastic_prior import ElasticPrior
+from flexcal.calibration.fit.least_squares_problem import GeometryFit, PlainLoss
+from flexcal.calibration.fit.marginalised_elasticity import marginalised
+from flexcal.calibration.fit.practical_identifiability import Undetermined, undetermined
+from flexcal.calibration.fit.structural_identifiability import (
+    kinematic_identifiability,
+    random_identifiability,
+    require_enough,
+)
+from flexcal.calibration.fit.terms import LEAST_POSES, geometric_parameters, plausible_size, random_waves
+from flexcal.calibration.measurement import Prediction, predict, register, require_both_flanks
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import RANK_TOLERANCE, Estimate, Identifiability, Loss, Parameter, Parameters
+from flexcal.model.robot import SCATTER, RobotModel, unit_of
+
+_FLANK_PASSES = 4
+_FIRST_SCATTER = 1e-4
+"""Scatter (m) that a fit begins with: its size matters against priors only."""
+_CHI_MEDIAN = 2.366
+"""Median of chi-square with three degrees of freedom."""
+_SUSPICION = 1e-3
+"""Chance of suspecting an outlier where there is none."""
+_SLACK = 1.5
+"""By which the squared scatter of few points, taken from their median, may be too small."""
+
+_FREE_STIFFNESS = 0.3
+"""Relative 1σ by which every stiffness may differ from its prior while the scatter is estimated."""
+
+
+@dataclass(frozen=True, eq=False)
+class PointFit:
+    """What a fit is made from: the registered robot `start`, its `geometric` parameters, their rank on the `poses`, the elastic `prior`."""
+
+    start: RobotModel
+    poses: PoseSet
+    terms: tuple[str, ...]
+    geometric: Parameters
+    identifiability: Identifiability
+    structural: Identifiability
+    prior: ElasticPrior
+    elastic: bool
+    marginalised: bool
+    progress: Callable[[int, float], None] | None
+
+    @classmethod
+    def of(
+        cls,
+        model: RobotModel,
+        poses: PoseSet,
+        terms: tuple[str, ...],
+        prior: ElasticPrior,
+        elastic: bool,
+        *,
+        marginalised: bool,
+        progress: Callable[[int, float], None] | None,
+    ) -> PointFit:
+        """Without the term `transmission` where there are fewer than 20 different poses, which do not tell its variance.
+
+        Raises `FlexcalError` for a backlash seen from one flank and for too few poses.
+        """
+        if not are_different(poses.q, LEAST_POSES):
+            terms = tuple(term for term in terms if term != TRANSMISSION)
+        bare = replace(model, station=np.zeros_like(model.station))
+        start = register(model, poses, predict(bare, poses, elastic=elastic).position)
+        if "backlash" in terms:
+            require_both_flanks(model, predict(start, poses, elastic=elastic).rest.flank)
+        geometric = geometric_parameters(start, poses, terms)
+        seen = kinematic_identifiability(start, poses, geometric)
+        require_enough(start, poses, geometric, seen)
+        structural = random_identifiability(start, poses, geometric, seen)
+        if structural.rank > seen.rank:
+            # these poses hide something: what may be off most, as the place of the instrument, is to take it up
+            sizes = np.array([plausible_size(start, name) for name in geometric.names])
+            seen = kinematic_identifiability(start, poses, geometric, scale=sizes)
+            structural = random_identifiability(start, poses, geometric, seen, scale=sizes)
+        return cls(start, poses, terms, geometric, seen, structural, prior, elastic, marginalised, progress)
+
+    @cached_property
+    def waves(self) -> dict[str, float]:
+        """Waves of transmission errors that have one variance, with their sizes over that of order 1."""
+        return random_waves(self.start, self.poses, self.geometric) if TRANSMISSION in self.terms else {}
+
+    @cached_property
+    def cells(self) -> ErrorCells:
+        """Which points share an error."""
+        return ErrorCells.of(self.poses)
+
+    @cached_property
+    def straight(self) -> Prediction:
+        """The points of the robot that the fit starts from, undeflected."""
+        return predict(self.start, self.poses, elastic=False, jacobians=True)
+
+    @property
+    def first_scatter(self) -> Scatter:
+        """The error model to begin with: what is stated, and what robots usually have."""
+        return Scatter(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
+
+    @property
+    def hidden(self) -> tuple[str, ...]:
+        """Parameters that random poses would determine and these do not, and that no declared prior does."""
+        seen = self.identifiability.kept_names
+        declared = [p.name for p in self.geometric if np.isfinite(p.prior_std)]
+        return tuple(name for name in self.structural.kept_names if name not in (*seen, *declared))
+
+    @property
+    def free(self) -> Parameters:
+        """Parameters that rank or a declared prior determine."""
+        kept = self.identifiability.kept_names
+        return Parameters(p for p in self.geometric if p.name in kept or np.isfinite(p.prior_std))
+
+    def solved(
+        self,
+        scatter: Scatter,
+        loss: Loss | PlainLoss,
+        near: FittedPoints | None = None,
+        *,
+        held: tuple[Undetermined, ...] = (),
+        spread: dict[str, float] | None = None,
+    ) -> FittedPoints:
+        """The fit under some scatter, from the solution `near`, repeated until the flanks are those of the robot that it finds.
+
+        `held` parameters stay at their nominal values; `spread` are the standard deviations of the scatter's components.
+        """
+        names = [item.name for item in held]
+        kept = Parameters(item for item in self.free if item.name not in names)
+        if near is None:
+            at = predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
+            turns = joint_turns(at)
+        else:
+            at, turns = near.at, near.turns
+            kept = Parameters(
+                replace(p, value=near.estimate.values.get(p.name, p.value), prior_mean=p.value) for p in kept
+            )
+        whitening = scatter.weights(self.poses.sigma, turns)
+        flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
+        for _ in range(_FLANK_PASSES):
+            task = GeometryFit(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
+            if self.marginalised and len(prior.parameters):
+                estimate = marginalised(task, progress=self.progress)
+            else:
+                estimate = task.reestimated(loss=loss, progress=self.progress)
+            fitted = self.start.with_values(estimate.values)
+            after = predict(fitted, self.poses, elastic=self.elastic, jacobians=True)
+            if (after.rest.flank == flank).all():
+                break
+            flank = after.rest.flank
+            if "backlash" in self.terms:
+                require_both_flanks(self.start, flank)
+        return FittedPoints(self, scatter, spread or {}, held, estimate, fitted, after, flank, task)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPoints:
+    """A solution: `estimate` of the parameters that move, the robot `model`, its prediction `at` the poses on `flank` (N, n)."""
+
+    fit: PointFit
+    scatter: Scatter
+    spread: dict[str, float]
+    held: tuple[Undetermined, ...]
+    estimate: Estimate
+    model: RobotModel
+    at: Prediction
+    flank: np.ndarray
+    task: GeometryFit
+
+    @cached_property
+    def residuals(self) -> np.ndarray:
+        """Measured minus predicted (N, 3), m."""
+        return self.fit.poses.position - self.at.position
+
+    @cached_property
+    def turns(self) -> np.ndarray:
+        """How every revolute joint moves the points (N, 3, r), m/rad."""
+        return joint_turns(self.at)
+
+    @cached_property
+    def inliers(self) -> np.ndarray:
+        """(N,) rows that a robust loss did not set aside."""
+        return ~np.isin(np.arange(len(self.fit.poses)), self.estimate.outliers)
+
+    @cached_property
+    def linear(self) -> LinearFit:
+        """The fit linearised at its solution, without outliers.
+
+        Stiffness is nearly free there: an error of stage 1 must not pass for scatter of the robot, which would hide it.
+        """
+        estimate, prior, poses = self.estimate, self.fit.prior, self.fit.poses
+        elastic = prior.parameters.names
+        items = [estimate.parameters[name] for name in elastic]
+        moved = Parameters(items)
+        slopes = self.at.jacobian(elastic) * moved.natural_slope(moved.coordinates())
+        wide = [_FREE_STIFFNESS**2 if name.endswith(".stiffness") else 0.0 for name in elastic]
+        values, vectors = np.linalg.eigh(prior.covariance + np.diag(wide))
+        tied = slopes @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+        residual = self.residuals + slopes @ (moved.coordinates() - moved.prior_mean())
+        names = tuple(self.fit.waves)
+        waves = self.at.jacobian(names)
+        residual = residual + waves @ np.array([estimate.values.get(name, 0.0) for name in names])
+        columns = self.at.jacobian(self.task.kept.names)
+        free = ~np.isfinite(self.task.kept.prior_std())
+        known = self.task.kept.prior_std()[~free]
+        shift = estimate.parameters.subset(self.task.kept.names).coordinates() - self.task.kept.prior_mean()
+        tied = np.concatenate([tied, columns[:, :, ~free] * known], axis=2)
+        residual = residual + columns[:, :, ~free] @ shift[~free]
+        columns = columns[:, :, free]
+        scale = np.linalg.norm(columns, axis=(0, 1))
+        rows = self.inliers
+        flat = (columns / np.where(scale > 0, scale, 1.0))[rows].reshape(3 * int(rows.sum()), -1)
+        basis, sizes, _ = np.linalg.svd(flat, full_matrices=False)
+        basis = basis[:, sizes > RANK_TOLERANCE * sizes[0]]
+        return LinearFit(
+            residual[rows],
+            basis.reshape(int(rows.sum()), 3, -1),
+            tied[rows],
+            (waves * np.array(list(self.fit.waves.values())))[rows],
+            poses.sigma[rows],
+            self.turns[rows],
+            self.fit.cells.subset(rows),
+        )
+
+    def estimated_scatter(self) -> tuple[Scatter, dict[str, float]]:
+        """Variance components of the residuals, and the standard deviation of each."""
+        return self.linear.scatter(stated=self.fit.poses.sigma_given)
+
+    def robust_scatter(self) -> Scatter:
+        """One scatter for all coordinates, from the median of the residuals' distances."""
+        rows = self.residuals.size
+        freedom = max(rows - self.fit.identifiability.rank, 1)
+        variance = float(np.median((self.residuals**2).sum(axis=1))) / _CHI_MEDIAN * rows / freedom
+        return Scatter(share=0.0, robot=float(np.sqrt(variance)))
+
+    def undetermined(self, scatter: Scatter) -> tuple[Undetermined, ...]:
+        """What the poses leave unknown under some scatter."""
+        fit = self.fit
+        kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))
+        whitening = scatter.whitening(fit.poses.sigma, self.turns)
+        return undetermined(fit.straight, kept, whitening, fit.hidden)
+
+    @property
+    def suspects_outliers(self) -> bool:
+        """Whether single points are farther off than the scatter of most others allows."""
+        from scipy.special import chdtri
+
+        whitening = self.scatter.whitening(self.fit.poses.sigma, self.turns)
+        squares = (whitened(whitening, self.residuals).reshape(-1, 3) ** 2).sum(axis=1)
+        limit = float(chdtri(3, _SUSPICION / len(squares))) * _SLACK
+        return bool(squares.max() > limit * np.median(squares) / _CHI_MEDIAN)
+
+    @property
+    def poses(self) -> PoseSet:
+        """The poses; where they state no sigma, with that of the scatter."""
+        poses, scatter = self.fit.poses, self.scatter
+        if poses.sigma_given:
+            return poses
+        variances = np.diagonal(
+            replace(scatter, share=0.0).independent(poses.sigma, self.turns), axis1=1, axis2=2
+        )
+        return replace(poses, sigma=np.sqrt(variances + scatter.model**2))
+
+    def whole_estimate(self) -> Estimate:
+        """All parameters: those that moved, those that were held with the uncertainty that this leaves, and the scatter."""
+        undetermined_names = [item.name for item in self.held]
+        dropped = tuple(d for d in self.fit.identifiability.dropped if d.name not in self.task.kept.names)
+        turns = [f"station.{s}.{key}" for s in self.fit.poses.stations for key in ("rx", "ry", "rz")]
+        names = dict.fromkeys([*undetermined_names, *(d.name for d in dropped)])
+        items = [self.fit.geometric[name] for name in names]
+        items += [Parameter(n, "rad", self.model.value(n)) for n in turns if n not in self.fit.geometric]
+        estimate, held = replace(self.estimate, covariance=self._covariance()), Parameters(items)
+        size, all_ = len(estimate.parameters), len(estimate.parameters) + len(held) + len(SCATTER)
+        covariance = np.zeros((all_, all_))
+        covariance[:size, :size] = estimate.covariance
+        count = len(undetermined_names)
+        if count:
+            gain = self._gain(undetermined_names)
+            sizes = np.array([item.size for item in self.held])
+            covariance[:size, :size] += (gain * sizes**2) @ gain.T
+            covariance[:size, size : size + count] = gain * sizes**2
+            covariance[size : size + count, :size] = (gain * sizes**2).T
+            covariance[range(size, size + count), range(size, size + count)] = sizes**2
+        scatter, known = self._scatter_parameters()
+        covariance[range(all_ - len(SCATTER), all_), range(all_ - len(SCATTER), all_)] = known**2
+        return replace(
+            estimate,
+            parameters=estimate.parameters + held + scatter,
+            covariance=covariance,
+            dropped=estimate.dropped + dropped,
+            identifiable=self._identifiable() + (False,) * len(held) + tuple(bool(k > 0) for k in known),
+        )
+
+    def _covariance(self) -> np.ndarray:
+        """Covariance (p, p) of the estimate under errors V that the weights V₀ take for independent and alike in all directions.
+
+        Σ + G (V - V₀) Gᵀ with the estimate's response G = Σ Aᵀ V₀⁻¹ to errors of the points; Σ has the prior in it.
+        """
+        estimate, scatter, task = self.estimate, self.scatter, self.task
+        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
+        own = task.columns(self.at, estimate.parameters.names) * slopes
+        white = own.reshape(-1, 3, len(slopes))[self.inliers] @ estimate.covariance
+        respond = np.swapaxes(task.whitening[self.inliers], 1, 2) @ white
+        linear = self.linear
+        together = scatter.shared(linear.cells, respond)
+        jointly = scatter.jointly(linear.sigma, linear.turns, linear.cells)
+        visits = linear.cells.gathered(respond)
+        spread = np.einsum("gip,gij,gjq->pq", visits, jointly, visits, optimize=True)
+        taken = np.einsum("nip,niq->pq", white, white, optimize=True)
+        return estimate.covariance + spread - taken + together.T @ together
+
+    def _gain(self, names: list[str]) -> np.ndarray:
+        """How the estimates (p, h) follow parameters that are held, per unit of these: -Σ Aᵀ A_h of the whitened columns."""
+        estimate = self.estimate
+        slopes = estimate.parameters.natural_slope(estimate.parameters.coordinates())
+        own = self.task.columns(self.at, estimate.parameters.names) * slopes
+        return -estimate.covariance @ own.T @ self.task.columns(self.at, tuple(names))
+
+    def _identifiable(self) -> tuple[bool, ...]:
+        """Those of the estimate, less what a declared prior, or the variance of transmission errors, alone determines."""
+        estimate = self.estimate
+        stds = np.sqrt(np.diag(estimate.covariance))
+        waves = {name: size * self.scatter.transmission for name, size in self.fit.waves.items()}
+        beforehand = {p.name: p.prior_std for p in self.task.kept} | waves
+        return tuple(
+            known and bool(std < 0.8 * beforehand.get(p.name, np.inf))
+            for p, known, std in zip(estimate.parameters, estimate.identifiable, stds, strict=True)
+        )
+
+    def _scatter_parameters(self) -> tuple[Parameters, np.ndarray]:
+        scatter = self.scatter
+        instrument = scatter.share * float(np.sqrt(np.mean(self.fit.poses.sigma**2)))
+        robot, robot_std = self._together("robot", "pose")
+        model, model_std = self._together("workspace", "order", "command")
+        values = (
+            instrument,
+            scatter.share,
+            robot,
+            scatter.angular,
+            model,
+            scatter.pose,
+            scatter.transmission,
+        )
+        angular_std, pose_std, wave_std = (
+            self.spread.get(name, 0.0) for name in ("angular", "pose", "transmission")
+        )
+        # the points of the fit are all that speaks for a stated sigma
+        share_std = scatter.share / np.sqrt(2 * max(self.estimate.degrees_of_freedom, 1))
+        known = np.array([0.0, share_std, robot_std, angular_std, model_std, pose_std, wave_std])
+        items = (
+            Parameter(f"scatter.{key}", unit_of(f"scatter.{key}"), float(value), lower=0.0)
+            for key, value in zip(SCATTER, values, strict=True)
+        )
+        return Parameters(items), known
+
+    def _together(self, *names: str) -> tuple[float, float]:
+        """Root sum of squares of components of the scatter, and its standard deviation."""
+        sizes = np.array([getattr(self.scatter, name) for name in names])
+        spread = np.array([self.spread.get(name, 0.0) for name in names])
+        whole = float(np.linalg.norm(sizes))
+        return whole, float(np.linalg.norm(sizes * spread)) / whole if whole > 0 else 0.0

@@ -1,0 +1,169 @@
+"""Most probable robot among those with the same measured points.
+
+Positions of a point tell where it moves, not how the flange that carries it is turned, nor whether the point or the flange is off: an
+offset of the last joint moves the point as another place of the reflector does. The fit holds such directions at whatever its choice
+of parameters leaves. For every frame but the measured point that choice matters, so a robot is taken that measures the same and is most
+probable beforehand: joints and flange within manufacturing tolerances, each measured point where a ruler has it, instruments anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.calibration.fit.terms import TOLERANCE
+from flexcal.calibration.measurement import predict
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.kinematics import found_xyz, joint_limits
+from flexcal.model.robot import GEOMETRY, STATION, Posterior, RobotModel, posterior_spread, unit_of
+
+POINT_KNOWN = 0.002
+"""m, 1σ: a measured point that is known less well than this on the tool was not found at all."""
+POINT_STD = 0.010
+"""m: how well a ruler has the place of a measured point, 1σ a coordinate."""
+_POSES = 60
+_STEPS = 10
+_SMALL = 1e-10
+"""m and rad."""
+_UNSEEN = 1e-8
+"""Relative singular value below which a direction moves no measured point."""
+
+
+def probable_robot(model: RobotModel, targets: Sequence[str]) -> RobotModel:
+    """The first of `probable_robots`."""
+    return probable_robots(model, targets)[0]
+
+
+def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotModel, RobotModel]:
+    """`model` with the directions of its geometry that do not move the measured points `targets` where they are most probable.
+
+    Weighted least squares of all geometric errors, subject to unchanged positions of the points, as every calibrated station sees them, by
+    Gauss-Newton, of the robot taken as stiff under gravity: tilting axes would show such directions faintly. The posterior follows: what
+    was estimated is propagated, and the free directions have the tolerances as their covariance. The second robot is the same with only
+    these in its posterior: what the measured points leave open. Both are the
+    robot itself where nothing was calibrated.
+    """
+    stations = [name for name in model.stations if f"station.{name}.x" in model.posterior.parameters]
+    if not stations or not targets:
+        return model, model
+    names = _names(model, targets, stations)
+    std = np.array([_std(model, name, targets) for name in names])
+    poses = _random_poses(model, targets, stations)
+    stiff = replace(
+        model,
+        gravity_compliance=np.zeros_like(model.gravity_compliance),
+        lateral_compliance=np.zeros_like(model.lateral_compliance),
+    )
+    wanted = predict(stiff, poses, elastic=False).position
+    scale = np.where(np.isfinite(std), std, 1.0)
+    weight = np.where(np.isfinite(std), 1 / std, 0.0)
+    found, free = stiff, np.zeros((len(names), 0))
+    for _ in range(_STEPS):
+        at = predict(found, poses, elastic=False, jacobians=True)
+        columns = at.jacobian(names).reshape(-1, len(names)) * scale
+        left, sizes, right = np.linalg.svd(columns, full_matrices=len(columns) < len(names))
+        rank = int(np.sum(sizes > _UNSEEN * sizes[0]))
+        missing = left[:, :rank].T @ (wanted - at.position).ravel()
+        step = scale * (right[:rank].T @ (missing / sizes[:rank]))
+        free = scale[:, None] * right[rank:].T
+        values = np.array([found.value(name) for name in names]) + step
+        step += free @ np.linalg.lstsq(weight[:, None] * free, -weight * values, rcond=None)[0]
+        changed = np.array([found.value(name) for name in names]) + step
+        found = found.with_values(dict(zip(names, changed.tolist(), strict=True)))
+        if np.abs(step).max() < _SMALL:
+            break
+    found = model.with_values({name: found.value(name) for name in names})
+    whole, unseen = _propagated(found, names, free, weight)
+    return replace(found, posterior=whole), replace(found, posterior=unseen)
+
+
+def found_point(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
+    """The `nominal` robot with the calibrated positions of the measured points `targets` of `model` in their frames."""
+    values = {}
+    for target in targets:
+        moved = found_xyz(model, target) - nominal.points[target].xyz
+        values |= {f"point.{target}.{axis}": float(v) for axis, v in zip("xyz", moved, strict=True)}
+    return nominal.with_values(values)
+
+
+def point_uncertainty(model: RobotModel, target: str) -> float:
+    """1σ distance (m) to which the posterior of `model` has the place of a measured point in its frame."""
+    spread = posterior_spread(model, lambda changed: found_xyz(changed, target))
+    return float(np.linalg.norm(spread))
+
+
+def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[str]:
+    """Geometric parameters, those of a station that measures in the base frame without its rotation."""
+    moving: set[int] = set()
+    for target in targets:
+        joint = model.point(target).joint
+        while joint >= 0:
+            moving.add(joint)
+            joint = model.joints[joint].parent
+    names = [f"{model.joints[i].name}.{key}" for i in sorted(moving) for key in GEOMETRY]
+    names += [f"tool.{key}" for key in GEOMETRY]
+    first = next(iter(model.points))
+    names += [f"point.{t}.{axis}" for t in targets if t != first for axis in "xyz"]
+    for k, station in enumerate(model.stations):
+        if station in stations:
+            turned = bool(model.station[k, 3:].any())
+            names += [f"station.{station}.{key}" for key in STATION[: 6 if turned else 3]]
+    return names
+
+
+def _std(model: RobotModel, name: str, targets: Sequence[str]) -> float:
+    """How far a parameter may be off beforehand, 1σ; infinite where nothing is known."""
+    owner, _, key = name.rpartition(".")
+    if owner.startswith("station."):
+        return np.inf
+    first = next(iter(model.points))
+    if owner.startswith("point.") or (owner == "tool" and key.startswith("length") and first in targets):
+        return POINT_STD
+    return TOLERANCE[unit_of(name)]
+
+
+def _random_poses(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> PoseSet:
+    reach = np.where([joint.kind == "prismatic" for joint in model.joints], 1.0, np.pi)
+    lower, upper = (np.clip(limit, -reach, reach) for limit in joint_limits(model))
+    pairs = [(target, station) for target in targets for station in stations]
+    size = _POSES * len(pairs)
+    return PoseSet(
+        q=np.random.default_rng(0).uniform(lower, upper, (size, model.n)),
+        position=np.zeros((size, 3)),
+        sigma=np.ones((size, 3)),
+        torque=None,
+        payload=None,
+        target=np.repeat([target for target, _ in pairs], _POSES),
+        station=np.repeat([station for _, station in pairs], _POSES),
+        temperature=None,
+        pose=np.arange(size),
+    )
+
+
+def _propagated(
+    model: RobotModel, names: list[str], free: np.ndarray, weight: np.ndarray
+) -> tuple[Posterior, Posterior]:
+    """The posterior about `model`, whose free directions, spanned by `free` (p, k), follow the others to where they are most probable; and
+    the part of it that these directions alone make."""
+    old = model.posterior
+    added = [name for name in names if name not in old.parameters]
+    every = [*old.parameters.names, *added]
+    covariance = np.zeros((len(every), len(every)))
+    covariance[: len(old.parameters), : len(old.parameters)] = old.covariance
+    rows = [every.index(name) for name in names]
+    precision = (weight[:, None] * free).T @ (weight[:, None] * free)
+    across = np.eye(len(every))
+    across[np.ix_(rows, rows)] -= free @ np.linalg.lstsq(precision, free.T * weight**2, rcond=None)[0]
+    covariance = across @ covariance @ across.T
+    unseen = np.zeros_like(covariance)
+    unseen[np.ix_(rows, rows)] = free @ np.linalg.pinv(precision, hermitian=True) @ free.T
+    moved = {name: model.value(name) for name in names}
+    kept = Parameters(
+        replace(item, value=moved[item.name], prior_mean=None) if item.name in moved else item
+        for item in old.parameters
+    )
+    more = Parameters(Parameter(name, unit_of(name), moved[name]) for name in added)
+    return Posterior(kept + more, covariance + unseen), Posterior(kept + more, unseen)

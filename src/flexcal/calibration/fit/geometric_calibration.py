@@ -1,0 +1,178 @@
+"""Stage 2: the geometry from measured points, with the elastic deflection taken into account (P1 §3 and §5)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.error_model import ErrorStatistics, LinearFit, Scatter
+from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
+from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
+from flexcal.calibration.fit.least_squares_problem import LossName
+from flexcal.calibration.fit.practical_identifiability import Undetermined
+from flexcal.calibration.measurement import ambiguous_poses, require_points
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate, Identifiability, Loss, Squares, loss_named
+from flexcal.model.robot import RobotModel
+from flexcal.units import MILLIMETRE
+
+_PASSES = 8
+_SETTLED = 2e-3
+"""Relative change of every standard deviation of the errors at which the components count as found."""
+
+
+@dataclass(frozen=True, eq=False)
+class Calibration:
+    """A fitted geometry.
+
+    `model` is the calibrated robot; `estimate` holds all geometric parameters (dropped and undetermined ones at their start, not
+    identifiable), stiffness and inertia as `prior` and points together have them, and the `scatter`; `identifiability` is that of
+    the kinematic Jacobian, `undetermined` what has full rank and is hidden by noise or the choice of poses; `residuals` (N, 3) m,
+    measured minus predicted; `linear` the fit linearised at its solution, without outliers; `flank` (N, n); `ambiguous` (N,) poses
+    whose flank is not certain; `terms` those fitted.
+    """
+
+    model: RobotModel
+    estimate: Estimate
+    prior: ElasticPrior
+    identifiability: Identifiability
+    undetermined: tuple[Undetermined, ...]
+    scatter: Scatter
+    poses: PoseSet
+    residuals: np.ndarray
+    linear: LinearFit
+    flank: np.ndarray
+    ambiguous: np.ndarray
+    terms: tuple[str, ...]
+
+    @property
+    def errors(self) -> ErrorStatistics:
+        """How far the calibrated robot is from the points it was fitted to."""
+        return ErrorStatistics.of(self.residuals)
+
+    @property
+    def variances(self) -> dict[str, float | None]:
+        """The uncertainty budget of a measured point, 1σ of a coordinate in mm, as results.json has it.
+
+        `instrument_mm` is null where no sigma is stated: the robot's part then holds it. `robot_mm` has the repeatability of the
+        joints at the measured points in it. `stated_mm` is the sigma of the files, root mean square.
+        """
+        scatter, sigma = self.scatter, float(np.sqrt(np.mean(self.linear.sigma**2)))
+        stated = self.poses.sigma_given
+        return {
+            "instrument_mm": scatter.share * sigma / MILLIMETRE if stated else None,
+            "robot_mm": scatter.evenly(self.linear.turns) / MILLIMETRE,
+            "model_mm": scatter.model / MILLIMETRE,
+            "stated_mm": sigma / MILLIMETRE if stated else None,
+        }
+
+
+def calibrate(
+    model: RobotModel,
+    poses: PoseSet,
+    *,
+    terms: Sequence[str] = ("kinematic", "backlash", "transmission"),
+    elastic: bool = True,
+    elasticity: Literal["reestimated", "marginalised"] = "reestimated",
+    secant_scale: float = 0.0,
+    loss: Loss | LossName = "auto",
+    progress: Callable[[int, float], None] | None = None,
+) -> Calibration:
+    """Fit the geometry of `model` to measured points, Levenberg-Marquardt on the vector error (28) with the Jacobian (29).
+
+    Rank and dropped parameters come from the kinematic Jacobian at zero deflection. What the model's posterior holds of stiffness and
+    inertia (stage 1) is their prior, so give the model without an earlier calibration on the same poses. It enters by re-estimating those
+    parameters, or, marginalised, through the residual covariance R + J Σ Jᵀ; both give the same estimate. `secant_scale` lets each
+    drive's stiffness under gravity differ from the tangent one. Without `elastic` the arm is fitted as rigid.
+
+    The term `transmission`, transmission errors of all revolute joints as waves in the joint position, is a random effect: all waves are
+    normal with one variance, which falls with the square of their order and is estimated with those of the scatter (best linear unbiased
+    prediction). Few poses leave them near zero and uncertain. `transmission_1`… are free waves of one order.
+
+    Points are weighted by the sum of three variances, those of instrument, robot and model error, which restricted maximum
+    likelihood finds from the points; a stated sigma is that of the instrument alone. `loss` "cauchy" finds outliers; "auto" takes it
+    where squares leave some.
+
+    Raises `FlexcalError` for measured lengths and orientations, fewer rows than identifiable parameters, poses that are all equal,
+    joints that do not move, a backlash seen from one flank only, stations that robot.yaml does not know, and a robust loss with
+    marginalised elasticity.
+    """
+    robust = loss != "auto" and not isinstance(loss_named(loss), Squares)
+    if elasticity == "marginalised" and robust:
+        raise FlexcalError(
+            "a robust loss weights poses individually, but marginalised elasticity correlates them; use re-estimated elasticity instead."
+        )
+    require_points(poses)
+    _check_variety(model, poses)
+    prior = ElasticPrior.of(model, poses, secant_scale=secant_scale) if elastic else NOTHING_ELASTIC
+    fit = PointFit.of(
+        model,
+        poses,
+        tuple(terms),
+        prior,
+        elastic,
+        marginalised=elasticity == "marginalised",
+        progress=progress,
+    )
+    found = _settled(fit, "squares" if loss == "auto" else loss)
+    if loss == "auto" and elasticity == "reestimated" and found.suspects_outliers:
+        again = _settled(fit, "cauchy")
+        found = again if again.estimate.outliers else found
+    return _calibration(found)
+
+
+def _settled(fit: PointFit, loss: Loss | Literal["squares", "huber", "cauchy"]) -> FittedPoints:
+    """The fit with the scatter that its own residuals have, and with what is undetermined under that scatter held."""
+    robust = not isinstance(loss_named(loss), Squares)
+    found = fit.solved(fit.first_scatter, "squares")
+    if robust:
+        for _ in range(_PASSES):
+            before, found = found, fit.solved(found.robust_scatter(), loss, found)
+            if found.scatter.settled(before.scatter, 1e-2):
+                break
+    for _ in range(_PASSES):
+        scatter, spread = found.estimated_scatter()
+        held = found.undetermined(scatter)
+        if scatter.settled(found.scatter, _SETTLED) and held == found.held:
+            break
+        found = fit.solved(scatter, loss, found, held=held, spread=spread)
+    return found
+
+
+def _calibration(found: FittedPoints) -> Calibration:
+    fit = found.fit
+    estimate = found.whole_estimate()
+    calibrated = found.model.with_estimate(estimate)
+    return Calibration(
+        model=calibrated,
+        estimate=estimate,
+        prior=found.task.prior,
+        identifiability=fit.identifiability,
+        undetermined=found.held,
+        scatter=found.scatter,
+        poses=found.poses,
+        residuals=found.residuals,
+        linear=found.linear,
+        flank=found.flank,
+        ambiguous=ambiguous_poses(calibrated, found.at),
+        terms=fit.terms,
+    )
+
+
+def _check_variety(model: RobotModel, poses: PoseSet) -> None:
+    if len(poses.q) < 2:
+        raise FlexcalError(f"there are {len(poses.q)} poses; a calibration needs many.")
+    spread = np.ptp(poses.q, axis=0)
+    if spread.max() < 1e-6:
+        raise FlexcalError(
+            f"all {len(poses.q)} poses are the same; measure poses that differ in every joint."
+        )
+    still = [joint.name for joint, range_ in zip(model.joints, spread, strict=True) if range_ < 1e-6]
+    if still:
+        raise FlexcalError(
+            f"{', '.join(still)} never moves in the {len(poses.q)} poses; move every joint, or its errors are not identifiable."
+        )

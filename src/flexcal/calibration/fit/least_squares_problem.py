@@ -1,0 +1,71 @@
+"""The least-squares problem of stage 2: geometry from measured points, with stiffness and inertia estimated jointly."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.error_model import whitened
+from flexcal.calibration.fit.elastic_prior import ElasticPrior
+from flexcal.calibration.measurement import Prediction, predict
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import Estimate, Loss, Parameters, Problem, solve
+from flexcal.model.robot import RobotModel
+
+PlainLoss = Literal["squares", "huber", "cauchy"]
+LossName = Literal["auto", "squares", "huber", "cauchy"]
+
+
+@dataclass(frozen=True, eq=False)
+class GeometryFit:
+    """Geometric parameters `kept` of the robot `start` to be fitted to `poses` that rest on `flank` (N, n).
+
+    `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (N, 3, 3) in
+    1/m weighs the points: WᵀW is the inverse covariance of each.
+    """
+
+    start: RobotModel
+    poses: PoseSet
+    kept: Parameters
+    prior: ElasticPrior
+    flank: np.ndarray
+    elastic: bool
+    whitening: np.ndarray
+
+    def predicted(self, values: Mapping[str, float], *, jacobians: bool = False) -> Prediction:
+        """Where the robot with some named values should be seen, on the flanks of this fit."""
+        robot = self.start.with_values(values)
+        return predict(robot, self.poses, flank=self.flank, elastic=self.elastic, jacobians=jacobians)
+
+    def residual(self, at: Prediction) -> np.ndarray:
+        """Whitened measured minus predicted coordinates (3 N,), Eq. (28)."""
+        return whitened(self.whitening, self.poses.position - at.position)
+
+    def columns(self, at: Prediction, names: tuple[str, ...]) -> np.ndarray:
+        """Whitened Jacobian of all coordinates (3 N, p) by some parameters, natural units."""
+        return whitened(self.whitening, at.jacobian(names))
+
+    def reestimated(
+        self, *, loss: Loss | PlainLoss, progress: Callable[[int, float], None] | None
+    ) -> Estimate:
+        """Levenberg-Marquardt (29) on geometry, stiffness and inertia together; the latter keep their prior."""
+        parameters = self.kept + self.prior.parameters
+
+        def values(x: np.ndarray) -> dict[str, float]:
+            return dict(zip(parameters.names, parameters.natural(x), strict=True))
+
+        def linearise(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            at = self.predicted(values(x), jacobians=True)
+            return self.residual(at), -self.columns(at, parameters.names) * parameters.natural_slope(x)
+
+        def residual(x: np.ndarray) -> np.ndarray:
+            return self.residual(self.predicted(values(x)))
+
+        covariance = np.diag(parameters.prior_std() ** 2)
+        covariance[len(self.kept) :, len(self.kept) :] = self.prior.covariance
+        groups = np.repeat(np.arange(len(self.poses)), 3)
+        problem = Problem(parameters, linearise, residual, covariance, groups)
+        return solve(problem, loss=loss, progress=progress)

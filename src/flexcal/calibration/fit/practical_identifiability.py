@@ -1,0 +1,104 @@
+"""Practical identifiability: parameters that noise and the choice of poses leave undetermined in spite of full rank."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.error_model import whitened
+from flexcal.calibration.fit.terms import plausible_size
+from flexcal.calibration.measurement import Prediction
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import Parameters, analyse
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.units import MILLIMETRE
+
+_SMALL_TURN = np.deg2rad(10)
+"""Turning of the tool over all poses below which the instrument's place takes up the point's offset."""
+_SMALL_RANGE = np.deg2rad(20)
+"""Range of a joint below which its errors look like those of its neighbours."""
+_FLAT = 0.05
+"""Extent of the points across a plane, over that along it, below which they count as flat."""
+
+
+@dataclass(frozen=True)
+class Undetermined:
+    """A parameter that the data leave less certain than `size`, how far it may plausibly be off: held, and `cause` says why."""
+
+    name: str
+    size: float
+    cause: str
+
+
+def undetermined(
+    at: Prediction, kept: Parameters, whitening: np.ndarray, hidden: tuple[str, ...]
+) -> tuple[Undetermined, ...]:
+    """Parameters whose standard deviation from the data alone exceeds their plausible size.
+
+    Judged on the kinematic Jacobian `at` the nominal robot without deflection, weighed by W (N, 3, 3): what is seen only because the
+    errors themselves, once estimated, turn the tool or bend the arm is not determined. `kept` are those of full rank on these poses;
+    those that are `hidden`, which random poses would determine and these do not, are undetermined too.
+    """
+    start, poses = at.model, at.poses
+    sizes = np.array([plausible_size(start, name) for name in kept.names])
+    columns = whitened(whitening, at.jacobian(kept.names))
+    largest = np.linalg.norm(columns * sizes, axis=0).max()
+    found = analyse(columns, kept.names, scale=sizes, tolerance=1 / max(largest, 1.0))
+    lost = [item.name for item in found.dropped]
+    lost += hidden
+    partners = {item.name: item.absorbed_by for item in found.dropped}
+    return tuple(
+        Undetermined(name, plausible_size(start, name), _cause(start, poses, name, partners.get(name, ())))
+        for name in lost
+    )
+
+
+def _cause(start: RobotModel, poses: PoseSet, name: str, partners: tuple[tuple[str, float], ...]) -> str:
+    """One clause for a user: what about the poses hides a parameter."""
+    owner = name.rpartition(".")[0]
+    if owner == "tool" or owner.startswith("point."):
+        turned = _turning(start, poses, owner)
+        if turned < _SMALL_TURN:
+            return f"the tool turned by {np.rad2deg(turned):.1f}° only, so its offset is not identifiable beside the instrument"
+    for i in _neighbours(start, owner):
+        joint = start.joints[i]
+        extent = float(np.ptp(poses.q[:, i]))
+        if joint.kind == "revolute" and extent < _SMALL_RANGE:
+            return f"{joint.name} moved {np.rad2deg(extent):.1f}° only"
+    shape = _shape(poses.position)
+    if shape:
+        return shape
+    with_ = " and ".join(partner for partner, _ in partners[:2])
+    return (
+        f"it is not identifiable beside {with_} at the scatter of these points"
+        if with_
+        else "these points do not depend on it"
+    )
+
+
+def _turning(start: RobotModel, poses: PoseSet, owner: str) -> float:
+    """Largest angle (rad) between the orientations of the tool and the first one."""
+    point = owner.removeprefix("point.") if owner.startswith("point.") else None
+    turn = point_kinematics(start, poses.q, point=point, jacobians=False).orientation
+    trace = np.einsum("nij,ij->n", turn, turn[0])
+    return float(np.arccos(np.clip((trace - 1) / 2, -1, 1)).max())
+
+
+def _neighbours(start: RobotModel, owner: str) -> list[int]:
+    """Indices of the owning joint and those before and after it; for the tool the last one."""
+    if owner not in start.joint_names:
+        return [start.n - 1]
+    i = start.joint_index(owner)
+    return [k for k in (i, i - 1, i + 1) if 0 <= k < start.n]
+
+
+def _shape(position: np.ndarray) -> str:
+    centred = position - position.mean(axis=0)
+    extents = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(position))
+    if extents[1] < _FLAT * extents[0]:
+        return f"all points lie within {2 * extents[1] / MILLIMETRE:.0f} mm of a line"
+    if extents[2] < _FLAT * extents[1]:
+        return f"all points lie within {2 * extents[2] / MILLIMETRE:.0f} mm of a plane"
+    return ""

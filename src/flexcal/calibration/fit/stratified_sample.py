@@ -1,0 +1,79 @@
+"""Rows that stand for a measurement of more points than a fit with variance components can take."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.error_model import SAME_COMMAND, ErrorStatistics, distinct, occurrence
+from flexcal.calibration.measurement import predicted_positions
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+MOST = 10_000
+"""Points of a fit: their noise moves the calibrated tool by a hundredth of its size, far below every instrument's own error."""
+_COMMANDS = 400
+"""Positions of which several visits are kept."""
+_LEAST = 100
+"""Positions of every station and payload, as far as there are any and all together are no more than the others."""
+_PAYLOADS = 20
+"""Of a station; more are no payloads that are changed, but what is measured at every pose."""
+
+
+@dataclass(frozen=True, eq=False)
+class EvenSample:
+    """`rows` (M,) of `total` that were drawn evenly over positions, stations and payloads, in measuring order.
+
+    Visits to a pose are kept whole. Where positions were visited again, several visits, evenly in time, of fewer positions are kept.
+    """
+
+    rows: np.ndarray
+    total: int
+
+    @classmethod
+    def of(cls, poses: PoseSet, most: int = MOST) -> EvenSample | None:
+        """About `most` rows, always the same ones; None where there are no more than that."""
+        if len(poses) <= most:
+            return None
+        _, target = np.unique(poses.target, return_inverse=True)
+        visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
+        first = np.unique(visit, return_index=True)[1]
+        command = distinct(np.round(poses.q[first] / SAME_COMMAND))
+        _, station = np.unique(poses.station[first], return_inverse=True)
+        stratum = station
+        if poses.payload is not None:
+            own = distinct(station, poses.payload[first])
+            stratum = own if own.max() < _PAYLOADS * (station.max() + 1) else station
+        kept = _kept_visits(command, stratum, most * len(first) // len(poses))
+        return cls(np.flatnonzero(np.isin(visit, kept)), len(poses))
+
+
+def _kept_visits(command: np.ndarray, stratum: np.ndarray, budget: int) -> np.ndarray:
+    """Numbers of about `budget` visits, whose commands and strata are given (V,)."""
+    rng = np.random.default_rng(0)
+    order = np.argsort(command, kind="stable")
+    starts = np.flatnonzero(np.diff(command[order], prepend=-1))
+    counts = np.diff(np.append(starts, len(command)))
+    again = len(command) >= 2 * len(starts)
+    wanted = min(len(starts), _COMMANDS if again else budget)
+    each = max(1, budget // wanted) if again else 1
+    chosen = []
+    own = stratum[order[starts]]
+    strata = np.unique(own)
+    least = min(_LEAST, max(1, wanted // len(strata)))
+    for one in strata:
+        members = np.flatnonzero(own == one)
+        share = max(min(len(members), least), wanted * len(members) // len(starts))
+        chosen.append(rng.permutation(members)[:share])
+    kept = []
+    for k in np.concatenate(chosen):
+        places = np.unique(np.linspace(0, counts[k] - 1, min(each, int(counts[k]))).astype(int))
+        kept.append(order[starts[k] + places])
+    return np.concatenate(kept)
+
+
+def all_errors(model: RobotModel, poses: PoseSet, progress: Progress = silent) -> ErrorStatistics:
+    """Errors of a calibrated robot at any number of poses, in constant memory beside these."""
+    return ErrorStatistics.of(poses.position - predicted_positions(model, poses, progress=progress))

@@ -1,0 +1,72 @@
+"""Structural identifiability of the geometry: rank of the kinematic Jacobian, on the measured poses and on random ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.calibration.fit.terms import tolerances
+from flexcal.calibration.measurement import predict
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Identifiability, Parameters, analyse
+from flexcal.model.robot import RobotModel
+
+_RANDOM_POSES = 100
+
+
+def kinematic_identifiability(
+    model: RobotModel,
+    poses: PoseSet,
+    parameters: Parameters,
+    *,
+    scale: np.ndarray | None = None,
+    prefer: Sequence[str] = (),
+) -> Identifiability:
+    """Rank at zero deflection with both flanks as they are: exact derivatives leave a gap of many decades.
+
+    `scale` (p,) is the size of a change that matters, tolerances of manufacture by default: larger columns are kept first.
+    """
+    straight = predict(model, poses, elastic=False, jacobians=True)
+    columns = straight.jacobian(parameters.names).reshape(-1, len(parameters))
+    preferred = [name for name in parameters.names if name.endswith("backlash")]
+    if np.isfinite(parameters.prior_std()).any():
+        # a declared prior must not stand against what the points tell of a parameter without
+        preferred += [item.name for item in parameters if not np.isfinite(item.prior_std)]
+    return analyse(
+        columns,
+        parameters.names,
+        scale=tolerances(parameters) if scale is None else scale,
+        prefer=[*preferred, *prefer],
+    )
+
+
+def random_identifiability(
+    model: RobotModel,
+    poses: PoseSet,
+    parameters: Parameters,
+    seen: Identifiability,
+    *,
+    scale: np.ndarray | None = None,
+) -> Identifiability:
+    """The same on random poses of the whole joint ranges, the parameters that `seen` keeps tried first."""
+    limits = np.array([(max(j.lower, -np.pi), min(j.upper, np.pi)) for j in model.joints])
+    many = poses.subset(np.resize(np.arange(len(poses)), _RANDOM_POSES))
+    spread = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], many.q.shape)
+    return kinematic_identifiability(
+        model, replace(many, q=spread), parameters, scale=scale, prefer=seen.kept_names
+    )
+
+
+def require_enough(model: RobotModel, poses: PoseSet, parameters: Parameters, found: Identifiability) -> None:
+    """Raise `FlexcalError` where the rows are too few for the parameters that many random poses would determine."""
+    rows = 3 * len(poses)
+    if found.rank < rows:
+        return
+    rank = random_identifiability(model, poses, parameters, found).rank
+    raise FlexcalError(
+        f"{len(poses)} poses give {rows} coordinates, too few for {rank} identifiable parameters; "
+        f"measure at least {rank // 3 + 1} poses, better three times as many."
+    )

@@ -1,0 +1,170 @@
+"""Parameters of a calibration: the 47 kinematic ones and those of further terms."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.robot import GEOMETRY, LATERAL, RobotModel, unit_of
+from flexcal.model.statics import carried_mass, gravity_moments, gravity_torque
+
+LEAST_POSES = 20
+"""Different poses that a choice of terms needs, and the variance of transmission errors."""
+
+TOLERANCE = {"m": 3e-4, "rad": 5e-4, "rad/(N m)": 1e-6}
+"""Size of a change that matters (1σ of manufacture), by unit: what makes parameters of different units comparable."""
+
+
+PER_JOINT = ("gravity_compliance", "lateral_compliance")
+"""Kinds of terms that may be named for one joint, as `<joint>.<kind>`: compliance about its axis, and about the two axes normal to it."""
+
+
+_LOADED = 0.01
+"""Share of the largest spread of any gravity load that a load must spread by for its compliance to be told from a constant."""
+_LEAST_LOAD = 1e-6
+"""N m: loads of rounding."""
+
+
+def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:
+    """The geometric parameters of some terms, starting at the model's values (P1 §3).
+
+    `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
+    errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared
+    with it; `transmission` none, its waves being random effects (`random_waves`). `gravity_compliance`, `lateral_compliance`,
+    `transmission_1`…: one or two for every revolute joint on the way, compliances only where no spring is declared in their place and
+    gravity loads the axis: by moments that vary by more than 1 % of those that vary most. `<joint>.gravity_compliance` is that of one
+    joint.
+    """
+    joints = moving_joints(model, poses)
+    names: list[str] = []
+    for k, station in enumerate(dict.fromkeys(poses.station)):
+        names += [f"station.{station}.{key}" for key in ("x", "y", "z")]
+        names += [f"station.{station}.{key}" for key in ("rx", "ry", "rz")] if k else []
+    for i in joints:
+        names += [f"{model.joints[i].name}.{key}" for key in GEOMETRY]
+    names += [f"tool.{key}" for key in GEOMETRY]
+    first = next(iter(model.points))
+    names += [f"point.{t}.{key}" for t in dict.fromkeys(poses.target) if t != first for key in "xyz"]
+    items = [_parameter(model, name) for name in names if "kinematic" in terms]
+    if "backlash" in terms:
+        items += [
+            _parameter(model, f"{model.joints[i].name}.backlash", lower=0.0)
+            for i in model.backlash_joints
+            if i in joints
+        ]
+    further: dict[str, None] = {}
+    loaded = loaded_compliances(model, poses) if any(t.endswith(PER_JOINT) for t in terms) else frozenset()
+    for term in terms:
+        owner, _, kind = term.rpartition(".")
+        if kind in ("kinematic", "backlash", "transmission"):
+            continue
+        own = [model.joint_index(owner)] if owner else free_joints(model, kind, joints)
+        for i in own:
+            every = [f"{model.joints[i].name}.{key}" for key in _keys(kind)]
+            seen = [name for name in every if name in loaded or kind not in PER_JOINT]
+            further |= dict.fromkeys(every if owner and not seen else seen)
+    return Parameters([*items, *(_parameter(model, name) for name in further)])
+
+
+def random_waves(model: RobotModel, poses: PoseSet, free: Parameters) -> dict[str, float]:
+    """The waves of the term `transmission`, each with its size over that of order 1, which is 1 / order.
+
+    Those of every revolute joint on the way to a measured target that are not among the `free` parameters.
+    """
+    joints = free_joints(model, "transmission", moving_joints(model, poses))
+    every = {
+        f"{model.joints[i].name}.{key}": 1.0 / order
+        for i in joints
+        for order in model.harmonics
+        for key in _keys(f"transmission_{order}")
+    }
+    return {name: size for name, size in every.items() if name not in free}
+
+
+def free_joints(model: RobotModel, kind: str, joints: Sequence[int]) -> list[int]:
+    """Those of some revolute joints that may have a term of this kind: without a spring that robot.yaml declares in its place."""
+    springs = {e.index: e.components for e in model.elastic}
+    taken = {"gravity_compliance": 2, "lateral_compliance": 0}.get(kind)
+    return [i for i in joints if model.joints[i].kind == "revolute" and taken not in springs.get(i, ())]
+
+
+def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
+    """Names of the compliances of all joints whose gravity load varies by more than 1 % of the load that varies most."""
+    masses = carried_mass(model, poses.payload, len(poses))
+    loads = np.concatenate(
+        [gravity_torque(model, poses.q, masses)[:, :, None], gravity_moments(model, poses.q, masses)], axis=2
+    )
+    spread = loads.std(axis=0)
+    clear = max(_LOADED * float(spread.max(initial=0.0)), _LEAST_LOAD)
+    keys = ("gravity_compliance", *LATERAL)
+    return frozenset(f"{model.joints[i].name}.{keys[k]}" for i, k in np.argwhere(spread > clear))
+
+
+def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:
+    """Joints between the base and any measured target, in chain order."""
+    found: set[int] = set()
+    for target in dict.fromkeys(poses.target):
+        joint = model.point(target).joint
+        while joint >= 0:
+            found.add(joint)
+            joint = model.joints[joint].parent
+    return sorted(found)
+
+
+def _keys(kind: str) -> tuple[str, ...]:
+    if kind == "lateral_compliance":
+        return LATERAL
+    return (f"{kind}_sin", f"{kind}_cos") if kind.startswith("transmission_") else (kind,)
+
+
+def tolerances(parameters: Parameters) -> np.ndarray:
+    """Size of a change that matters in each geometric parameter (p,), natural units."""
+    return np.array([TOLERANCE[p.unit] for p in parameters])
+
+
+def _parameter(model: RobotModel, name: str, lower: float = -np.inf) -> Parameter:
+    std = declared_size(model, name) or np.inf
+    return Parameter(name, unit_of(name), model.value(name), lower=lower, prior_std=std)
+
+
+_PLAUSIBLE = {"offset": 5e-3, "misalignment_1": 2e-3, "misalignment_2": 2e-3, "backlash": 1e-3}
+_PLAUSIBLE_LENGTH, _PLAUSIBLE_POINT, _PLAUSIBLE_STATION = 1e-3, 1e-2, 1.0
+_PLAUSIBLE_COMPLIANCE, _PLAUSIBLE_TRANSMISSION = 1e-4, 1e-3
+
+
+def plausible_size(model: RobotModel, name: str) -> float:
+    """How far a geometric parameter may plausibly be from its nominal value (1σ, natural units).
+
+    What robot.yaml declares under `prior:` comes first; else joint offsets 5 mrad, misalignments 2 mrad, lengths 1 mm, the place of a
+    reflector on the tool 10 mm, the instrument 1 m or rad, and so the rotations of a joint at the base, which take up that of the first
+    station; half a backlash and a wave of a transmission error 1 mrad, compliances 0.1 mrad/(N m), the softest of small arms.
+    """
+    declared = declared_size(model, name)
+    if declared is not None:
+        return declared
+    owner, _, key = name.rpartition(".")
+    if owner.startswith("station."):
+        return _PLAUSIBLE_STATION
+    if owner.startswith("point.") or (owner == "tool" and key.startswith("length")):
+        return _PLAUSIBLE_POINT
+    if key.startswith("transmission_"):
+        return _PLAUSIBLE_TRANSMISSION
+    if key.startswith("gravity_compliance"):
+        return _PLAUSIBLE_COMPLIANCE
+    if key.startswith("length"):
+        return _PLAUSIBLE_LENGTH
+    at_base = owner in model.joint_names and model.joints[model.joint_index(owner)].parent < 0
+    return _PLAUSIBLE_STATION if at_base and key != "backlash" else _PLAUSIBLE[key]
+
+
+def declared_size(model: RobotModel, name: str) -> float | None:
+    """The standard deviation that robot.yaml's `prior:` gives a geometric parameter, by name or by kind; None where it gives none."""
+    prior, (owner, _, key) = model.prior, name.rpartition(".")
+    if name in prior.parameters:
+        return prior.parameters[name]
+    if owner not in model.joint_names or key not in GEOMETRY:
+        return None
+    return prior.length if key.startswith("length") else prior.angle

@@ -1,0 +1,5 @@
+"""Predicted measurements with derivatives, registration and propagated covariance."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,197 @@
+"""Predicted measurements at each pose, and their derivatives by all parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import PointKinematics
+from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import GEOMETRY, LATERAL, SPRINGS, STATION, RobotModel
+from flexcal.model.statics import (
+    Equilibrium,
+    carried_mass,
+    lateral_slopes,
+    tool_at_rest,
+    twist_by_hardening,
+    twist_of,
+)
+from flexcal.progress import Progress, silent
+
+
+def require_points(poses: PoseSet, where: str = "the poses") -> None:
+    """Raise `FlexcalError` for what is measured beside or in place of points and would be left out; `where` names the files."""
+    if poses.length is not None:
+        raise FlexcalError(f"{where}: lengths of a wire cannot be used yet; give points x, y, z.")
+    if poses.quaternion_wxyz is not None:
+        raise FlexcalError(
+            f"{where}: measured orientations cannot be used yet; take out the columns qw, qx, qy, qz to use the points alone."
+        )
+
+
+_BLOCK = 20_000
+"""Poses whose predictions are in memory together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """Points (N, 3) in the instrument's frame at the poses, with what their derivatives need."""
+
+    model: RobotModel
+    poses: PoseSet
+    position: np.ndarray
+    base: np.ndarray
+    rest: Equilibrium
+    kinematics: PointKinematics
+
+    def jacobian(self, names: Sequence[str]) -> np.ndarray:
+        """∂position/∂parameter (N, 3, len(names)) in natural units, the motion of the deflection included.
+
+        Raises `FlexcalError` for a name without effect on points.
+        """
+        result = np.zeros((len(self.position), 3, len(names)))
+        by_motion = self._turned(self.kinematics.motion_jacobian[:, :3].reshape(len(self.position), 3, -1))
+        by_motion = by_motion.reshape(len(self.position), 3, self.model.n, 3)
+        by_load = -np.matmul(
+            by_motion[:, :, self.rest.axes[:, 0], self.rest.axes[:, 1]], self.rest.compliance
+        )
+        by_geometry = self._turned(self.kinematics.geometry_jacobian[:, :3])
+        by_geometry[:, :, : 6 * self.model.n] += np.matmul(by_load, self.rest.coupling)
+        owners = [*self.model.joint_names, "tool"]
+        first = next(iter(self.model.points))
+        for k, name in enumerate(names):
+            owner, _, key = name.rpartition(".")
+            if owner.startswith("station.") and key in STATION:
+                result[:, :, k] = self._by_station(owner.removeprefix("station."), key)
+            elif owner.startswith("point."):
+                own = self.poses.target == owner.removeprefix("point.")
+                result[own, :, k] = by_geometry[own, :, 6 * self.model.n + 3 + "xyz".index(key)]
+            elif key in GEOMETRY:
+                result[:, :, k] = by_geometry[:, :, 6 * owners.index(owner) + GEOMETRY.index(key)]
+                if owner == "tool" and key.startswith("length"):
+                    result[self.poses.target != first, :, k] = 0.0
+            elif key in ("backlash", "gravity_compliance") or key.startswith("transmission_"):
+                i = self.model.joint_index(owner)
+                result[:, :, k] = self._twist(i, key)[:, None] * by_geometry[:, :, 6 * i]
+            elif key == "hardening":
+                i = self.model.joint_index(owner.removesuffix(".drive"))
+                result[:, :, k] = self._twist(i, key)[:, None] * by_motion[:, :, i, 2]
+            elif key in LATERAL:
+                i = self.model.joint_index(owner)
+                tilt = self._lateral[:, i, LATERAL.index(key)]
+                result[:, :, k] = np.matmul(by_motion[:, :, i, :2], tilt[:, :, None])[:, :, 0]
+            else:
+                result[:, :, k] = np.matmul(by_load, self.load(name)[:, :, None])[:, :, 0]
+        return result
+
+    def _twist(self, joint: int, key: str) -> np.ndarray:
+        """How far a joint turns (N,) with its backlash, gravity compliance, hardening or one wave of its transmission error."""
+        if key == "hardening":
+            hardening = self.model.hardening[joint]
+            twist = twist_of(-self.rest.torque[:, joint], self.model.stiffness[joint, 2], hardening)
+            return twist_by_hardening(twist, hardening)
+        if key == "backlash":
+            return -self.rest.flank[:, joint]
+        if key == "gravity_compliance":
+            return -self.rest.torque[:, joint]
+        order, wave = key.split("_")[1:]
+        phase = int(order) * self.poses.q[:, joint]
+        return np.sin(phase) if wave == "sin" else np.cos(phase)
+
+    @cached_property
+    def _lateral(self) -> np.ndarray:
+        """Tilt about the bearing's x and y (N, n, axis, 2) of every joint by its lateral compliances, rad per rad/(N m)."""
+        masses = carried_mass(self.model, self.poses.payload, len(self.poses))
+        return lateral_slopes(self.model, self.poses.q, masses)
+
+    def _turned(self, columns: np.ndarray) -> np.ndarray:
+        return np.matmul(self.base, columns)
+
+    def _by_station(self, station: str, key: str) -> np.ndarray:
+        own = (self.poses.station == station)[:, None]
+        if key in ("x", "y", "z"):
+            return own * np.eye(3)["xyz".index(key)]
+        values = [self.model.value(f"station.{station}.{k}") for k in STATION]
+        arm = self.position - np.array(values[:3])
+        return own * np.cross(left_jacobian(np.array(values[3:]))[:, "xyz".index(key[1])], arm)
+
+    def load(self, name: str) -> np.ndarray:
+        """Change of the load on each elastic coordinate (N, d) with a stiffness, mass or centre of mass."""
+        owner, _, key = name.rpartition(".")
+        if key == "stiffness":
+            joint_name, _, spring = owner.rpartition(".")
+            axis = (self.model.joint_index(joint_name), SPRINGS.index(spring))
+            load = np.zeros(self.rest.compliance.shape[:2])
+            stretch = self.rest.deflection[:, axis[0], axis[1]]
+            if axis[1] == 2:
+                stretch = -self.rest.torque[:, axis[0]] / self.model.stiffness[axis]
+            load[:, [tuple(a) for a in self.rest.axes].index(axis)] = stretch
+            return load
+        if key == "mass" or key.startswith("com_"):
+            if owner == "payload":
+                held = self.model.payload
+                assert held is not None
+                block = self.rest.regressor[:, :, 4 * held.joint : 4 * held.joint + 4]
+                masses = carried_mass(self.model, self.poses.payload, len(self.poses))[:, None]
+                if key == "mass":
+                    share = masses / held.mass if held.mass > 0 else 1.0
+                    return share * (block[:, :, 0] + block[:, :, 1:] @ held.com_in_link)
+                return masses * (block[:, :, 1:] @ held.rotation[:, "xyz".index(key[-1])])
+            i = [joint.link for joint in self.model.joints].index(owner)
+            block = self.rest.regressor[:, :, 4 * i : 4 * i + 4]
+            if key == "mass":
+                return block[:, :, 0] + block[:, :, 1:] @ self.model.com[i]
+            return self.model.mass[i] * block[:, :, 1 + "xyz".index(key[-1])]
+        raise FlexcalError(f"the position of a point does not depend on '{name}'.")
+
+
+def left_jacobian(vector: np.ndarray) -> np.ndarray:
+    """How a rotation turns (3, 3), in fixed axes, as its rotation vector (3,) changes."""
+    angle = float(np.linalg.norm(vector))
+    skew = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])
+    if angle < 1e-8:
+        return np.eye(3) + skew / 2
+    return (
+        np.eye(3) + (1 - np.cos(angle)) / angle**2 * skew + (angle - np.sin(angle)) / angle**3 * skew @ skew
+    )
+
+
+def predict(
+    model: RobotModel,
+    poses: PoseSet,
+    *,
+    flank: np.ndarray | None = None,
+    elastic: bool = True,
+    jacobians: bool = False,
+) -> Prediction:
+    """Predicted positions of the target of every pose in the instrument's frame, for the deflected, calibrated robot.
+
+    `flank` (N, n) fixes the side of the backlash; without, the drive torque at rest decides. Without `elastic` the arm is rigid.
+    Raises `FlexcalError` for unknown targets and stations, and payloads without a declaration.
+    """
+    tool = tool_at_rest(
+        model, poses.q, poses.payload, poses.target, flank=flank, elastic=elastic, jacobians=jacobians
+    )
+    at, base = np.empty((len(poses), 3)), np.empty((len(poses), 3, 3))
+    for name in poses.stations:
+        own, place = poses.station == name, model.station[model.station_index(name)]
+        at[own], base[own] = place[:3], vector_rotation(place[3:])
+    position = np.matmul(base, tool.kinematics.position[:, :, None])[:, :, 0] + at
+    return Prediction(model, poses, position, base, tool.rest, tool.kinematics)
+
+
+def predicted_positions(
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True, progress: Progress = silent
+) -> np.ndarray:
+    """The positions (N, 3) of `predict`, m, for any number of poses: block by block."""
+    parts = [np.zeros((0, 3))]
+    for first in range(0, len(poses), _BLOCK):
+        progress("all points", first / len(poses))
+        parts.append(predict(model, poses.subset(slice(first, first + _BLOCK)), elastic=elastic).position)
+    progress("all points", 1.0)
+    return np.concatenate(parts)

@@ -1,0 +1,230 @@
+"""Propagation of the parameter covariance to points at many poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.measurement.prediction import left_jacobian
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import point_kinematics
+from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import GEOMETRY, INERTIALS, LATERAL, SPRINGS, STATION, RobotModel
+from flexcal.model.statics import (
+    carried_mass,
+    elastic_axes,
+    gravity_torque,
+    lateral_slopes,
+    spring_loads,
+    tangent_ratio,
+    twist_by_hardening,
+    twist_of,
+)
+
+_GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance", *LATERAL)
+
+
+def moving_parameters(model: RobotModel, *, elastic: bool = True) -> list[str]:
+    """The names in the robot's posterior that move a point at rest; without `elastic` those that move one of the rigid arm."""
+    names = model.posterior.parameters.names
+    return [n for n in names if _is_geometric(n) or (elastic and _is_elastic(n))]
+
+
+def covariance_root(model: RobotModel, names: list[str]) -> np.ndarray:
+    """R (p, p) with R Rᵀ the covariance of the named parameters in natural units."""
+    values, vectors = np.linalg.eigh(model.posterior.marginal(names))
+    parameters = model.posterior.parameters.subset(names)
+    slopes = parameters.natural_slope(parameters.coordinates())
+    return slopes[:, None] * vectors * np.sqrt(np.maximum(values, 0.0))
+
+
+@dataclass(frozen=True, eq=False)
+class Propagation:
+    """A root of the parameters' covariance, sorted by how its rows reach the point `target` under `payload` kg.
+
+    `rows` (6 n + 6 + d + 4 n + T + 6, p): by geometric errors of joints and tool, by the stiffness of each of the d elastic coordinates, by
+    mass and first moment of each link, by the T `twisting` parameters (joint and kind, those that tilt its axis included), by the place
+    of the `station`; natural units.
+    """
+
+    model: RobotModel
+    target: str
+    payload: float
+    station: str
+    twisting: tuple[tuple[int, str], ...]
+    rows: np.ndarray
+
+    def roots(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points (N, 3) m at `q` (N, n), and roots A (N, 3, k) m: A Aᵀ is the covariance of the point's error.
+
+        Columns are those of the parameters, then those of the scatter, where there is any: repeatability at every joint, repeatability and
+        model error of the coordinates. Both in the base frame, as an instrument at the station finds them, without its own noise.
+        Derivatives are those of the undeflected arm: they differ by its deflection angles, some 1e-3 of them.
+        """
+        model, axes = self.model, np.array(elastic_axes(self.model), dtype=int).reshape(-1, 2)
+        loads, regressor, coupling = spring_loads(model, q, self.payload)
+        at = point_kinematics(model, q, point=self.target)
+        stiffness = model.stiffness[axes[:, 0], axes[:, 1]]
+        by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
+        if model.hardening.any():
+            hardening = np.where(axes[:, 1] == 2, model.hardening[axes[:, 0]], 0.0)
+            by_load /= tangent_ratio(twist_of(loads, stiffness, hardening), hardening)[:, None]
+        by_geometry = at.geometry_jacobian[:, :3]
+        by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
+        twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, loads)[:, None]
+        self._tilt(q, at.motion_jacobian[:, :3, :, :2], twists)
+        columns = (
+            by_geometry,
+            by_load * (-loads / stiffness)[:, None],
+            np.matmul(by_load, regressor),
+            twists,
+            self._by_station(at.position),
+        )
+        stacked = np.concatenate(columns, axis=2)
+        roots = stacked.reshape(-1, stacked.shape[2]) @ self.rows
+        return at.position, np.concatenate(
+            [roots.reshape(len(q), 3, -1), *self._scatter(by_geometry)], axis=2
+        )
+
+    def _scatter(self, by_geometry: np.ndarray) -> list[np.ndarray]:
+        """Columns (N, 3, k) m of what is no parameter's: repeatability and model error."""
+        model, columns = self.model, []
+        angular = model.value("scatter.angular")
+        if angular > 0:
+            revolute = [6 * i for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+            columns.append(angular * by_geometry[:, :, revolute])
+        size = np.hypot(model.value("scatter.robot"), model.value("scatter.model"))
+        if size > 0:
+            columns.append(np.broadcast_to(size * np.eye(3), (len(by_geometry), 3, 3)))
+        return columns
+
+    def _twist(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """How far joints turn (N, T) with the twisting parameters, springs being loaded by `loads` (N, d)."""
+        columns = np.empty((len(q), len(self.twisting)))
+        torque = self._torque(q, loads)
+        for k, (joint, kind) in enumerate(self.twisting):
+            if kind == "backlash":
+                columns[:, k] = -np.sign(torque[:, joint])
+            elif kind == "gravity_compliance":
+                columns[:, k] = -torque[:, joint]
+            elif kind == "hardening":
+                hardening = self.model.hardening[joint]
+                twist = twist_of(-torque[:, joint], self.model.stiffness[joint, 2], hardening)
+                columns[:, k] = twist_by_hardening(twist, hardening)
+            elif kind in LATERAL:
+                columns[:, k] = 0.0
+            else:
+                order, wave = kind.split("_")[1:]
+                columns[:, k] = (np.sin if wave == "sin" else np.cos)(int(order) * q[:, joint])
+        return columns
+
+    def _tilt(self, q: np.ndarray, by_tilt: np.ndarray, twists: np.ndarray) -> None:
+        """Write the columns of lateral compliances into `twists` (N, 3, T), `by_tilt` (N, 3, n, 2) being those of the tilts."""
+        tilting = [
+            (k, joint, LATERAL.index(kind))
+            for k, (joint, kind) in enumerate(self.twisting)
+            if kind in LATERAL
+        ]
+        if tilting:
+            slopes = lateral_slopes(self.model, q, self.payload)
+            for k, joint, axis in tilting:
+                twists[:, :, k] = np.matmul(by_tilt[:, :, joint], slopes[:, joint, axis, :, None])[:, :, 0]
+
+    def _torque(self, q: np.ndarray, loads: np.ndarray) -> np.ndarray:
+        """Gravity torque (N, n) on the joints that twist by it; that on drives with springs is among the `loads`."""
+        loaded = {
+            joint for joint, kind in self.twisting if kind in ("backlash", "gravity_compliance", "hardening")
+        }
+        springs = {
+            joint: k for k, (joint, component) in enumerate(elastic_axes(self.model)) if component == 2
+        }
+        if not loaded <= springs.keys():
+            return gravity_torque(self.model, q, self.payload)
+        torque = np.zeros(q.shape)
+        for joint in loaded:
+            torque[:, joint] = loads[:, springs[joint]]
+        return torque
+
+    def _by_station(self, position: np.ndarray) -> np.ndarray:
+        """∂(point seen from the station, turned into the base frame)/∂(x, y, z, rx, ry, rz of the station), (N, 3, 6)."""
+        place = self.model.station[self.model.station_index(self.station)]
+        turn = vector_rotation(place[3:])
+        axes = turn.T @ left_jacobian(place[3:])
+        result = np.empty((len(position), 3, 6))
+        result[:, :, :3] = turn.T
+        result[:, :, 3:] = np.cross(axes.T[None], position[:, None]).swapaxes(1, 2)
+        return result
+
+
+def propagation(
+    model: RobotModel, *, target: str | None = None, station: str | None = None, payload: float | None = None
+) -> Propagation:
+    """How the posterior of `model` reaches a target (default: the first), seen from a station (default: the first), under a payload.
+
+    `payload` in kg as `carried_mass` takes it, None for the declared one. Raises `FlexcalError` for unknown names, a payload without a
+    declaration, and a robot of which nothing was estimated that moves a point.
+    """
+    name = model.point(target).name
+    names = [n for n in moving_parameters(model) if model.posterior.determines(n)]
+    if not names:
+        raise FlexcalError(f"no estimated parameter of {model.name} that moves a point; calibrate it first.")
+    mass = float(carried_mass(model, None if payload is None else np.array([payload]), 1)[0])
+    place = model.stations[0] if station is None else station
+    root = covariance_root(model, names)
+    n, axes = model.n, elastic_axes(model)
+    owners = [*model.joint_names, "tool"]
+    links = [joint.link for joint in model.joints]
+    twisting = [_twisting(model, item) for item in names]
+    twists = [item for item in twisting if item is not None]
+    first_twist = 6 * n + 6 + len(axes) + 4 * n
+    rows = np.zeros((first_twist + len(twists) + 6, len(names)))
+    for item, row in zip(names, root, strict=True):
+        owner, _, key = item.rpartition(".")
+        body = 6 * n + 6 + len(axes)
+        if owner == f"station.{place}":
+            rows[first_twist + len(twists) + STATION.index(key)] += row
+        elif owner == f"point.{name}":
+            rows[6 * n + 3 + "xyz".index(key)] += row
+        elif owner in owners and key in GEOMETRY:
+            if owner != "tool" or not key.startswith("length") or name == next(iter(model.points)):
+                rows[6 * owners.index(owner) + GEOMETRY.index(key)] += row
+        elif (twist := _twisting(model, item)) is not None:
+            rows[first_twist + twists.index(twist)] += row
+        elif key == "stiffness":
+            joint, _, spring = owner.rpartition(".")
+            rows[6 * n + 6 + axes.index((model.joint_index(joint), SPRINGS.index(spring)))] += row
+        elif owner == "payload":
+            held = model.payload
+            assert held is not None
+            own = body + 4 * held.joint
+            share = mass / held.mass if held.mass > 0 else 1.0
+            moments = share * np.array([1.0, *held.com_in_link]) if key == "mass" else np.zeros(4)
+            if key != "mass":
+                moments[1:] = mass * held.rotation[:, "xyz".index(key[-1])]
+            rows[own : own + 4] += np.outer(moments, row)
+        elif owner in links:
+            i = links.index(owner)
+            moments = np.array([1.0, *model.com[i]]) if key == "mass" else np.zeros(4)
+            if key != "mass":
+                moments[1 + "xyz".index(key[-1])] = model.mass[i]
+            rows[body + 4 * i : body + 4 * i + 4] += np.outer(moments, row)
+    return Propagation(model, name, mass, place, tuple(twists), rows)
+
+
+def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
+    owner, _, key = name.rpartition(".")
+    if key in ("backlash", "gravity_compliance", *LATERAL) or key.startswith("transmission_"):
+        return model.joint_index(owner), key
+    if key == "hardening":
+        return model.joint_index(owner.removesuffix(".drive")), key
+    return None
+
+
+def _is_elastic(name: str) -> bool:
+    return name.rpartition(".")[2] in ("stiffness", "hardening", *INERTIALS)
+
+
+def _is_geometric(name: str) -> bool:
+    key = name.rpartition(".")[2]
+    return key in _GEOMETRIC or key.startswith("transmission_")

@@ -1,0 +1,55 @@
+"""Registration of the instrument's frame with the robot's base before parameters are fitted."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model.parts import rotation_vector
+from flexcal.model.robot import RobotModel
+
+ALREADY_ALIGNED = 0.010
+"""Instrument and base frame are the same where nominal and measured points differ by less than this (m, median)."""
+
+
+def register(model: RobotModel, poses: PoseSet, predicted: np.ndarray) -> RobotModel:
+    """Register every station of `poses` by the rigid motion that best maps `predicted` (N, 3) to the measured points (Kabsch).
+
+    A station whose points already agree to a centimetre is left at the base frame. The rotation of the first station stays where it
+    is put here, for the first joint's errors span it; the rest is refined by the fit. Raises `FlexcalError` for a station that
+    robot.yaml does not know, or with fewer than three poses that do not lie on a line.
+    """
+    values: dict[str, float] = {}
+    for station in poses.stations:
+        model.station_index(station)
+        own = poses.station == station
+        measured, expected = poses.position[own], predicted[own]
+        if np.median(np.linalg.norm(measured - expected, axis=1)) < ALREADY_ALIGNED:
+            rotation, offset = np.eye(3), np.zeros(3)
+        else:
+            rotation, offset = rigid_motion(expected, measured, station)
+        turn = rotation_vector(rotation)
+        values |= {
+            f"station.{station}.{key}": float(v) for key, v in zip(("x", "y", "z"), offset, strict=True)
+        }
+        values |= {f"station.{station}.r{key}": float(v) for key, v in zip("xyz", turn, strict=True)}
+    return model.with_values(values)
+
+
+def rigid_motion(source: np.ndarray, target: np.ndarray, name: str = "") -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (3, 3) and translation (3,) that map `source` (N, 3) onto `target` (N, 3) in least squares (Kabsch 1976).
+
+    Raises `FlexcalError` where the points do not span a plane.
+    """
+    if len(source) < 3:
+        raise FlexcalError(f"station '{name}' has {len(source)} poses; at least 3 are needed to register it.")
+    from_centre, to_centre = source.mean(axis=0), target.mean(axis=0)
+    left, sizes, right = np.linalg.svd((target - to_centre).T @ (source - from_centre))
+    if sizes[1] < 1e-9 * max(sizes[0], 1e-12):
+        raise FlexcalError(
+            f"the points of station '{name}' lie on a line; measure poses distributed in space."
+        )
+    sign = np.sign(np.linalg.det(left @ right))
+    rotation = left @ np.diag([1.0, 1.0, sign]) @ right
+    return rotation, to_centre - rotation @ from_centre

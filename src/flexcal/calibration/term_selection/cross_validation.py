@@ -1,0 +1,128 @@
+"""Selection of terms beyond the kinematic ones by cross-validation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.calibration.error_model import order_folds, single_poses, workspace_folds
+from flexcal.calibration.fit import LEAST_POSES, Calibration, calibrate
+from flexcal.calibration.term_selection.candidates import candidates
+from flexcal.calibration.term_selection.trials import ConsideredTerm, TermTrials, not_tried
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import RobotModel
+
+FOLDS = 8
+MANY_POSES = 10 * FOLDS
+"""Different poses from which whole folds are left out, rather than single poses."""
+
+
+@dataclass(frozen=True, eq=False)
+class TermSelection:
+    """`terms` that cross-validation supports, for a `model` that declares them, and every term that was `considered`.
+
+    `by` says what was left out: "poses" one by one, or "folds"; "nothing" where there are too few, as `remark` then says.
+    """
+
+    terms: tuple[str, ...]
+    model: RobotModel
+    considered: tuple[ConsideredTerm, ...]
+    by: str
+    remark: str
+
+    def __str__(self) -> str:
+        return "; ".join(
+            f"{row.term}: {'taken' if row.taken else 'left'}, {row.reason}"
+            for row in self.considered
+            if row.term
+        )
+
+
+@dataclass(frozen=True)
+class CrossValidation:
+    """`mean` error (m) of a fit at poses left out of it: `by` "poses" one by one, or by "folds", the larger of both kinds.
+
+    `freedom` is the number of parameters of the fit, the trace of its hat matrix.
+    """
+
+    by: str
+    mean: float
+    freedom: float
+
+
+def cross_validated(fit: Calibration) -> CrossValidation | None:
+    """The fit with all its terms, linear about itself and without its outliers; None with fewer than 20 different poses."""
+    rows = np.setdiff1d(np.arange(len(fit.poses)), list(fit.estimate.outliers))
+    inside = replace(fit, poses=fit.poses.subset(rows), residuals=fit.residuals[rows])
+    folds, distinct = _folds(inside.poses)
+    if distinct < LEAST_POSES:
+        return None
+    many = distinct >= MANY_POSES
+    trials = TermTrials(inside, fit.model, fit.terms, folds, many=many)
+    left = trials.fit(fit.terms)
+    mean = max(float(left.distances[kind].mean()) for kind in trials.deciding)
+    return CrossValidation("folds" if many else "poses", mean, left.freedom)
+
+
+def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
+    """Folds (N,) in measuring order, in the workspace, and of single poses, and how many of these there are."""
+    alone = single_poses(poses.q)
+    folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
+    return folds, len(np.unique(alone))
+
+
+def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
+    """Forward selection of compliance under gravity, backlash and transmission harmonics on top of the rigid fit.
+
+    A term is added where it lowers the mean error on poses left out by more than one standard error of the paired difference, lowers the
+    Bayesian information criterion, and does not raise the largest left-out error. Fewer than 80 different poses are left out one by one,
+    more in folds contiguous in measuring order and in the workspace, where both must agree. Fits are linear, about the fit of the base
+    terms to all poses. Compliances that are not supported for all joints are tried joint by joint, and must then lower the criterion by
+    2 log(number of such candidates) more (Chen and Chen 2008). Fewer than 20 different poses support no choice.
+
+    The random effects `transmission` are none of the terms: beside them compliance of every joint, which moves the points much alike,
+    would not be found.
+    """
+    base = ("kinematic", *(("backlash",) if model.backlash_joints else ()))
+    folds, distinct = _folds(poses)
+    if distinct < LEAST_POSES:
+        more = LEAST_POSES - distinct
+        return TermSelection(base, model, (), "nothing", _too_few(distinct, more))
+    open_terms = candidates(model, poses)
+    rigid = calibrate(model, poses, terms=base, elastic=bool(model.elastic))
+    trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
+    chosen, rows = base, [trials.start()]
+    left: dict[str, ConsideredTerm] = {}
+
+    def grow(options: list[str], extra: float) -> list[str]:
+        """Add the best of the supported options until there is none; those that remain."""
+        nonlocal chosen
+        while options:
+            tried = {o: trials.compare(chosen, o, extra) for o in options}
+            left.update(tried)
+            supported = [o for o in options if tried[o].taken]
+            if not supported:
+                break
+            best = min(supported, key=lambda o: trials.mean((*chosen, o)))
+            rows.append(left.pop(best))
+            chosen = (*chosen, best)
+            options = [o for o in options if o != best]
+        return options
+
+    remaining = grow(list(open_terms.kinds), 0.0)
+    joints = [term for kind in remaining for term in open_terms.single.get(kind, ())]
+    if joints:
+        grow(joints, 2 * np.log(len(joints)))
+        grow([kind for kind in remaining if kind not in open_terms.single], 0.0)
+    excluded = [not_tried(term, chosen, reason) for term, reason in open_terms.excluded]
+    kept = open_terms.model if "backlash" in chosen else model
+    by = "folds" if distinct >= MANY_POSES else "poses"
+    return TermSelection(chosen, kept, (*rows, *left.values(), *excluded), by, "")
+
+
+def _too_few(distinct: int, more: int) -> str:
+    return (
+        f"terms beyond kinematics were not tried: {distinct} different poses are too few for cross-validation; "
+        f"measure {more} more, so that compliance under gravity, backlash and transmission errors can be considered."
+    )

@@ -1,0 +1,168 @@
+"""Comparison of sets of terms by the errors at poses left out of their fits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.calibration.fit import Calibration, geometric_parameters
+from flexcal.calibration.measurement import Prediction, predict
+from flexcal.calibration.term_selection.leave_out_errors import LeftOut, left_out
+from flexcal.model.robot import RobotModel
+from flexcal.units import MILLIMETRE
+
+_WORSE = 1.05
+"""Factor by which the largest error at a left-out pose may rise with a term."""
+
+
+_LEAST_GAIN = 1e-12
+"""m: gains of rounding are none."""
+
+_OUT = ("left out in measuring order", "left out in the workspace", "left out one by one")
+
+
+@dataclass(frozen=True)
+class ConsideredTerm:
+    """A term that was considered; `term` is None for the base terms, with which all are compared.
+
+    `terms` are those fitted, it among them; `order`, `workspace` the mean errors (m) with folds contiguous in measuring order and in the
+    workspace, `single` with single poses left out, `largest` the largest of the errors that decide; NaN where it could not be tried.
+    `bic` is the change of the Bayesian information criterion by the term, `reason` says in a clause why it was taken or left.
+    """
+
+    term: str | None
+    terms: tuple[str, ...]
+    order: float
+    workspace: float
+    single: float
+    largest: float
+    bic: float
+    taken: bool
+    reason: str
+
+
+def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> ConsideredTerm:
+    """The row of a term that cannot be considered."""
+    nan = float("nan")
+    return ConsideredTerm(term, (*chosen, term), nan, nan, nan, nan, nan, False, reason)
+
+
+def _change(old: LeftOut, new: LeftOut, kinds: Sequence[int]) -> str:
+    return f"{old.mean(kinds) / MILLIMETRE:.4f} to {new.mean(kinds) / MILLIMETRE:.4f} mm"
+
+
+class TermTrials:
+    """Linear fits of sets of terms about the fit of the `base` terms to all poses.
+
+    `model` declares the joints with backlash; `folds` (N,) are those in measuring order, in the workspace, and single poses. With
+    `many` the first two decide, otherwise the third.
+    """
+
+    def __init__(
+        self,
+        rigid: Calibration,
+        model: RobotModel,
+        base: tuple[str, ...],
+        folds: tuple[np.ndarray, ...],
+        *,
+        many: bool,
+    ) -> None:
+        self.rigid = rigid
+        self.model = replace(rigid.model, config=model.config)
+        self.folds = folds
+        self.deciding = (0, 1) if many else (2,)
+        self._columns: dict[str, np.ndarray] = {}
+        self._fits: dict[tuple[str, ...], LeftOut] = {}
+        self._base = base
+
+    def start(self) -> ConsideredTerm:
+        """The row of the base terms."""
+        return self._row(None, self._base, 0.0, taken=True, reason="")
+
+    def compare(self, chosen: tuple[str, ...], term: str, extra: float) -> ConsideredTerm:
+        """Whether a term is taken beside those chosen; `extra` is what the criterion must fall by beyond 0."""
+        terms = (*chosen, term)
+        old, new = self.fit(chosen), self.fit(terms)
+        bic = self._criterion(old, new)
+        gains = {k: self._gain(old, new, k) for k in self.deciding}
+        poorest = min(gains, key=lambda k: gains[k][0] / gains[k][1])
+        most = [fit.largest(self.deciding) for fit in (old, new)]
+        taken = False
+        if gains[poorest][0] <= 0:
+            reason = f"the mean error at poses {_OUT[poorest]} does not fall ({_change(old, new, [poorest])})"
+        elif gains[poorest][0] <= gains[poorest][1]:
+            reason = f"the mean error at poses {_OUT[poorest]} falls by less than the standard error ({_change(old, new, [poorest])})"
+        elif bic >= -extra:
+            reason = (
+                f"the BIC rises by {bic:.0f}"
+                if bic >= 0
+                else f"the BIC falls by {-bic:.1f}, less than {extra:.1f}"
+            )
+        elif most[1] > _WORSE * most[0]:
+            reason = f"the largest error at a left-out pose would rise from {most[0] / MILLIMETRE:.4f} to {most[1] / MILLIMETRE:.4f} mm"
+        else:
+            taken = True
+            change = _change(old, new, self.deciding)
+            reason = f"lowers the mean error at left-out poses from {change} and the BIC by {-bic:.0f}"
+        return self._row(term, terms, bic, taken=taken, reason=reason)
+
+    def fit(self, terms: tuple[str, ...]) -> LeftOut:
+        """The fit of some terms, with springs and inertia where the base fit has them."""
+        if terms not in self._fits:
+            blocks = [self._block(term) for term in terms] + [self._held]
+            penalty = [0.0] * len(terms) + [self._noise]
+            self._fits[terms] = left_out(blocks, penalty, self.rigid.residuals, self.folds)
+        return self._fits[terms]
+
+    def mean(self, terms: tuple[str, ...]) -> float:
+        """Mean error at left-out poses, m, over the kinds of folds that decide."""
+        return self.fit(terms).mean(self.deciding)
+
+    def _row(
+        self, term: str | None, terms: tuple[str, ...], bic: float, *, taken: bool, reason: str
+    ) -> ConsideredTerm:
+        fit = self.fit(terms)
+        order, workspace, single = (float(d.mean()) for d in fit.distances)
+        largest = fit.largest(self.deciding)
+        return ConsideredTerm(term, terms, order, workspace, single, largest, bic, taken, reason)
+
+    def _criterion(self, old: LeftOut, new: LeftOut) -> float:
+        """Change of the Bayesian information criterion of the coordinates that the base terms leave free (Schwarz 1978)."""
+        free = max(self.rigid.residuals.size - self.fit(self._base).freedom, 1.0)
+        return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
+
+    def _gain(self, old: LeftOut, new: LeftOut, kind: int) -> tuple[float, float]:
+        """Mean gain (m) over the folds of a kind, which are the independent units, and its standard error."""
+        fold, gain = self.folds[kind], old.distances[kind] - new.distances[kind]
+        gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])
+        return float(gains.mean()), float(gains.std(ddof=1) / np.sqrt(len(gains))) + _LEAST_GAIN
+
+    @cached_property
+    def _prediction(self) -> Prediction:
+        return predict(self.model, self.rigid.poses, elastic=bool(self.model.elastic), jacobians=True)
+
+    @cached_property
+    def _noise(self) -> float:
+        freedom = max(self.rigid.residuals.size - self.rigid.identifiability.rank, 1)
+        return float((self.rigid.residuals**2).sum()) / freedom
+
+    @cached_property
+    def _held(self) -> np.ndarray:
+        """Columns (N, 3, k) of springs and inertia, in standard deviations of what is known of them beforehand."""
+        prior = self.rigid.prior
+        if not len(prior.parameters):
+            return np.zeros((len(self.rigid.poses), 3, 0))
+        found = self.rigid.estimate.parameters.subset(prior.parameters.names)
+        slope = found.natural_slope(found.coordinates())
+        return self._prediction.jacobian(found.names) * slope @ np.linalg.cholesky(prior.covariance)
+
+    def _block(self, term: str) -> np.ndarray:
+        if term not in self._columns:
+            names = geometric_parameters(self.model, self.rigid.poses, [term]).names
+            if term == "kinematic":
+                names = tuple(n for n in names if n in self.rigid.identifiability.kept_names)
+            self._columns[term] = self._prediction.jacobian(names)
+        return self._columns[term]

@@ -1,0 +1,5 @@
+"""Accuracy at poses outside the fit, before and after calibration."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

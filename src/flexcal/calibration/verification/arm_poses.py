@@ -1,0 +1,85 @@
+"""Shapes of the arm at measured poses, with the errors of its tool."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet
+from flexcal.model.kinematics import LinkSurface
+from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import STATION, RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class ArmPoses:
+    """The arm at measured points, in the robot's base frame, m.
+
+    `corners` (K, joints + 2, 3) from the base through every joint to the point, of some of the poses; `surface` (E, V, 3) vertices and
+    `triangles` (F, 3) of the links in a few of them; `pose` (N,) numbers, `tip` (N, 3) points and `errors` (N, 3) by model of all.
+    """
+
+    corners: np.ndarray
+    surface: np.ndarray
+    triangles: np.ndarray
+    pose: np.ndarray
+    tip: np.ndarray
+    errors: Mapping[str, np.ndarray]
+
+
+_EXAMPLES = 3
+"""Poses in which the links are drawn, as in the paper's figure."""
+
+
+_MOST_ARMS = 60
+
+
+_MOST_ARROWS = 1500
+
+
+def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray]) -> ArmPoses:
+    """The arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; of many arms and arrows some, evenly chosen."""
+    rows = _evenly(len(poses), _MOST_ARROWS)
+    corners = skeletons(model, poses.subset(rows))
+    turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
+    surface = LinkSurface.of(model)
+    drawn = surface.at(model, poses.q[rows[_evenly(len(rows), _EXAMPLES)]]).astype(np.float32)
+    arms = corners[_evenly(len(rows), _MOST_ARMS)]
+    return ArmPoses(arms, drawn, surface.triangles, poses.pose[rows], corners[:, -1], turned)
+
+
+def skeletons(model: RobotModel, poses: PoseSet) -> np.ndarray:
+    """Corners (N, joints + 2, 3) m of the arm from the base through every joint to the measured point, base frame, undeflected."""
+    chain: list[int] = []
+    joint = model.point(str(poses.target[0])).joint
+    while joint >= 0:
+        chain.insert(0, joint)
+        joint = model.joints[joint].parent
+    still = np.zeros((len(poses), model.n, 3))
+    q = np.ascontiguousarray(poses.q)
+    target = model.point(str(poses.target[0]))
+
+    def place(index: int, rotation: np.ndarray, translation: np.ndarray, xyz: np.ndarray) -> np.ndarray:
+        frame = np.ascontiguousarray(rotation), np.ascontiguousarray(translation)
+        geometry = np.ascontiguousarray(model.geometry)
+        return model.tree.point(index, frame[0], frame[1], xyz, geometry, np.zeros(6), q, still, False)[0]
+
+    origins = [place(k, np.eye(3), np.zeros(3), np.zeros(3)) for k in chain]
+    tip = place(target.joint, target.rotation, target.translation, target.xyz)
+    return np.stack([np.zeros_like(tip), *origins, tip], axis=1)
+
+
+def in_base(model: RobotModel, poses: PoseSet, vectors: np.ndarray) -> np.ndarray:
+    """Vectors (N, 3) of the instrument's frame turned into the robot's base frame."""
+    turned = np.empty_like(vectors)
+    for station in poses.stations:
+        angles = np.array([model.value(f"station.{station}.{key}") for key in STATION[3:]])
+        own = poses.station == station
+        turned[own] = vectors[own] @ vector_rotation(angles)
+    return turned
+
+
+def _evenly(total: int, most: int) -> np.ndarray:
+    return np.unique(np.linspace(0, total - 1, min(total, most)).astype(int))

@@ -1,0 +1,131 @@
+"""Best-fit registration: where the instrument, and the measured points on the tool, have to be for given positions of a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.error_model import distinct
+from flexcal.calibration.measurement import rigid_motion
+from flexcal.data.poses import PoseSet
+from flexcal.model.parts import rotation_vector, vector_rotation
+from flexcal.model.robot import STATION, RobotModel
+
+_LEAST_POINTS = 4
+_STEPS = 20
+_SMALL = 1e-10
+"""m and rad: a Gauss-Newton step after which there is no other."""
+_RANK = 1e-8
+_BLOCK = 20_000
+"""Points that are linearised together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """Rotation (3, 3) and position (3,) m of the robot's base in each station's frame, and by how much (3,) m each target is moved in the
+    axes of its own frame."""
+
+    stations: Mapping[str, tuple[np.ndarray, np.ndarray]]
+    shifts: Mapping[str, np.ndarray]
+
+    def values(self, model: RobotModel) -> dict[str, float]:
+        """The parameters of stations and points that put `model` there."""
+        found: dict[str, float] = {}
+        for name, (turn, offset) in self.stations.items():
+            numbers = (*offset, *rotation_vector(turn))
+            found |= {f"station.{name}.{key}": float(v) for key, v in zip(STATION, numbers, strict=True)}
+        for name, shift in self.shifts.items():
+            for axis, value in zip("xyz", shift, strict=True):
+                found[f"point.{name}.{axis}"] = model.value(f"point.{name}.{axis}") + float(value)
+        return found
+
+    def expected(self, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+        """Where the instrument should read the targets (N, 3) m, which are at `nominal` (N, 3), turned by `orientation` (N, 3, 3)."""
+        expected = np.empty(nominal.shape)
+        shift = np.zeros(nominal.shape)
+        for target, moved in self.shifts.items():
+            shift[poses.target == target] = moved
+        at = nominal + np.matmul(orientation, shift[:, :, None])[:, :, 0]
+        for name, (turn, offset) in self.stations.items():
+            own = poses.station == name
+            expected[own] = at[own] @ turn.T + offset
+        return expected
+
+
+def rigid_placement(poses: PoseSet, nominal: np.ndarray) -> Placement:
+    """Every station by the rigid motion that best maps `nominal` (N, 3) m, base frame, to the measured points (Kabsch 1976)."""
+    stations = {}
+    for name in poses.stations:
+        own = poses.station == name
+        stations[name] = rigid_motion(nominal[own], poses.position[own], name)
+    return Placement(stations, {})
+
+
+def best_placement(poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> Placement:
+    """Stations and measured points by least squares: measured = R (nominal + orientation · shift) + t, by Gauss-Newton from Kabsch's R, t.
+
+    `nominal` (N, 3) m and `orientation` (N, 3, 3) of each target's frame, in the base frame. What the poses cannot tell apart (a tool that
+    never turns: where the point is, and where the instrument) is the shortest step from where it was.
+    """
+    found = rigid_placement(poses, nominal)
+    shifts = {name: np.zeros(3) for name in poses.targets}
+    points_from = 6 * len(found.stations)
+    blocks = [slice(first, first + _BLOCK) for first in range(0, len(poses), _BLOCK)]
+    parts = [(poses.subset(rows), nominal[rows], orientation[rows]) for rows in blocks]
+    found = Placement(found.stations, shifts)
+    for _ in range(_STEPS):
+        factor = np.zeros((0, points_from + 3 * len(shifts) + 1))
+        for part in parts:
+            factor = np.asarray(np.linalg.qr(np.vstack([factor, _linearised(found, *part)]), mode="r"))
+        step = np.linalg.lstsq(factor[:, :-1], factor[:, -1], rcond=_RANK)[0]
+        stations = {}
+        for k, (name, (turn, offset)) in enumerate(found.stations.items()):
+            own = step[6 * k : 6 * k + 6]
+            stations[name] = (vector_rotation(own[:3]) @ turn, offset + own[3:])
+        moved = step[points_from:].reshape(-1, 3)
+        shifts = {name: shift + own for (name, shift), own in zip(found.shifts.items(), moved, strict=True)}
+        found = Placement(stations, shifts)
+        if np.abs(step).max() < _SMALL:
+            break
+    return found
+
+
+def _linearised(found: Placement, poses: PoseSet, nominal: np.ndarray, orientation: np.ndarray) -> np.ndarray:
+    """(3 N, k + 1): how the points move with every station's turn and offset and every target's shift, and what they miss, m."""
+    points_from = 6 * len(found.stations)
+    expected = found.expected(poses, nominal, orientation)
+    columns = np.zeros((len(poses), 3, points_from + 3 * len(found.shifts) + 1))
+    for k, (name, (turn, offset)) in enumerate(found.stations.items()):
+        own = poses.station == name
+        columns[own, :, 6 * k : 6 * k + 3] = -np.cross(
+            (expected[own] - offset)[:, :, None], np.eye(3), axis=1
+        )
+        columns[own, :, 6 * k + 3 : 6 * k + 6] = np.eye(3)
+        for j, target in enumerate(found.shifts):
+            seen = own & (poses.target == target)
+            columns[seen, :, points_from + 3 * j : points_from + 3 * j + 3] = turn @ orientation[seen]
+    columns[:, :, -1] = poses.position - expected
+    return columns.reshape(-1, columns.shape[2])
+
+
+def enough_for_points(poses: PoseSet) -> bool:
+    """Whether there are three coordinates for each parameter of `best_placement`, repeated visits apart."""
+    return _distinct(poses) >= 6 * len(poses.stations) + 3 * len(poses.targets)
+
+
+def registrable(poses: PoseSet) -> bool:
+    """Whether every station has the four points off a line that a registration with something left to say needs, repeated visits apart."""
+    for station in poses.stations:
+        own = poses.subset(poses.station == station)
+        centred = own.position - own.position.mean(axis=0)
+        if _distinct(own) < _LEAST_POINTS or np.linalg.matrix_rank(centred, tol=1e-3) < 2:
+            return False
+    return True
+
+
+def _distinct(poses: PoseSet) -> int:
+    """Number of joint positions with a target, without repeated visits."""
+    labels = [np.unique(names, return_inverse=True)[1] for names in (poses.target, poses.station)]
+    return int(distinct(np.column_stack([poses.q.round(3), *labels])).max(initial=-1)) + 1

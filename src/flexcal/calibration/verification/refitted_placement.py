@@ -1,0 +1,132 @@
+"""Verification with a refit of the instrument's placement or of the measured point: leave-one-out errors."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.measurement import predict, require_points
+from flexcal.calibration.verification.best_fit_registration import best_placement, rigid_placement
+from flexcal.calibration.verification.unseen_poses import ErrorCovariance, Verification, verify_jointly
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model.robot import RobotModel
+
+Refit = Literal["station", "point"]
+_RANK = 1e-9
+_FREE = 1e-6
+"""A pose whose own coordinates decide a refitted parameter but for this cannot be left out."""
+_STEPS = 10
+_SMALL = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Refitted:
+    """Verification with the placement of the instrument (`station`), the measured points (`point`), or both fitted to its own poses.
+
+    `result` has errors by leave-one-out: each pose against the placement that the other poses give, so that they are honest for all poses.
+    `covariance` is that of these errors; `parameters` how many were fitted; `model` is the robot with
+    the placement that all poses give.
+    """
+
+    what: tuple[Refit, ...]
+    model: RobotModel
+    parameters: int
+    result: Verification
+    covariance: ErrorCovariance
+
+
+def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitted:
+    """Verify `model` at `poses` with stations or points fitted again and everything else as calibrated.
+
+    Linear least squares leaves one pose out by its hat matrix H: e_i = (I - H_ii)⁻¹ r_i. Raises `FlexcalError` where the poses are too
+    few for that.
+    """
+    require_points(poses)
+    placed = _placed(model, poses, what)
+    at = predict(placed, poses, jacobians=True)
+    columns = at.jacobian(_names(poses, what)).reshape(3 * len(poses), -1)
+    scale = np.linalg.norm(columns, axis=0)
+    left, sizes, _ = np.linalg.svd(columns / np.where(scale > 0, scale, 1.0), full_matrices=False)
+    basis = left[:, sizes > _RANK * sizes[0]]
+    blocks = basis.reshape(len(poses), 3, -1)
+    own = np.eye(3) - blocks @ np.swapaxes(blocks, 1, 2)
+    if np.linalg.eigvalsh(own).min() < _FREE:
+        raise FlexcalError(
+            f"{len(poses)} poses are too few to refit {' and '.join(_WORDS[name] for name in what)} and to verify with: "
+            f"{basis.shape[1]} of their {3 * len(poses)} coordinates go into that; measure {2 * basis.shape[1] // 3 + 4} or more."
+        )
+
+    def left_out(values: np.ndarray) -> np.ndarray:
+        """What leaving each pose out makes of errors (3 N, k)."""
+        rest = values - basis @ (basis.T @ values)
+        return np.linalg.solve(own, rest.reshape(len(poses), 3, -1))
+
+    errors = left_out((poses.position - at.position).reshape(-1, 1))[:, :, 0]
+    standing, covariance = verify_jointly(placed, poses)
+    roots = left_out(covariance.roots.reshape(3 * len(poses), -1))
+    independent = (
+        None if covariance.independent is None else _left_out_noise(covariance.independent, blocks, own)
+    )
+    count = covariance.roots.shape[2] - covariance.shared
+    scatter = (roots[:, :, count:] ** 2).sum(axis=(1, 2))
+    if independent is not None:
+        scatter = scatter + np.trace(independent, axis1=1, axis2=2)
+    result = Verification(
+        position=poses.position - errors,
+        errors=errors,
+        parameter_rms=np.sqrt((roots[:, :, :count] ** 2).sum(axis=(1, 2))),
+        scatter_rms=np.sqrt(scatter),
+        ambiguous=standing.ambiguous,
+    )
+    found = replace(covariance, roots=roots, independent=independent, visit=None, common=None)
+    return Refitted(tuple(what), placed, basis.shape[1], result, found)
+
+
+_WORDS = {"station": "the instrument", "point": "the measured point"}
+
+
+def _names(poses: PoseSet, what: Sequence[Refit]) -> list[str]:
+    names = []
+    if "station" in what:
+        names += [f"station.{s}.{key}" for s in poses.stations for key in ("x", "y", "z", "rx", "ry", "rz")]
+    if "point" in what:
+        names += [f"point.{target}.{key}" for target in poses.targets for key in "xyz"]
+    return names
+
+
+def _placed(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RobotModel:
+    """The robot with what is refitted placed by all poses."""
+    if "station" not in what:
+        return _points_found(model, poses)
+    base = predict(replace(model, station=np.zeros_like(model.station)), poses)
+    at, turned = base.position, base.kinematics.orientation
+    found = best_placement(poses, at, turned) if "point" in what else rigid_placement(poses, at)
+    return model.with_values(found.values(model))
+
+
+def _points_found(model: RobotModel, poses: PoseSet) -> RobotModel:
+    """The robot with its points moved to where the measurements from known stations have them."""
+    names = _names(poses, ("point",))
+    found = model
+    for _ in range(_STEPS):
+        at = predict(found, poses, jacobians=True)
+        columns = at.jacobian(names).reshape(3 * len(poses), -1)
+        step = np.linalg.lstsq(columns, (poses.position - at.position).ravel(), rcond=_RANK)[0]
+        values = {name: found.value(name) + float(v) for name, v in zip(names, step, strict=True)}
+        found = found.with_values(values)
+        if np.abs(step).max() < _SMALL:
+            break
+    return found
+
+
+def _left_out_noise(independent: np.ndarray, blocks: np.ndarray, own: np.ndarray) -> np.ndarray:
+    """Covariance (N, 3, 3) m² that `independent` errors of all poses give leave-one-out errors: own⁻¹ (I - H) Σ (I - H) own⁻¹."""
+    across = blocks @ np.matmul(np.swapaxes(blocks, 1, 2), independent)
+    weighted = np.einsum("nik,nij,njl->kl", blocks, independent, blocks, optimize=True)
+    total = independent - across - np.swapaxes(across, 1, 2) + blocks @ weighted @ np.swapaxes(blocks, 1, 2)
+    inverse = np.linalg.inv(own)
+    return inverse @ total @ inverse

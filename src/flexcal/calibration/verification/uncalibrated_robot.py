@@ -1,0 +1,129 @@
+"""Errors of the uncalibrated robot: as declared, best-fit registered, and with the measured point fitted too.
+
+A reflector whose place on the tool was taken with a ruler is off by millimetres, and so is the robot that is registered with it. That is no
+error of the robot. Its own error is what is left when the instrument's frame (6 parameters a station) and the place of each measured
+point on the tool (3 a point) are fitted, and no geometric parameter of the robot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.measurement import predict, predicted_positions
+from flexcal.calibration.verification.best_fit_registration import (
+    best_placement,
+    enough_for_points,
+    registrable,
+    rigid_placement,
+)
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import RobotModel
+
+_BLOCK = 20_000
+DECLARED_WITHIN = 0.05
+"""Of the reach: with a larger median distance between nominal and measured points the instrument's frame is not the declared one."""
+
+
+@dataclass(frozen=True, eq=False)
+class RobotBefore:
+    """Uncalibrated robot as declared, best-fit registered, and with the measured points fitted too.
+
+    `declared`: the instrument measures in the base frame, or stands, axes parallel to the base's, where robot.yaml says; None where the
+    measured points are in another frame. `registered`: every station placed by the best rigid motion; None where its points are too few.
+    `own`: stations and measured points placed; None with fewer than three coordinates a parameter.
+    """
+
+    declared: RobotModel | None
+    registered: RobotModel | None
+    own: RobotModel | None
+
+    def errors(self, poses: PoseSet) -> ErrorsBefore:
+        """Errors at `poses`, whose stations and targets are those that were placed."""
+        found = (
+            None if robot is None else poses.position - predicted_positions(robot, poses, elastic=False)
+            for robot in (self.declared, self.registered, self.own)
+        )
+        return ErrorsBefore(*found)
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorsBefore:
+    """Error vectors (N, 3) m, measured minus predicted, of an uncalibrated robot placed as in `RobotBefore`; None where it is not."""
+
+    declared: np.ndarray | None
+    registered: np.ndarray | None
+    own: np.ndarray | None
+
+    @property
+    def known(self) -> Mapping[str, np.ndarray]:
+        """The errors by name, where they are known."""
+        every = {"declared": self.declared, "registered": self.registered, "own": self.own}
+        return {name: errors for name, errors in every.items() if errors is not None}
+
+    @property
+    def robots_own(self) -> np.ndarray | None:
+        """The headline: the robot's own errors, where the poses are too few for that those after registration; None where they are too."""
+        return self.registered if self.own is None else self.own
+
+    def document(self) -> dict[str, Any]:
+        """The block `before` of results.json; null where the errors are not known."""
+        every = (("declared", self.declared), ("registered", self.registered), ("own", self.own))
+        return {
+            name: None if errors is None else ErrorStatistics.of(errors).in_millimetres()
+            for name, errors in every
+        }
+
+
+def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
+    """Place the instrument, and the measured points, of the nominal, rigid robot `model` by the measured points of `poses`.
+
+    Kabsch (1976) for the registration; Gauss-Newton on the 6 parameters of every station and 3 of every measured point for the robot's own
+    error. Raises `FlexcalError` for an unknown target or station.
+    """
+    for station in poses.stations:
+        model.station_index(station)
+    at_base = replace(model, station=np.zeros_like(model.station))
+    declared = _declared(at_base, poses)
+    if not registrable(poses):
+        return RobotBefore(declared, None, None)
+    position, orientation = _tools(at_base, poses)
+    registered = at_base.with_values(rigid_placement(poses, position).values(at_base))
+    own = None
+    if enough_for_points(poses):
+        found = best_placement(poses, position, orientation)
+        own = at_base.with_values(found.values(at_base))
+    return RobotBefore(declared, registered, own)
+
+
+def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:
+    """Positions (N, 3) and orientations (N, 3, 3) of the rigid robot's targets in its base frame."""
+    blocks = [poses.subset(slice(first, first + _BLOCK)) for first in range(0, len(poses), _BLOCK)]
+    found = (predict(model, block, elastic=False) for block in blocks)
+    positions, orientations = zip(*((at.position, at.kinematics.orientation) for at in found), strict=True)
+    return np.concatenate(positions), np.concatenate(orientations)
+
+
+def _declared(model: RobotModel, poses: PoseSet) -> RobotModel | None:
+    """The robot in the instrument's frame, where that is the base frame or at the declared stations; None where it is neither."""
+    places = {
+        name: np.array(station.xyz)
+        for name, station in model.config.stations.items()
+        if station.xyz is not None
+    }
+    beside = model.with_values(
+        {
+            f"station.{name}.{axis}": -float(value)
+            for name, place in places.items()
+            for axis, value in zip("xyz", place, strict=True)
+        }
+    )
+    for candidate in (model, beside):
+        away = poses.position - predicted_positions(candidate, poses, elastic=False)
+        if np.median(np.linalg.norm(away, axis=1)) < DECLARED_WITHIN * model.reach:
+            return candidate
+    return None

@@ -1,0 +1,166 @@
+"""Accuracy of the calibrated robot at poses outside the fit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.error_model import (
+    ErrorCells,
+    ErrorStatistics,
+    Scatter,
+    block_columns,
+    joint_turns,
+    known_scatter,
+)
+from flexcal.calibration.measurement import (
+    Prediction,
+    ambiguous_poses,
+    covariance_root,
+    moving_parameters,
+    predict,
+    require_points,
+)
+from flexcal.data.poses import PoseSet
+from flexcal.model.robot import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class Verification:
+    """Predicted and measured points of a set of poses.
+
+    `position` (N, 3) as predicted, m; `errors` (N, 3) measured minus predicted. Root mean square distance errors (N,) m that are predicted:
+    `parameter_rms` from the parameters' covariance, `scatter_rms` from instrument, robot and model error. `ambiguous` (N,) poses at which
+    the flank of a backlash is not certain.
+    """
+
+    position: np.ndarray
+    errors: np.ndarray
+    parameter_rms: np.ndarray
+    scatter_rms: np.ndarray
+    ambiguous: np.ndarray
+
+    @property
+    def expected_rms(self) -> np.ndarray:
+        """Root mean square distance error (N,) m that is predicted in all."""
+        return np.hypot(self.parameter_rms, self.scatter_rms)
+
+    @property
+    def all(self) -> ErrorStatistics:
+        """Over all poses."""
+        return ErrorStatistics.of(self.errors)
+
+    @property
+    def unambiguous(self) -> ErrorStatistics:
+        """Over the poses whose flank is certain."""
+        return ErrorStatistics.of(self.errors[~self.ambiguous])
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorCovariance:
+    """Covariance of the errors at N poses: between poses i and j `roots`_i `roots`_jᵀ (N, 3, k), m; `independent` (N, 3, 3) m² beside it.
+
+    The roots are of the parameters and, the last `shared` of them, of the model error that neighbouring poses have in common; independent
+    are instrument and repeatability, None where neither was estimated nor stated. Of these the points of one `visit` (N,) to a pose
+    share the columns `common` (N, 3, c) m; None where a pose has one point.
+    `freedom` are the degrees of freedom of the predicted mean square, inf where scatter is known.
+    """
+
+    roots: np.ndarray
+    shared: int
+    independent: np.ndarray | None
+    freedom: float = np.inf
+    visit: np.ndarray | None = None
+    common: np.ndarray | None = None
+
+    def by_visits(self, rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Roots (G, 3 T, k) and what is independent of other visits (G, 3 T, 3 T) of the points of a mask `rows` (N,), visit by visit."""
+        roots = self.roots[rows]
+        size = len(roots)
+        own = np.zeros((size, 3, 3)) if self.independent is None else self.independent[rows]
+        if self.visit is None or self.common is None:
+            return roots, own
+        visits = ErrorCells(self.visit).subset(rows)
+        common = visits.gathered(self.common[rows])
+        together = common @ np.swapaxes(common, 1, 2)
+        places = together.shape[1] // 3
+        blocks, single = together.reshape(-1, places, 3, places, 3), visits.gathered(own)
+        for k in range(places):
+            blocks[:, k, :, k] = single[:, 3 * k : 3 * k + 3]
+        return visits.gathered(roots), together
+
+
+def verify(
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
+) -> Verification:
+    """Compare a calibrated robot with points; `poses` should be none of those it was fitted to.
+
+    The instrument must stand where it stood during calibration: `model` holds its place. `noise_free` points are those of the true robot,
+    without instrument and repeatability. Raises `FlexcalError` for measured lengths and orientations, and as `predict` does.
+    """
+    return verify_jointly(model, poses, elastic=elastic, noise_free=noise_free)[0]
+
+
+def verify_jointly(
+    model: RobotModel, poses: PoseSet, *, elastic: bool = True, noise_free: bool = False
+) -> tuple[Verification, ErrorCovariance]:
+    """As `verify`, with the joint covariance of the errors at all poses predicted from parameters and scatter."""
+    require_points(poses)
+    at = predict(model, poses, elastic=elastic, jacobians=True)
+    used = moving_parameters(model, elastic=elastic)
+    roots = at.jacobian(used) @ covariance_root(model, used)
+    cells = ErrorCells.of(poses)
+    shared = _shared_errors(model, cells)
+    scatter = None if noise_free else known_scatter(model, stated=poses.sigma_given)
+    independent = None if scatter is None else _independent(model, scatter, at, poses)
+    common = scatter.common(joint_turns(at)) if scatter is not None and cells.several else None
+    squares = (shared**2).sum(axis=(1, 2))
+    if independent is not None:
+        squares = squares + np.trace(independent, axis1=1, axis2=2)
+    found = Verification(
+        position=at.position,
+        errors=poses.position - at.position,
+        parameter_rms=np.sqrt((roots**2).sum(axis=(1, 2))),
+        scatter_rms=np.sqrt(squares),
+        ambiguous=ambiguous_poses(model, at),
+    )
+    freedom = np.inf if noise_free else _freedom(model, at, poses, float(np.sum(found.expected_rms**2)))
+    return found, ErrorCovariance(
+        np.concatenate([roots, shared], axis=2),
+        shared.shape[2],
+        independent,
+        freedom,
+        None if common is None else cells.pose,
+        common,
+    )
+
+
+def _freedom(model: RobotModel, at: Prediction, poses: PoseSet, predicted: float) -> float:
+    """Degrees of freedom of the `predicted` sum of squares, m², from the standard deviations of the scatter (Satterthwaite, 1946)."""
+    known, rows = model.posterior, 3 * len(at.position)
+    weights = {
+        "scatter.robot": rows,
+        "scatter.model": rows,
+        "scatter.instrument_share": float(np.sum(poses.sigma**2)) if poses.sigma_given else 0.0,
+        "scatter.angular": float(np.sum(joint_turns(at) ** 2)),
+    }
+    seen = [name for name in weights if known.determines(name)]
+    spread = [2 * model.value(n) * weights[n] * float(np.sqrt(known.marginal([n])[0, 0])) for n in seen]
+    variance = float(np.sum(np.square(spread)))
+    return 2 * predicted**2 / variance if variance > 0 else np.inf
+
+
+def _shared_errors(model: RobotModel, cells: ErrorCells) -> np.ndarray:
+    """Columns (N, 3, k) m of the model error, common to the poses of a cell of the workspace."""
+    return model.value("scatter.model") * block_columns(
+        cells.pose if cells.workspace is None else cells.workspace
+    )
+
+
+def _independent(model: RobotModel, scatter: Scatter, at: Prediction, poses: PoseSet) -> np.ndarray:
+    """Covariance (N, 3, 3) m² of instrument and repeatability."""
+    sigma = (
+        poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))
+    )
+    return scatter.independent(sigma, joint_turns(at))

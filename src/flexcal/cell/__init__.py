@@ -1,5 +1,0 @@
-"""The virtual cell: a simulated robot with hidden true parameters, its controller and its instruments."""
-
-import lazy_loader
-
-__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

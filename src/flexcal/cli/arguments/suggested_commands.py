@@ -1,0 +1,57 @@
+"""Next steps that several verbs print."""
+
+from __future__ import annotations
+
+from os.path import relpath
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flexcal.errors import InputError
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import RobotModel
+
+
+def measuring(plan: Path, robot: Path, folder: str) -> str:
+    """The command line that carries out a plan in the virtual cell, with --robot where that verb would not find the robot by itself."""
+    from flexcal.jobs.inputs import robot_file
+
+    try:
+        near = robot_file(plan, None).samefile(robot)
+    except InputError:
+        near = False
+    named = "" if near else f" --robot {robot}"
+    return f"flexcal measure {plan}{named} --cell virtual --out {folder}"
+
+
+def on_the_robot(robot: Path, poses: str) -> str:
+    """The other way to measure poses, where the robot is a real one."""
+    return f"; or measure them on the robot, and flexcal import {robot} FILE --out {poses}"
+
+
+def with_estimates(place: Path | None) -> str:
+    """The option by which another verb finds estimates that are not beside robot.yaml; empty where they are."""
+    return "" if place is None else f" --estimates {place}"
+
+
+def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
+    """What follows the robot's own dynamics: the payload by `loaded`, where one is declared and not identified, and springs or poses."""
+    springs = f"flexcal design frequency {robot} --out frequency.yaml"
+    poses = f"flexcal design poses {robot} --count 40 --out poses.yaml"
+    onward = springs if model.elastic else poses
+    if model.nominal_payload is None:
+        return onward
+    return f"{loaded}; or, where the declared payload is weighed, {onward}"
+
+
+def reading_elsewhere(robot: Path, estimates: Path) -> str:
+    """How other verbs find estimates that are not beside robot.yaml."""
+    entry = f"'estimates: {relpath(estimates, robot.parent)}'"
+    line = next((i for i, text in enumerate(_lines(robot), start=1) if text.startswith("estimates:")), None)
+    if line is None:
+        return f"for other verbs to use these estimates, add the line {entry} to {robot}"
+    return f"for other verbs to use these estimates, replace the line {line} of {robot} by {entry}"
+
+
+def _lines(file: Path) -> list[str]:
+    return file.read_text("utf-8").splitlines()

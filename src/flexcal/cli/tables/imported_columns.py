@@ -1,0 +1,52 @@
+"""Table of the columns of an imported file, with their meaning and unit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from rich.table import Table
+
+from flexcal.data.tables import standard_columns
+
+if TYPE_CHECKING:
+    from flexcal.jobs.setup import ImportedFile
+
+_ROWS = 3
+
+
+def first_rows_table(found: ImportedFile) -> Table:
+    """One row a column of flexcal: the file's column, its unit, the first values in SI, and why."""
+    what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions"}[found.kind]
+    rows = len(next(iter(found.columns.values())))
+    table = Table(title=f"{found.file}: {what}, {rows} rows; the first in SI units", title_justify="left")
+    table.add_column("")
+    table.add_column("column")
+    table.add_column("unit")
+    for number in range(min(_ROWS, rows)):
+        table.add_column(f"row {number + 1}", justify="right")
+    table.add_column("recognised by")
+    listed = set()
+    for placed in found.placed:
+        names = standard_columns(placed.quantity, found.model.n)
+        for i, name in enumerate(names):
+            listed.add(name)
+            sign = "" if placed.gains[i] == 1 else "−" if placed.gains[i] == -1 else f"{placed.gains[i]:g} · "
+            offset = f" {placed.offsets[i]:+g}" if placed.offsets[i] else ""
+            column = f"{sign}{placed.columns[i]}{offset}"
+            table.add_row(
+                name,
+                column,
+                placed.units[i] or "",
+                *_first(found, name),
+                placed.why if not i else "″",
+            )
+    given = {"pose": "rows are numbered", "sigma": "--sigma"}
+    for name in found.columns:
+        if name not in listed:
+            table.add_row(name, "", "", *_first(found, name), given.get(name, "its name"))
+    return table
+
+
+def _first(found: ImportedFile, name: str) -> list[str]:
+    values = found.columns[name][:_ROWS]
+    return [f"{value:.6g}" if values.dtype.kind == "f" else str(value) for value in values]

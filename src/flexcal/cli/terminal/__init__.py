@@ -1,0 +1,1 @@
+"""Standard streams, progress, safe text, encoding and stop signals of the terminal."""

@@ -1,0 +1,199 @@
+"""`flexcal calibrate`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybePath,
+    PoseFiles,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
+from flexcal.cli.arguments.suggested_commands import with_estimates
+from flexcal.cli.terminal.console import Console
+from flexcal.files.transaction import current, write_text
+from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.jobs.calibration import RobotCalibration
+    from flexcal.progress import Progress
+
+
+def considered_lines(rows: Sequence[Mapping[str, Any]]) -> list[str]:
+    """One line a term of `term_selection` in results.json; compliances of single joints that were left stand in one line together."""
+    lines, joints = [], []
+    for row in rows:
+        term = row["term"]
+        if term is None:
+            continue
+        if not row["taken"] and "." in term:
+            joints.append(term)
+            continue
+        lines.append(
+            f"considered {term}: {'taken, because it' if row['taken'] else 'left, because'} {row['reason']}"
+        )
+    if joints:
+        lines.append(
+            f"considered for single joints and left, because left-out poses or the BIC do not support them: {', '.join(joints)}"
+        )
+    return lines
+
+
+@dataclass(frozen=True)
+class Calibrate:
+    """Calibrate the geometry of a robot from measured positions: joint offsets, misalignments, lengths, tool, backlash.
+
+    Starts from robot.yaml and the results of 'identify stiffness', and writes estimates.yaml beside robot.yaml. Two fits are reported:
+    a rigid one, and one with elasticity and the terms selected by cross-validation; the second is stored.
+    """
+
+    robot: Robot
+    poses: PoseFiles
+    terms: Annotated[
+        tuple[str, ...], arg(metavar="TERM...", help_behavior_hint="(default: as robot.yaml declares)")
+    ] = ()
+    """auto, or some of: kinematic, backlash, gravity_compliance, lateral_compliance, transmission; JOINT.gravity_compliance is that of
+    one joint. auto: those that cross-validation supports, and transmission."""
+    loss: Literal["auto", "squares", "huber", "cauchy"] = "auto"
+    """Loss function; cauchy is robust and lists outliers; auto uses it where there are outliers."""
+    secant_scale: Annotated[float, arg(metavar="STD")] = 0.0
+    """Relative 1σ of the ratio of a drive's secant stiffness under gravity to its stiffness in the frequency response; 0.1 is usual."""
+    elasticity: Literal["reestimated", "marginalised"] = "reestimated"
+    """Treatment of the uncertainty of stiffness and inertia; both give the same geometry to first order."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for report.html, results.json, points.csv and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    write_point: bool = False
+    """Write the calibrated positions of the measured points to robot.yaml, in place of the declared ones, and calibrate with them."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Calibrate, and print identifiability, errors and remarks."""
+        from flexcal.calibration.diagnostics import hardly_fits
+        from flexcal.calibration.fit import POINT_KNOWN
+        from flexcal.cli.tables.results import before_rows, dropped_table, error_table, weak_table
+        from flexcal.cli.verbs.calibrate import considered_lines
+
+        require_robot(self.robot, *self.poses)
+        require_files(self.poses, "POSES")
+        require_at_least(0, secant_scale=self.secant_scale)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = self._calibrated(self.terms, progress)
+            known = all(point["std_m"] <= POINT_KNOWN for point in found.found_points.values())
+            write = self.write_point and known and not hardly_fits(found.selected)
+            if write:
+                told = point_lines(found.found_points)
+                found = self._with_points_written(found, progress)
+        document = found.document()
+        seen = document["identifiability"]
+        if seen["dropped"]:
+            console.show(dropped_table(seen))
+        console.show(weak_table(seen["weak_directions"]))
+        if found.selected.terms != found.rigid.terms:
+            dropped = [d["name"] for d in seen["selected"]["dropped"]]
+            further = [name for name in dropped if name not in found.rigid.identifiability.names]
+            lost = f"; not separately identifiable: {', '.join(further)}" if further else ""
+            console.say(
+                f"with all terms: {seen['selected']['rank']} of {seen['selected']['parameters']} parameters{lost}"
+            )
+        for line in considered_lines(document["term_selection"]):
+            console.say(line)
+        errors = document["calibration"]
+        terms = ("elastic, " if found.selected.model.elastic else "") + " + ".join(found.selected.terms)
+        labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
+        rows = before_rows(document) | {label: errors[key] for key, label in labels.items()}
+        console.show(error_table("distance to the measured points", rows))
+        for remark in document["remarks"]:
+            console.say(remark)
+        if write:
+            for line in told:
+                console.say(f"{line}: written to {self.robot}, and calibrated with it")
+        else:
+            known = all(point["std_m"] <= POINT_KNOWN for point in document["points"].values())
+            for line in point_lines(document["points"]):
+                console.say(f"{line}; --write-point writes it to {self.robot}" if known else line)
+        console.say(found.trust.sentence)
+        where = with_estimates(self.out)
+        console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+        following = (
+            f"correct the data or {self.robot}, and calibrate again; "
+            f"flexcal import {self.robot} {self.poses[0]} looks for the error"
+            if hardly_fits(found.selected)
+            else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
+            "(flexcal design poses --random plans some)"
+        )
+        if found.bearings is not None and found.bearings.contradicted:
+            following = f"write `bearings: {found.bearings.preferred}` in {self.robot}, and calibrate again"
+        console.finish(document, following)
+
+    def _calibrated(self, terms: Sequence[str], progress: Progress) -> RobotCalibration:
+        from flexcal.jobs.calibration import calibrate_robot
+
+        return calibrate_robot(
+            self.robot,
+            self.poses,
+            terms=terms or None,
+            loss=self.loss,
+            secant_scale=self.secant_scale,
+            elasticity=self.elasticity,
+            out=self.out,
+            command=command_line(),
+            progress=progress,
+        )
+
+    def _with_points_written(self, found: RobotCalibration, progress: Progress) -> RobotCalibration:
+        """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
+        from flexcal.jobs.setup import write_point_place
+
+        text = current(self.robot).read_text(encoding="utf-8")
+        try:
+            for name, point in found.found_points.items():
+                write_point_place(self.robot, name, point["found_xyz_m"])
+            return self._calibrated(found.selected.terms, progress)
+        except BaseException:
+            write_text(self.robot, text)
+            raise
+
+
+_FOUND_BESIDE = 5e-4
+"""m: distance of a point from its declared position above which it is reported."""
+
+
+def unknown_place(name: str, std: float) -> str:
+    """A sentence on a measured point whose position on the tool the calibration does not determine."""
+    return (
+        f"these poses do not determine the position of the point {name} on the tool (± {std / MILLIMETRE:.2g} mm): its orientation hardly "
+        "changes. The calibration is valid at such orientations only; measure poses with other tool orientations, and calibrate again"
+    )
+
+
+def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """A line for each point whose calibrated position differs from the declared one; `points` as in the document."""
+    from flexcal.calibration.fit import POINT_KNOWN
+
+    lines = []
+    for name, point in points.items():
+        off = math.dist(point["found_xyz_m"], point["declared_xyz_m"])
+        if point["std_m"] > POINT_KNOWN:
+            lines.append(unknown_place(name, point["std_m"]))
+        elif off > _FOUND_BESIDE:
+            found, declared = (
+                ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")
+            )
+            lines.append(
+                f"calibrated position of the point {name}: [{found}] m in {point['frame']}, {off / MILLIMETRE:.2f} mm from the "
+                f"declared [{declared}]"
+            )
+    return lines

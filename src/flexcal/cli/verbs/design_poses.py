@@ -1,0 +1,216 @@
+"""`flexcal design poses`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Annotated, Any, Literal, TypeVar
+
+from tyro.conf import arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybeNumber,
+    MaybePath,
+    MaybeText,
+    Paths,
+    Robot,
+    require_at_least,
+    require_robot,
+)
+from flexcal.cli.arguments.suggested_commands import measuring, on_the_robot
+from flexcal.cli.terminal.console import Console
+from flexcal.errors import InputError
+from flexcal.units import MILLIMETRE
+
+Planned = TypeVar("Planned")
+
+
+@dataclass(frozen=True)
+class DesignPoses:
+    """Choose the calibration poses with the smallest predicted tool error in the working volume, within joint limits, free of collision and
+    visible to the instrument, and order them for short moves. A page with figures is written beside the plan.
+
+    With --from, poses are chosen from a file; with --measured, the next ones after those measured; --random draws random poses of the
+    workspace instead, for a verification.
+    """
+
+    robot: Robot
+    count: Annotated[int, arg(metavar="N")] = 40
+    """Number of poses; with --wanted or --measured the maximum."""
+    out: Annotated[Path, arg(metavar="FILE")] = Path("poses.yaml")
+    """File for the plan, YAML or CSV."""
+    working: Annotated[
+        MaybeText,
+        arg(metavar="BOX|FILE", help_behavior_hint="(default: as robot.yaml declares, else anywhere)"),
+    ] = None
+    """Working volume: ranges of x, y, z in m like 0.4:0.9,-0.3:0.3,0.2:0.8, or a CSV of points x, y, z or of poses."""
+    wanted: Annotated[
+        MaybeNumber,
+        arg(
+            metavar="MM",
+            help_behavior_hint="(default: --count poses; with --measured until more poses only average noise)",
+        ),
+    ] = None
+    """Stop when the predicted tool error is at most this, mm."""
+    measured: Annotated[Paths, arg(metavar="FILE...", help_behavior_hint="(default: none)")] = ()
+    """Measured poses, to choose the next ones, best first."""
+    pool: Annotated[
+        MaybePath, arg(name="from", metavar="FILE", help_behavior_hint="(default: random poses)")
+    ] = None
+    """Candidate poses, CSV or Parquet with pose, q1, q2 and so on: poses taught on the robot, or measured before."""
+    random: bool = False
+    """Random poses, for a verification; of the other options only count, payload and seed apply."""
+    criterion: Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"] = "c"
+    """c: smallest predicted tool error; A, D, E: criteria of the parameter covariance; O1-O5: observability indices."""
+    candidates: Annotated[int, arg(metavar="N")] = 4000
+    """Number of random candidate poses, without --from; 100000 take seconds more."""
+    payload: Annotated[
+        MaybeNumber, arg(metavar="KG", help_behavior_hint="(default: as robot.yaml declares)")
+    ] = None
+    """Payload in these poses, kg."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of the random poses."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Choose the poses, and print the predicted tool error."""
+        require_robot(self.robot)
+        require_at_least(1, count=self.count, candidates=self.candidates)
+        require_at_least(0, seed=self.seed, payload=self.payload)
+        if self.wanted is not None and not self.wanted > 0:
+            raise InputError(f"--wanted is {self.wanted:g}; it must be a positive number of mm.")
+        if self.random and self.pool is not None:
+            raise InputError("--random and --from exclude each other; give one of them.")
+        if self.random and self.measured:
+            raise InputError("--random and --measured exclude each other; give one of them.")
+        console = Console(self.json)
+        if self.random:
+            self._draw(console)
+        elif self.measured:
+            self._continue(console)
+        else:
+            self._choose(console)
+
+    def _draw(self, console: Console) -> None:
+        from flexcal.jobs.experiments import plan_verification_poses
+
+        drawn = plan_verification_poses(
+            self.robot,
+            self.out,
+            self.count,
+            payload=self.payload,
+            seed=self.seed,
+            command=command_line(),
+        )
+        console.say(f"wrote {self.out}: {self.count} random poses")
+        console.finish(
+            drawn.document(),
+            f"{measuring(self.out, self.robot, 'unseen')}{on_the_robot(self.robot, 'unseen.csv')}",
+        )
+
+    def _planned(self, console: Console, plan: Callable[..., Planned]) -> Planned:
+        with console.progress() as progress:
+            return plan(
+                self.robot,
+                self.out,
+                self.count,
+                criterion=self.criterion,
+                candidates=self.candidates if self.pool is None else self.pool,
+                working=self.working,
+                wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
+                payload=self.payload,
+                seed=self.seed,
+                command=command_line(),
+                progress=progress,
+            )
+
+    def _choose(self, console: Console) -> None:
+        from flexcal.jobs.experiments import plan_calibration_poses
+
+        found = self._planned(console, plan_calibration_poses)
+        document = found.document()
+        seen = document["identifiability"]
+        console.say(
+            f"{seen['rank']} of {seen['parameters']} parameters are identifiable from position measurements"
+        )
+        console.say(
+            f"predicted tool error from tracker noise alone: {document['tool_error_mm']:.4f} mm (rms over {_where(document)}); "
+            f"lower bound for this number of poses: {document['least_possible_mm']:.4f} mm; from "
+            f"{document['enough_poses']} poses on further ones only average noise"
+        )
+        others = {name: value for name, value in document["criteria"].items() if name != "c"}
+        console.say("criteria: " + ", ".join(f"{name} {value:.4g}" for name, value in others.items()))
+        self._say_pool(console, document)
+        blocked = document["blocked_moves"]
+        ways = ", ".join(f"{a} to {b}" for a, b in blocked)
+        console.say(
+            f"the moves between them take {document['moves_s']:.1f} s or more"
+            + (f"; the straight joint motion from {ways} collides: add via points" if blocked else "")
+        )
+        console.say(f"wrote {self.out}: {document['poses']} poses")
+        console.finish(
+            document,
+            f"{measuring(self.out, self.robot, 'measured')}{on_the_robot(self.robot, 'measured.csv')}",
+        )
+
+    def _continue(self, console: Console) -> None:
+        from flexcal.jobs.experiments import plan_next_poses
+
+        found = self._planned(console, partial(plan_next_poses, measured=self.measured))
+        document = found.document()
+        errors, least = document["tool_error_mm"], document["least_possible_mm"]
+        console.say(
+            f"after {document['measured']} measured poses the predicted tool error is {errors[0]:.4f} mm from tracker noise alone "
+            f"(rms over {_where(document)}); lower bound for this number of poses: {least[0]:.4f} mm"
+        )
+        stop = document["stop_after"]
+        aim = (
+            "further poses only average noise" if self.wanted is None else f"it is at most {self.wanted:g} mm"
+        )
+        if stop == 0:
+            console.say(f"stop here: {aim}; no plan was written")
+            console.finish(document, "flexcal calibrate with the measured poses")
+            return
+        self._say_pool(console, document)
+        reached = errors[document["poses"]]
+        console.say(
+            f"after {document['poses']} more it is {reached:.4f} mm"
+            + (f": then stop, {aim}" if stop is not None else "; more poses are needed")
+        )
+        console.say(f"wrote {self.out}: the next {document['poses']} poses, best first")
+        console.finish(
+            document,
+            f"{measuring(self.out, self.robot, 'more')}{on_the_robot(self.robot, 'more.csv')}",
+        )
+
+    def _say_pool(self, console: Console, document: Mapping[str, Any]) -> None:
+        if self.pool is not None:
+            if "drawn" in document:
+                drawn = document["drawn"]
+                console.say(
+                    f"of {drawn['among']} poses {drawn['considered']}, drawn at random, were considered"
+                )
+            console.say(f"chosen from {self.pool}: {', '.join(map(str, document['chosen']))}")
+            unsure, hidden = len(document["flank_not_sure"]), len(document["not_seen"])
+            if unsure:
+                console.say(
+                    f"{unsure} poses were left out because the flank of a backlash is uncertain there"
+                )
+            if hidden:
+                console.say(f"{hidden} poses were left out because the instrument does not see them")
+        for joint, sides in document["flanks"].items():
+            console.say(
+                f"{joint}: {sides['positive']} poses on one flank of its backlash, {sides['negative']} on the other"
+            )
+
+
+def _where(document: Mapping[str, Any]) -> str:
+    working = document["working"]
+    if working is None:
+        return "the workspace"
+    share = working["reached_share"]
+    return "the working volume" + (f", {100 * share:.0f} % of it within reach" if share < 1 else "")

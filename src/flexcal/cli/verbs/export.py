@@ -1,0 +1,231 @@
+"""`flexcal export …`: a verb a format."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from tyro.conf import arg
+
+from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Robot, require_robot
+from flexcal.cli.terminal.console import Console
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from flexcal.jobs.deployment import ExportedRobot
+
+_WORTH = 0.9
+"""Of the mean error without offsets: what they leave less than is worth entering them."""
+Point = Annotated[
+    MaybeText,
+    arg(metavar="NAME", help="the point at the end of the chain", help_behavior_hint="(default: the first)"),
+]
+
+
+@dataclass(frozen=True)
+class Export(ABC):
+    """Common part of the export verbs: write the calibrated robot to a file, and report what the format cannot represent."""
+
+    robot: Robot
+    out: Annotated[Path, arg(metavar="FILE", help="the file to write")]
+    estimates: Estimates = None
+    json: Json = False
+
+    @abstractmethod
+    def write(self) -> ExportedRobot:
+        """Write the file."""
+
+    @abstractmethod
+    def following(self, document: dict[str, Any]) -> str:
+        """Next step with the file."""
+
+    def tables(self, document: dict[str, Any]) -> list[Table]:
+        """Tables of the content of the file; `document` as with --json."""
+        return []
+
+    def run(self) -> None:
+        """Export, and print the error due to terms that the format lacks."""
+        require_robot(self.robot)
+        console = Console(self.json)
+        found = self.write()
+        document = found.document()
+        for table in self.tables(document):
+            console.show(table)
+        console.say(f"wrote {found.export.path}")
+        for sentence in (*found.export.loss.sentences, *found.export.remarks):
+            console.say(sentence)
+        following = self.following(document)
+        if not found.calibrated:
+            console.say("there is no calibration: the joint placements are nominal")
+            following = f"flexcal calibrate {self.robot} POSES…, and export again"
+        console.finish(document, following)
+
+
+@dataclass(frozen=True)
+class ExportUrdf(Export):
+    """Write the calibrated robot as URDF: calibrated joint origins and tool, links with identified inertials.
+
+    A URDF cannot represent deflection, backlash and transmission error; the resulting error is printed in millimetres. Rotor inertia
+    and friction stay in estimates.yaml.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_urdf
+
+        return export_urdf(self.robot, self.out, estimates=self.estimates)
+
+    def following(self, document: dict[str, Any]) -> str:
+        return f"load {self.out} wherever the nominal URDF was loaded"
+
+
+@dataclass(frozen=True)
+class ExportMjcf(Export):
+    """Write the calibrated robot as MJCF for MuJoCo, with its springs, dampers and rotors as joints and its payload in the last link.
+
+    It deflects under gravity as the calibrated robot does. MJCF cannot represent backlash, gravity compliance and transmission error;
+    the resulting error is printed in millimetres.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_mjcf
+
+        return export_mjcf(self.robot, self.out, estimates=self.estimates)
+
+    def following(self, document: dict[str, Any]) -> str:
+        return f"load {self.out} in MuJoCo, or look at it with 'python -m mujoco.viewer --mjcf={self.out}'"
+
+
+@dataclass(frozen=True)
+class ExportSdf(Export):
+    """Write the calibrated robot as SDFormat 1.7 for Gazebo: geometry, inertials and friction, without visuals and collision bodies.
+
+    SDFormat cannot represent deflection, backlash and transmission error; the resulting error is printed in millimetres.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_sdf
+
+        return export_sdf(self.robot, self.out, estimates=self.estimates)
+
+    def following(self, document: dict[str, Any]) -> str:
+        return f"include {self.out} in a Gazebo world"
+
+
+@dataclass(frozen=True)
+class ExportKinematics(Export):
+    """Write the placements of the six joints as the `kinematics` YAML of Universal Robots' ROS description.
+
+    Its frames are those of that description, whatever those of the URDF are, for robots of that manufacturer. It cannot hold the tool,
+    which is printed.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_kinematics
+
+        return export_kinematics(self.robot, self.out, estimates=self.estimates)
+
+    def following(self, document: dict[str, Any]) -> str:
+        return f"give {self.out} to the description or driver as kinematics_params_file"
+
+
+@dataclass(frozen=True)
+class ExportJson(Export):
+    """Write the complete calibrated model as one JSON document, for programs of your own.
+
+    Joints with placements, springs, backlash and drives, points, payload, stations, and every parameter with its standard deviation.
+    """
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_json
+
+        return export_json(self.robot, self.out, estimates=self.estimates)
+
+    def following(self, document: dict[str, Any]) -> str:
+        return f"read {self.out} in your own program; docs/file-formats.md describes its content"
+
+
+@dataclass(frozen=True)
+class ExportDh(Export):
+    """Write the standard Denavit-Hartenberg table of the chain to a point as CSV, nominal beside calibrated.
+
+    A row is Rz(theta + q) Tz(d) Tx(a) Rx(alpha) Ry(beta). beta (Hayati) replaces d between nominally parallel axes, which have no unique
+    common normal.
+    """
+
+    convention: ClassVar[Literal["standard", "modified"]] = "standard"
+    point: Point = None
+    four_parameters: bool = False
+    """Never use beta, for controllers with four parameters per joint; the tilt of nominally parallel axes about y is left out."""
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_dh
+
+        return export_dh(
+            self.robot,
+            self.out,
+            self.convention,
+            point=self.point,
+            four_parameters=self.four_parameters,
+            estimates=self.estimates,
+        )
+
+    def following(self, document: dict[str, Any]) -> str:
+        if not document["safe"]:
+            return f"compare the nominal values of {self.out} with the controller's before entering anything: see above"
+        return f"where the controller has the nominal values of {self.out}, enter the calibrated ones, base and tool too"
+
+    def tables(self, document: dict[str, Any]) -> list[Table]:
+        from flexcal.cli.tables.export import dh_table, frame_table
+
+        frames = {name: document[name]["calibrated"] for name in ("base", "tool")}
+        return [dh_table(document), frame_table(frames)]
+
+
+@dataclass(frozen=True)
+class ExportMdh(ExportDh):
+    """Write the modified Denavit-Hartenberg table (Craig; Khalil, Kleinfinger) of the chain to a point as CSV, nominal beside calibrated.
+
+    A row is Rx(alpha) Tx(a) Ry(beta) Rz(theta + q) Tz(d). beta (Hayati) replaces d between nominally parallel axes, which have no unique
+    common normal.
+    """
+
+    convention: ClassVar[Literal["standard", "modified"]] = "modified"
+
+
+@dataclass(frozen=True)
+class ExportOffsets(Export):
+    """Write the joint offsets with the smallest tool error, for controllers that accept nothing else, as CSV.
+
+    They are fitted to the calibrated robot at rest over random poses, of the working volume where robot.yaml declares one, so that the
+    remaining error is smallest. Base and tool are fitted with them.
+    """
+
+    point: Point = None
+    keep_frames: bool = False
+    """Leave base and tool as they are nominally, and fit the offsets alone."""
+
+    def write(self) -> ExportedRobot:
+        from flexcal.jobs.deployment import export_offsets
+
+        return export_offsets(
+            self.robot, self.out, point=self.point, keep_frames=self.keep_frames, estimates=self.estimates
+        )
+
+    def following(self, document: dict[str, Any]) -> str:
+        frames = "" if self.keep_frames else ", and set base and tool as it says"
+        if not document["safe"]:
+            return f"find out why offsets of {self.out} are so large before adding any to the joint zeros: see above"
+        error, without = document["tool_error"], document["without_offsets"]
+        if error["mean_mm"] > _WORTH * without["mean_mm"]:
+            return f"offsets alone improve little here: flexcal export mdh {self.robot}, or flexcal compensate {self.robot} TARGETS.csv"
+        return f"add the offsets of {self.out} to the joint zeros of the controller{frames}"
+
+    def tables(self, document: dict[str, Any]) -> list[Table]:
+        from flexcal.cli.tables.export import frame_table, offset_table
+
+        if self.keep_frames:
+            return [offset_table(document)]
+        return [offset_table(document), frame_table({name: document[name] for name in ("base", "tool")})]

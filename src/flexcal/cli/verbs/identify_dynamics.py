@@ -1,0 +1,211 @@
+"""`flexcal identify dynamics`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Accept,
+    Json,
+    MaybePath,
+    Paths,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
+from flexcal.cli.arguments.suggested_commands import after_dynamics, with_estimates
+from flexcal.cli.terminal.console import Console
+from flexcal.errors import InputError
+
+if TYPE_CHECKING:
+    from flexcal.jobs.dynamics import RobotDynamics
+
+_SPRINGS = (".drive.stiffness", ".drive.damping", ".bearing_x.", ".bearing_y.")
+_ESTIMATORS = """wls: weighted least squares, every joint and log by its own noise.
+ols: ordinary least squares.
+sdp: as wls, with physically consistent inertials.
+irls: as wls, robust to outliers in single rows (Huber).
+iv: instrumental variables, without the bias of noisy velocities (simulates the robot under the `controller:` of robot.yaml).
+didim: direct and inverse dynamic identification models, from torques alone (simulates it too).
+energy, power: energy or power of all joints, one equation per row.
+tls: total least squares, with the noise of the positions.
+ml: maximum likelihood, with noise from four or more periods of one motion.
+ekf: extended Kalman filter."""
+_LEARNING = (
+    "Learn the residual torque of each motor as a function of its position, speed and torque (needs scikit-learn). "
+    "Written to learned_residual.npz beside the estimates where it reduces the cross-validation error; "
+    "the estimates are not changed."
+)
+
+
+@dataclass(frozen=True)
+class IdentifyDynamics:
+    """Identify link inertials, rotor inertias and friction (base parameters) from joint logs of exciting motion.
+
+    Writes estimates.yaml beside robot.yaml. Parameters that are not identifiable keep their CAD values and are absorbed by others:
+    the torques of the whole robot are right, but a single mass or inertia need not be. With --estimator sdp the inertials of every link
+    are physically consistent and as close to CAD as the torques allow, as springs and a URDF need.
+    """
+
+    robot: Robot
+    logs: Annotated[
+        Positional[Paths],
+        arg(metavar="LOGS...", help="joint logs (CSV or Parquet), one or several", help_behavior_hint=""),
+    ]
+    hold_out: Annotated[str, arg(metavar="last:SHARE", help_behavior_hint="(for example last:0.3)")] = ""
+    """Hold out this last fraction of every log, and predict its torques."""
+    validate: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
+    """Logs outside the fit whose torques are predicted."""
+    estimator: Annotated[
+        Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"],
+        arg(help=_ESTIMATORS),
+    ] = "wls"
+    flexible: bool = False
+    """Use separate motor and arm equations for elastic joints, and identify the drive stiffness; needs logs with the arm side (qa1…).
+    With the tilts of the bearings too (qax1…, qay1…) their stiffness is identified."""
+    learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
+    accept: Accept = ()
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Number of logs read in parallel, each in its own process."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the base parameters and the error of the torques."""
+        from flexcal.cli.tables.results import (
+            base_parameter_table,
+            friction_table,
+            learned_table,
+            quantity_table,
+        )
+        from flexcal.jobs.dynamics import identify_robot_dynamics
+        from flexcal.jobs.logs import signal_sentences
+        from flexcal.report.checks import check_external, check_fit, check_weight_shares
+
+        require_robot(self.robot, *self.logs)
+        require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
+        share = _share(self.hold_out)
+        if share and self.validate:
+            raise InputError("--hold-out and --validate exclude each other; give one of them.")
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_dynamics(
+                self.robot,
+                self.logs,
+                hold_out=share,
+                validate=self.validate,
+                estimator=self.estimator,
+                flexible=self.flexible,
+                learn_residual=self.learn_residual,
+                accept_weight="weight" in self.accept,
+                out=self.out,
+                command=command_line(),
+                jobs=self.jobs,
+                progress=progress,
+            )
+        document = found.document()
+        console.show(base_parameter_table(document["base_parameters"]))
+        if self.flexible:
+            springs = {
+                name: q for name, q in document["parameters"].items() if any(key in name for key in _SPRINGS)
+            }
+            units = {item.name: item.unit for item in found.estimate.parameters}
+            console.show(quantity_table("drives of the elastic joints", springs, units))
+        console.say(
+            f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
+            f"{document['masked_rows']} rows at standstill left out"
+        )
+        for sentence in signal_sentences(document["signals"]):
+            console.say(sentence)
+        if document["friction_tried"]:
+            console.show(friction_table(document["friction_tried"]))
+        console.say(f"friction: {', '.join(found.friction.labels)}")
+        if document["selection_remark"]:
+            console.say(document["selection_remark"])
+        error = document["error_percent"]
+        console.say(f"relative torque error: {error['train']:.2f} % in the fit")
+        if large := check_fit(error["train"]):
+            console.say(f"warning: {large.answer}")
+        if error["held_out"] is not None:
+            console.say(f"relative torque error: {error['held_out']:.2f} % on data outside the fit")
+        if learned := document["learned_residual"]:
+            console.show(learned_table(learned["motors"]))
+            console.say(_learned(learned))
+        essential = document["essential_parameters"]
+        console.say(
+            f"relative torque error with the {len(essential['parameters'])} essential parameters alone: "
+            f"{essential['error_percent']['train']:.2f} %"
+        )
+        if found.bodiless:
+            console.say(
+                f"the inertials of {', '.join(found.bodiless)} are not physically consistent: torques are right, but springs and a URDF "
+                "need consistent ones; use --estimator sdp"
+            )
+        for remark in (*document["remarks"], *document["notes"]):
+            console.say(remark)
+        if shares := document["weight_shares"]:
+            weight = check_weight_shares(shares)
+            console.say(f"{weight.question} {weight.answer}")
+        if (share := document["external_share"]) and (sensor := check_external(share)).status != "good":
+            console.say(sensor.answer)
+        console.say(found.trust.sentence)
+        console.say(f"wrote {found.estimates}")
+        if learned and learned["file"]:
+            console.say(f"wrote {learned['file']}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+        console.finish(document, self._next(found))
+
+    def _next(self, found: RobotDynamics) -> str:
+        """Payload and frequency responses for an elastic robot; else validation, the payload where one is declared, and then a URDF if the
+        inertials are physically consistent."""
+        where = with_estimates(self.out)
+        model = found.train.observation.model
+        payload = (
+            f"record logs with the payload and flexcal identify payload {self.robot} LOADED.parquet{where}"
+        )
+        if model.elastic:
+            return after_dynamics(self.robot, model, payload)
+        verb = f"flexcal identify dynamics {self.robot} {' '.join(map(str, self.logs))}"
+        if not (self.hold_out or self.validate):
+            kept = "" if self.estimator == "wls" else f" --estimator {self.estimator}"
+            return f"{verb} --validate other.parquet{kept}"
+        if found.bodiless:
+            return f"{verb} --estimator sdp" + (f" --hold-out {self.hold_out}" if self.hold_out else "")
+        urdf = f"flexcal export urdf {self.robot}{where} --out identified.urdf"
+        return urdf if model.nominal_payload is None else f"{payload}; or {urdf}"
+
+
+def _share(text: str) -> float:
+    """Fraction in `last:SHARE`, 0 for none; raises `InputError` for anything else."""
+    if not text:
+        return 0.0
+    kind, _, number = text.partition(":")
+    try:
+        share = float(number)
+    except ValueError:
+        share = -1.0
+    if kind != "last" or not 0 < share < 1:
+        raise InputError(f"--hold-out is '{text}'; write for example last:0.3, a share between 0 and 1.")
+    return share
+
+
+def _learned(learned: Mapping[str, Any]) -> str:
+    """Reduction of the relative torque error by the learned residual, in words."""
+    if not learned["file"]:
+        return "no residual model was kept: it reduced the cross-validation error of no motor"
+    kinds = {"cross_validation": "in cross-validation", "held_out": "on data outside the fit"}
+    told = (
+        f"{error['with']:.2f} % instead of {error['without']:.2f} % {where}"
+        for kind, where in kinds.items()
+        if (error := learned["error_percent"][kind]) is not None
+    )
+    return f"with the learned residual the relative torque error is {' and '.join(told)}"

@@ -1,0 +1,68 @@
+"""`flexcal identify gains`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybePath,
+    Paths,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
+from flexcal.cli.terminal.console import Console
+
+
+@dataclass(frozen=True)
+class IdentifyGains:
+    """Identify the drive gain (N m/A) of each joint, from recordings with and without the payload of robot.yaml.
+
+    A column `payload` of every log states the mass held in kg. This mass must be right; centre of mass and inertia are fitted.
+    robot.yaml is not changed: copy the printed line into its `signals: tau:`.
+    """
+
+    robot: Robot
+    logs: Annotated[
+        Positional[Paths],
+        arg(
+            metavar="LOGS...",
+            help="joint logs (CSV or Parquet), with and without payload",
+            help_behavior_hint="",
+        ),
+    ]
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Number of logs read in parallel, each in its own process."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
+    """Folder for report.html and results.json."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the gains."""
+        from flexcal.cli.tables.results import drive_gain_table
+        from flexcal.jobs.dynamics import identify_gains
+        from flexcal.jobs.logs import signal_sentences
+
+        require_robot(self.robot, *self.logs)
+        require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_gains(
+                self.robot, self.logs, out=self.out, command=command_line(), jobs=self.jobs, progress=progress
+            )
+        document = found.document()
+        console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
+        for sentence in signal_sentences(document["signals"]):
+            console.say(sentence)
+        console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
+        console.say(found.trust.sentence)
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+        console.finish(document, f"flexcal identify dynamics {self.robot} {self.logs[0]}")

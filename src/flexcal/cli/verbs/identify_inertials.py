@@ -1,0 +1,57 @@
+"""`flexcal identify inertials`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import Json, MaybePath, Robot, require_robot
+from flexcal.cli.arguments.suggested_commands import after_dynamics, reading_elsewhere
+from flexcal.cli.terminal.console import Console
+
+
+@dataclass(frozen=True)
+class IdentifyInertials:
+    """Identify masses, centres of mass, rotor inertias and friction from recordings of 'design trajectory', with CAD as the prior.
+
+    Writes estimates.yaml beside robot.yaml, which 'identify stiffness' and 'calibrate' then use. What the torques do not determine
+    keeps the uncertainty of the `prior:` of robot.yaml; springs and geometry have their uncertainty before identification.
+    """
+
+    robot: Robot
+    folder: Annotated[
+        Positional[Path], arg(metavar="DIR", help="folder with plan.yaml and one joint log per trajectory")
+    ]
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the parameters and the error of the torques."""
+        from flexcal.cli.tables.results import quantity_table
+        from flexcal.jobs.dynamics import identify_robot_inertials
+
+        require_robot(self.robot, self.folder)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_inertials(
+                self.robot, self.folder, out=self.out, command=command_line(), progress=progress
+            )
+        document = found.document()
+        units = {item.name: item.unit for item in found.estimate.parameters}
+        console.show(quantity_table("links and drives", document["parameters"], units))
+        error = document["error_percent"]
+        console.say(
+            f"relative torque error: {error['train']:.2f} % in the fit, {error['nominal']:.2f} % with the values of robot.yaml"
+        )
+        console.say(found.trust.sentence)
+        console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+            console.say(reading_elsewhere(self.robot, found.estimates))
+        loaded = f"flexcal design trajectory {self.robot} --loaded --out holding.yaml, for the payload"
+        console.finish(document, after_dynamics(self.robot, found.nominal, loaded))

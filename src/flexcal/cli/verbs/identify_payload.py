@@ -1,0 +1,115 @@
+"""`flexcal identify payload`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Accept,
+    Json,
+    MaybePath,
+    Paths,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
+from flexcal.cli.arguments.suggested_commands import reading_elsewhere, with_estimates
+from flexcal.cli.terminal.console import Console
+
+if TYPE_CHECKING:
+    from flexcal.jobs.payload import RobotPayload
+
+
+@dataclass(frozen=True)
+class IdentifyPayload:
+    """Identify mass, centre of mass and inertia of the payload from joint logs of motion with it.
+
+    The robot's own dynamics are those of its estimates ('identify dynamics' or 'identify inertials'), or of --free recordings. Friction is
+    estimated again. Writes the block `payload` of estimates.yaml beside robot.yaml, which 'compensate', 'predict', 'calibrate', 'verify'
+    and 'export' use from then on. The torques must be in N m: with currents times gains, a relative error of the gains is one of the mass.
+    """
+
+    robot: Robot
+    logs: Annotated[
+        Positional[Paths],
+        arg(
+            metavar="LOGS...",
+            help="joint logs (CSV or Parquet) with the payload, or the folder of 'measure'",
+            help_behavior_hint="",
+        ),
+    ]
+    free: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
+    """Joint logs without the payload; not those from which the estimates were identified."""
+    frame: Annotated[
+        str,
+        arg(metavar="FRAME", help_behavior_hint="(default: as robot.yaml declares it, else the last link)"),
+    ] = ""
+    """URDF frame of the values."""
+    estimates: Annotated[
+        MaybePath,
+        arg(
+            metavar="FILE",
+            help="estimates.yaml of the robot's own dynamics, or the folder of 'identify dynamics --out'; "
+            "without --out the block payload is added to it.",
+            help_behavior_hint="(default: beside robot.yaml)",
+        ),
+    ] = None
+    accept: Accept = ()
+    jobs: Annotated[int, arg(metavar="N")] = 1
+    """Number of logs read in parallel, each in its own process."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the payload."""
+        from flexcal.cli.tables.results import quantity_table
+        from flexcal.jobs.logs import signal_sentences
+        from flexcal.jobs.payload import identify_robot_payload
+
+        require_robot(self.robot, *self.logs)
+        require_files(self.logs, "LOGS")
+        require_at_least(1, jobs=self.jobs)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_payload(
+                self.robot,
+                self.logs,
+                free=self.free,
+                frame=self.frame,
+                estimates=self.estimates,
+                accept_weight="weight" in self.accept,
+                out=self.out,
+                command=command_line(),
+                jobs=self.jobs,
+                progress=progress,
+            )
+        document = found.document()
+        units = {item.name: item.unit for item in found.fit.estimate.parameters}
+        title = f"payload in the frame {found.frame}, inertia about its centre of mass"
+        console.show(quantity_table(title, document["parameters"], units))
+        console.say(f"relative torque error: {document['error_percent']['train']:.2f} %")
+        for sentence in signal_sentences(document["signals"]):
+            console.say(sentence)
+        for remark in document["remarks"]:
+            console.say(remark)
+        console.say(found.trust.sentence)
+        console.say(f"as a line of robot.yaml: {found.declaration}")
+        console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+            console.say(reading_elsewhere(self.robot, found.estimates))
+        console.finish(document, self._next(found))
+
+    def _next(self, found: RobotPayload) -> str:
+        where = with_estimates(self.out or self.estimates)
+        if "calibration" in found.blocks:
+            return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
+        if found.declared.elastic and "stiffness" not in found.blocks:
+            return f"flexcal design frequency {self.robot} --out frequency.yaml"
+        return f"flexcal design poses {self.robot} --count 40 --out poses.yaml"

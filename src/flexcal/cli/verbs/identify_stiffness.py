@@ -1,0 +1,109 @@
+"""`flexcal identify stiffness`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Literal
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybePath,
+    Paths,
+    Robot,
+    require_at_least,
+    require_files,
+    require_robot,
+)
+from flexcal.cli.arguments.suggested_commands import reading_elsewhere
+from flexcal.cli.terminal.console import Console
+
+_CHECK = "check that responses, payload and poses are of this robot, and the start values under `elastic:`"
+_OTHER_START = {
+    "multi-start": f"search a start more widely with --search population; if that ends so too, {_CHECK}",
+    "population": f"try another --seed; if that ends so too, {_CHECK}",
+}
+
+
+@dataclass(frozen=True)
+class IdentifyStiffness:
+    """Identify stiffness and damping of drives and bearings from frequency responses.
+
+    Writes estimates.yaml beside robot.yaml, which 'calibrate' then uses. Link inertias, rotor inertias, friction and delays are estimated
+    too, with CAD as the prior.
+    """
+
+    robot: Robot
+    responses: Annotated[
+        Positional[Paths],
+        arg(
+            metavar="RESPONSES...",
+            help="files of 'identify response', or their folder",
+            help_behavior_hint="",
+        ),
+    ]
+    inertias_known: bool = False
+    """Take link inertias as exact."""
+    weighting: Literal["covariance", "paper", "uniform"] = "covariance"
+    """covariance: that of the measured responses, with correct intervals; paper: emphasis near poles and zeros; uniform: equal weights."""
+    search: Literal["multi-start", "population"] = "multi-start"
+    """Search for a start: multi-start with gradients, or differential evolution in place of the paper's genetic algorithm."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of the search for a start."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
+    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Fit, and print the springs."""
+        from flexcal.cli.tables.results import quantity_table
+        from flexcal.jobs.stiffness import identify_robot_stiffness
+
+        require_robot(self.robot, *self.responses)
+        require_files(self.responses, "RESPONSES")
+        require_at_least(0, seed=self.seed)
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = identify_robot_stiffness(
+                self.robot,
+                self.responses,
+                inertias_known=self.inertias_known,
+                weighting=self.weighting,
+                search=self.search,
+                seed=self.seed,
+                out=self.out,
+                command=command_line(),
+                progress=progress,
+            )
+        document = found.document()
+        quantities = document["parameters"]
+        units = {item.name: item.unit for item in found.estimate.parameters}
+        for title, ending in (("stiffness", ".stiffness"), ("damping", ".damping")):
+            shown = {name: values for name, values in quantities.items() if name.endswith(ending)}
+            console.show(quantity_table(title, shown, units))
+        fit = document["fit"]
+        if fit["status"] != "converged":
+            console.say(
+                f"the fit has not converged ({fit['message']}), so its values and intervals mean nothing: {_OTHER_START[self.search]}"
+            )
+        if not fit["reference_motion_modelled"]:
+            console.say(
+                "there is no plan.yaml beside the responses: the reference motion is ignored, which biases damping upwards"
+            )
+        if fit["missing_poses"]:
+            numbers = ", ".join(map(str, fit["missing_poses"]))
+            console.say(f"poses of the plan without a response, not used in the fit: {numbers}")
+        if fit["reduced_chi2"] is not None:
+            console.say(
+                f"chi-square over its expectation: {fit['reduced_chi2']:.2f} (near 1 where model and noise are right)"
+            )
+        for remark in found.remarks:
+            console.say(remark)
+        console.say(found.trust.sentence)
+        console.say(f"wrote {found.estimates}")
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+            console.say(reading_elsewhere(self.robot, found.estimates))
+        console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

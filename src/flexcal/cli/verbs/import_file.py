@@ -1,0 +1,186 @@
+"""`flexcal import`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.shared_options import (
+    Json,
+    MaybeNumber,
+    MaybePath,
+    MaybeText,
+    Robot,
+    Texts,
+    require_robot,
+)
+from flexcal.cli.terminal.console import Console
+from flexcal.errors import InputError
+from flexcal.units import MILLIMETRE
+
+if TYPE_CHECKING:
+    from flexcal.jobs.setup import ImportedFile
+
+_MOVED = 0.002
+"""A point that fits better so far (m) from where it was declared is worth a word."""
+
+
+@dataclass(frozen=True)
+class Import:
+    """Convert measurements with other column names and units to flexcal's, in SI units: measured poses, or a joint log.
+
+    FILE is delimited text, Excel, MAT, Parquet, a universal file, or a ROS recording (MCAP, rosbag2). Columns are recognised by
+    joint names, usual words and numbers; units by the headers, else by magnitude. The first rows are shown as they were
+    read, and columns that are left out are listed. Without --out nothing is written.
+
+    The nominal robot is then registered with the points by best fit. If the residuals are too large, nothing is written, and an explanation
+    is proposed.
+    """
+
+    robot: Robot
+    file: Annotated[Positional[Path], arg(metavar="FILE", help="the measurements; of a rosbag2, the folder")]
+    map: Annotated[Texts, arg(metavar="NAME=COLUMN...", help_behavior_hint="(default: as recognised)")] = ()
+    """Meaning of columns: q2=-J2[deg]+90 x=X[mm] tau1=12.5*I1[A] temperature=none, in quotes where there are spaces."""
+    out: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: only show how the file is read)")
+    ] = None
+    """The file to write, CSV or Parquet."""
+    sigma: Annotated[
+        MaybeNumber, arg(metavar="MM", help_behavior_hint="(default: as in the file, else unknown)")
+    ] = None
+    """The instrument's 1σ per coordinate, mm, for a file that does not state it."""
+    sheet: Annotated[
+        MaybeText,
+        arg(metavar="NAME", help_behavior_hint="(default: the first)"),
+    ] = None
+    """Sheet of an Excel file."""
+    topic: Annotated[
+        MaybeText,
+        arg(metavar="NAME", help_behavior_hint="(default: the only one)"),
+    ] = None
+    """Topic of the measured points in a ROS recording."""
+    unchecked: bool = False
+    """Write although the points do not fit the nominal robot."""
+    write_signals: bool = False
+    """Also append the block 'signals:' to robot.yaml, so that files with these columns can be read without import."""
+    write_point: bool = False
+    """Also write the position of the measured point that fits the nominal robot best to robot.yaml, as its `xyz`."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Import, and show how the columns were read."""
+        from flexcal.cli.tables.imported_columns import first_rows_table
+        from flexcal.importing.columns import reasons_of
+        from flexcal.jobs.setup import import_file
+
+        require_robot(self.robot, self.file)
+        console = Console(self.json)
+        found = import_file(
+            self.robot,
+            self.file,
+            mapped=self.map,
+            out=self.out,
+            sigma=None if self.sigma is None else self.sigma * MILLIMETRE,
+            sheet=self.sheet,
+            topic=self.topic,
+            unchecked=self.unchecked,
+        )
+        console.show(first_rows_table(found))
+        for left in reasons_of(found.left_out):
+            console.say(f"left out: {left}")
+        for remark in found.remarks:
+            console.say(remark)
+        self._say_fit(console, found)
+        if not found.trusted and not self.unchecked:
+            raise InputError(self._doubt(found))
+        if self.write_point:
+            self._write_point(console, found)
+        if self.write_signals:
+            self._add_signals(console, found)
+        if self.out is not None:
+            rows = len(next(iter(found.columns.values())))
+            console.say(f"wrote {self.out}: {rows} rows")
+        console.finish(found.document(), self._following(found))
+
+    def _say_fit(self, console: Console, found: ImportedFile) -> None:
+        fit = found.misfit
+        if fit is None:
+            return
+        console.say(
+            f"the nominal robot, best-fit registered, has residuals of {fit.rms / MILLIMETRE:.2f} mm (rms)"
+        )
+        shift = float(((fit.moved - fit.declared) ** 2).sum() ** 0.5)
+        if not fit.doubtful and shift > _MOVED and fit.moved_rms < 0.5 * fit.rms:
+            place = ", ".join(f"{value:.3f}" for value in fit.moved)
+            console.say(
+                f"with the point {fit.point} at [{place}] in its frame only {fit.moved_rms / MILLIMETRE:.2f} mm: "
+                f"check its xyz under `points:` in {self.robot}"
+                + (
+                    ""
+                    if self.write_point
+                    else "; --write-point writes this there (calibrate finds it more exactly)"
+                )
+            )
+
+    def _write_point(self, console: Console, found: ImportedFile) -> None:
+        from flexcal.jobs.setup import write_point_place
+
+        fit = found.misfit
+        if fit is None or fit.doubtful:
+            raise InputError(
+                f"{self.file}: these points do not determine the position of the reflector on the tool; leave --write-point out."
+            )
+        write_point_place(self.robot, fit.point, fit.moved)
+        console.say(f"wrote the xyz of {fit.point} to {self.robot}")
+
+    def _doubt(self, found: ImportedFile) -> str:
+        fit = found.misfit
+        assert fit is not None
+        share = f"{100 * fit.moved_rms / fit.reach:.0f} % of its reach"
+        what = f"{self.file}: the points do not fit this robot as the columns are read: the residuals are {share}"
+        if not fit.proposal:
+            check = f"check the order, units and signs of the columns, and the point's frame in {self.robot}"
+            return f"{what}; {check}, or write them with --unchecked."
+        if not fit.supported:
+            return f"{what}; {fit.proposal}."
+        options = "".join(f" '{option}'" for option in fit.options)
+        return (
+            f"{what}; {fit.proposal}"
+            + (f": --map{options}" if options else "; correct it with --map, as z=-COLUMN")
+            + "."
+        )
+
+    def _add_signals(self, console: Console, found: ImportedFile) -> None:
+        from flexcal.data.tables import TIMESTAMP
+        from flexcal.jobs.setup import add_signals
+
+        if not found.signals:
+            console.say("robot.yaml needs no `signals:` for these columns")
+            return
+        add_signals(self.robot, found.signals)
+        console.say(f"added `signals:` to {self.robot}")
+        if found.signals.get("t", {}).get("unit") == TIMESTAMP:
+            (column,) = found.signals["t"]["columns"]
+            console.say(
+                f"with it the timestamps of {column} are read as seconds from the first; where they are irregular, the verbs that read "
+                "logs resample them to a uniform time step, and say so"
+            )
+
+    def _following(self, found: ImportedFile) -> str:
+        if self.out is None:
+            return f"if the columns are right, the same with --out {'log' if found.kind == 'log' else 'poses'}.csv, else with --map"
+        if found.kind == "log":
+            return f"flexcal identify dynamics {self.robot} {self.out}"
+        if found.kind == "joints":
+            return f"flexcal design poses {self.robot} --from {self.out} --out plan.yaml"
+        from flexcal.jobs.inputs import stored_estimates
+
+        calibrate, verify = (f"flexcal {verb} {self.robot} {self.out}" for verb in ("calibrate", "verify"))
+        if stored_estimates(found.model, None).is_file():
+            return (
+                f"{verify}, if these poses are outside the calibration; or, to calibrate again, {calibrate}"
+            )
+        return f"{calibrate}; or, if they are verification poses, {verify}"

@@ -1,0 +1,73 @@
+"""`flexcal measure`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+from tyro.conf import Positional, arg
+
+from flexcal.cli.arguments.shared_options import Json, MaybePath, require_at_least
+from flexcal.cli.terminal.console import Console
+
+
+@dataclass(frozen=True)
+class Measure:
+    """Carry out a plan of 'design', in the virtual cell or from recorded files."""
+
+    plan: Annotated[Positional[Path], arg(metavar="PLAN", help="the plan (YAML)")]
+    cell: Annotated[str, arg(metavar="virtual|DIR")]
+    """virtual, or a folder with plan.yaml and the joint logs or poses.csv recorded for it."""
+    out: Annotated[Path, arg(metavar="DIR")]
+    """Folder for the measurements."""
+    robot: Annotated[
+        MaybePath,
+        arg(metavar="ROBOT", help_behavior_hint="(default: beside PLAN, else in the current folder)"),
+    ] = None
+    """robot.yaml."""
+    config: Annotated[
+        MaybePath, arg(metavar="FILE", help_behavior_hint="(default: cell.yaml beside robot.yaml)")
+    ] = None
+    """Settings of the virtual cell."""
+    truth: Annotated[MaybePath, arg(metavar="FILE", help_behavior_hint="(default: drawn from the seed)")] = (
+        None
+    )
+    """File of the true parameters of the virtual cell."""
+    seed: Annotated[int, arg(metavar="N")] = 0
+    """Seed of the virtual cell's true parameters and noise; use the same seed for all measurements of one robot."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Measure, and print the files that were written."""
+        from flexcal.jobs.experiments import measure
+        from flexcal.jobs.inputs import robot_file
+
+        require_at_least(0, seed=self.seed)
+        console = Console(self.json)
+        robot = robot_file(self.plan, self.robot)
+        with console.progress() as progress:
+            found = measure(
+                robot,
+                self.plan,
+                self.cell,
+                self.out,
+                config=self.config,
+                seed=self.seed,
+                truth=self.truth,
+                progress=progress,
+            )
+        if found.kind == "trajectory":
+            console.say(f"wrote {found.recordings} recordings to {self.out}")
+            verb = "payload" if found.loaded else "inertials"
+            following = f"flexcal identify {verb} {robot} {self.out}"
+        elif found.recordings:
+            console.say(f"wrote {found.recordings} recordings of {found.poses} poses to {self.out}")
+            following = f"flexcal identify response {robot} {self.out} --out responses"
+        else:
+            console.say(f"wrote {found.poses} measured points to {self.out / 'poses.csv'}")
+            points = f"{robot} {self.out / 'poses.csv'}"
+            following = f"flexcal {'verify' if found.for_verification else 'calibrate'} {points}"
+            if self.plan.suffix not in (".yaml", ".yml"):
+                following = f"flexcal verify {points} to verify a calibration, or flexcal calibrate {points}"
+        console.finish(found.document(), following)

@@ -1,0 +1,102 @@
+"""`flexcal verify`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from tyro.conf import arg
+
+from flexcal.cli.arguments.invocation import command_line
+from flexcal.cli.arguments.shared_options import (
+    Estimates,
+    Json,
+    MaybePath,
+    PoseFiles,
+    Robot,
+    require_files,
+    require_robot,
+)
+from flexcal.cli.arguments.suggested_commands import with_estimates
+from flexcal.cli.terminal.console import Console
+
+if TYPE_CHECKING:
+    from flexcal.report.layout import Status
+
+
+@dataclass(frozen=True)
+class Verify:
+    """Verify a calibration on measured positions outside the fit."""
+
+    robot: Robot
+    poses: PoseFiles
+    estimates: Estimates = None
+    refit: Annotated[
+        tuple[Literal["station", "point"], ...],
+        arg(metavar="{station,point}...", help_behavior_hint="(default: nothing)"),
+    ] = ()
+    """Fit the placement of the instrument, or the measured point, to these poses, where it was moved or replaced since the
+    calibration; the geometry is kept. Errors are then leave-one-out errors."""
+    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
+    """Folder for report.html, results.json and points.csv; without it there is no report."""
+    json: Json = False
+
+    def run(self) -> None:
+        """Verify, and print the errors."""
+        from flexcal.cli.tables.results import before_rows, error_table
+        from flexcal.jobs.accuracy import verify_robot
+
+        require_robot(self.robot, *self.poses)
+        require_files(self.poses, "POSES")
+        console = Console(self.json)
+        with console.progress() as progress:
+            found = verify_robot(
+                self.robot,
+                self.poses,
+                estimates=self.estimates,
+                refit=tuple(dict.fromkeys(self.refit)),
+                out=self.out,
+                command=command_line(),
+                progress=progress,
+            )
+        document = found.document()
+        blocks = document["verification"]
+        labels = {"measured": "calibrated"}
+        if document["refit"] is not None:
+            labels = {
+                "as_calibrated": "calibrated, nothing refitted",
+                "measured": f"calibrated, {' and '.join(document['refit']['what'])} refitted (leave-one-out)",
+            }
+        if document["ambiguous_poses"]:
+            labels["measured_unambiguous"] = "calibrated, flank certain"
+        rows = before_rows(document) | {label: blocks[key] for key, label in labels.items() if key in blocks}
+        console.show(error_table("distance to the measured points", rows))
+        rms = document["rms_mm"]
+        whole = (
+            "; noise of instrument and robot is not known"
+            if rms["expected"] is None
+            else f", {rms['expected']:.3f} mm with instrument, robot and model error"
+        )
+        console.say(
+            f"root mean square: {rms['measured']:.3f} mm; predicted from the parameters' covariance: {rms['parameters']:.3f} mm{whole}"
+        )
+        for remark in document["remarks"]:
+            console.say(remark)
+        console.say(found.trust.sentence)
+        if self.out is not None:
+            console.say(f"wrote {self.out / 'report.html'}")
+        console.finish(document, self._next(found.trust.status))
+
+    def _next(self, status: Status) -> str:
+        """The next step after a verdict."""
+        where = with_estimates(self.estimates)
+        if status == "bad":
+            return "mend what the verdict names, and verify again; do not use this calibration before that"
+        if status == "unknown":
+            return (
+                f"flexcal verify {self.robot} MORE_POSES…{where} (flexcal design poses --random plans some)"
+            )
+        return (
+            f"flexcal export urdf {self.robot}{where} --out calibrated.urdf, or flexcal compensate {self.robot} TARGETS.csv{where}; "
+            f"flexcal map {self.robot}{where} --verification {self.poses[0]} predicts the accuracy elsewhere"
+        )

@@ -1,0 +1,57 @@
+"""Target poses of the tool from a file of targets."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.compensation.tool_target import Aim
+from flexcal.data.poses import ToolTargets
+from flexcal.errors import FlexcalError
+from flexcal.model.parts import vector_rotation
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import points_kinematics
+
+_POSE = 6
+
+
+def wanted_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> Aim:
+    """Position and, where it counts, rotation of every target in the base frame.
+
+    Points and orientations are those of the file, else those that the `nominal` robot takes at the file's joint positions. A point alone
+    leaves the orientation free, and so does an arm with fewer than six joints before the tool. Points in an instrument's frame are brought
+    to the base frame by where `model` has its station. Raises `FlexcalError` for an orientation that such an arm cannot be asked for.
+    """
+    short = [name for name in dict.fromkeys(targets.target.tolist()) if joints_before(model, name) < _POSE]
+    if targets.rotation is not None and short:
+        raise FlexcalError(
+            f"{model.name} has {joints_before(model, short[0])} joints before '{short[0]}' and cannot take every orientation; "
+            "leave qw, qx, qy, qz out."
+        )
+    position, rotation = targets.position, targets.rotation
+    if targets.station is not None:
+        assert position is not None
+        position, rotation = _from_stations(model, targets.station, position, rotation)
+    if targets.q is not None:
+        at = points_kinematics(nominal, targets.q, None, targets.target, jacobians=False)
+        position = at.position if position is None else position
+        rotation = at.orientation if rotation is None else rotation
+    assert position is not None
+    return Aim(targets.target, position, None if short else rotation)
+
+
+def joints_before(model: RobotModel, target: str) -> int:
+    """How many joints move a point."""
+    joint, count = model.point(target).joint, 0
+    while joint >= 0:
+        joint, count = model.joints[joint].parent, count + 1
+    return count
+
+
+def _from_stations(
+    model: RobotModel, station: np.ndarray, position: np.ndarray, rotation: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray | None]:
+    places = np.array([model.station[model.station_index(name)] for name in station.tolist()])
+    turns = np.array([vector_rotation(place[3:]) for place in places])
+    back = np.swapaxes(turns, 1, 2)
+    moved = np.matmul(back, (position - places[:, :3])[:, :, None])[:, :, 0]
+    return moved, None if rotation is None else np.matmul(back, rotation)

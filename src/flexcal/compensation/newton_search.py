@@ -1,0 +1,154 @@
+"""The command that brings the real tool to its aim: Newton's method on the calibrated robot, on the flank that gravity holds there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from flexcal.compensation.inverse_kinematics import NEAR, nearest_positions
+from flexcal.compensation.tool_target import Aim
+from flexcal.model.kinematics import damped_step, joint_limits
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import ToolAtRest, tool_at_rest
+
+LARGEST_CORRECTION = 0.2
+"""A command farther than this from the nominal one (rad or m, any joint) is that of another posture, not a correction."""
+_ITERATIONS = 12
+_SHARED = 4
+"""Steps that share the Jacobian of the nominal command; rows that need more get their own in each."""
+_DAMPING = 1e-7
+"""Relative to the reach: it keeps exactly singular rows solvable, and is far below what can be corrected."""
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Motor positions `q` (N, n) after the last step; `found` (N,): with them the tool is at its aim, within all limits.
+
+    `before` and `after` (N, m): aim minus tool, as `Aim.residual` has it, at the nominal command and at `q`; `torque` (N, n) N m at rest.
+    """
+
+    q: np.ndarray
+    found: np.ndarray
+    before: np.ndarray
+    after: np.ndarray
+    torque: np.ndarray
+
+    def subset(self, rows: np.ndarray) -> Commands:
+        """The rows with these indices, or where this mask is true."""
+        return Commands(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
+
+
+def find_commands(model: RobotModel, aim: Aim, nominal: np.ndarray, payload: np.ndarray | None) -> Commands:
+    """Commands of least change from `nominal` (N, n) that bring the deflected robot to `aim`, carrying `payload` (N,) kg.
+
+    q ← q₀ + J⁺ (r + J (q − q₀)), the Gauss-Newton step to the solution nearest to q₀; for six joints and a full pose it is Newton's.
+    A correction of millimetres hardly turns J, so that the first one serves for four steps.
+    How the arm stands with the tool at its aim does not depend on the flank, and so the torque there settles it: once the steps have come
+    to an end, and not on the way, where it could turn to and fro. Where a redundant arm leaves a limit, that joint is held there and the
+    others make up for it. Rows in which these steps lead away are sought once more by `nearest_positions`. Raises `FlexcalError` where the
+    springs cannot carry the arm.
+    """
+    search = _Search(model, aim, nominal, payload)
+    for iteration in range(_ITERATIONS):
+        if not len(search.rows):
+            break
+        search.advance(jacobians=iteration >= _SHARED - 1)
+    search.try_damped()
+    return Commands(search.q, search.found, search.before, search.after, search.torque)
+
+
+class _Search:
+    """Where the search stands for all rows; `rows` are the numbers of those still under way."""
+
+    def __init__(self, model: RobotModel, aim: Aim, nominal: np.ndarray, payload: np.ndarray | None) -> None:
+        self.model, self.aim, self.nominal, self.payload = model, aim, nominal, payload
+        self.lower, self.upper = joint_limits(model)
+        self.weight = aim.weight(model)
+        self.rows = np.arange(len(nominal))
+        self.q, self.origin = nominal.copy(), nominal.copy()
+        self.held = np.zeros(nominal.shape, dtype=bool)
+        self.found, self.turned = np.zeros((2, len(nominal)), dtype=bool)
+        start = self._at_rest(self.rows, nominal, None, jacobians=True)
+        self.flank, self.torque = start.rest.flank, start.rest.torque
+        self.jacobian = start.command_jacobian()[:, : aim.rows]
+        self.before = aim.residual(start.kinematics)
+        self.after = self.before.copy()
+
+    def advance(self, *, jacobians: bool) -> None:
+        """One step of all rows under way; those that are done, or lead too far, leave."""
+        self._step(self.rows)
+        rows = self.rows = self.rows[~self._far(self.rows)]
+        self._evaluate(rows, self.q[rows], jacobians=jacobians)
+        there = self.aim.reached(self.after[rows])
+        goes_on = ~there
+        goes_on[there] = self._turn_flanks(rows[there]) | self._hold_at_limits(rows[there])
+        self.rows = rows[goes_on]
+
+    def try_damped(self) -> None:
+        """Rows that came to no end, once more by damped least squares within the limits; twice where the flank turns at the end."""
+        rows = np.flatnonzero(~self.found & ~self.aim.reached(self.after))
+
+        def forward(own: np.ndarray, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+            self._evaluate(rows[own], q, jacobians=True)
+            return self.after[rows[own]], self.jacobian[rows[own]]
+
+        for _ in range(2):
+            aim = self.aim.subset(rows)
+            self.q[rows], self.after[rows] = nearest_positions(
+                self.model, aim, self.nominal[rows], NEAR, forward
+            )
+            there = rows[self.aim.reached(self.after[rows])]
+            self._evaluate(there, self.q[there], jacobians=False)
+            turns = self._turn_flanks(there)
+            self.found[there] = ~turns & ~self._far(there)
+            rows = there[turns]
+
+    def _at_rest(
+        self, rows: np.ndarray, q: np.ndarray, flank: np.ndarray | None, *, jacobians: bool
+    ) -> ToolAtRest:
+        payload = None if self.payload is None else self.payload[rows]
+        target = self.aim.target[rows]
+        return tool_at_rest(self.model, q, payload, target, flank=flank, jacobians=jacobians)
+
+    def _evaluate(self, rows: np.ndarray, q: np.ndarray, *, jacobians: bool) -> None:
+        """Residuals and torques of rows at `q` (k, n) on their flanks, and with `jacobians` these."""
+        at = self._at_rest(rows, q, self.flank[rows], jacobians=jacobians)
+        self.torque[rows] = at.rest.torque
+        self.after[rows] = self.aim.subset(rows).residual(at.kinematics)
+        if jacobians:
+            self.jacobian[rows] = at.command_jacobian()[:, : self.aim.rows]
+
+    def _far(self, rows: np.ndarray) -> np.ndarray:
+        correction = np.abs(self.q[rows] - self.nominal[rows])
+        return correction.max(axis=1, initial=0.0) > LARGEST_CORRECTION
+
+    def _turn_flanks(self, rows: np.ndarray) -> np.ndarray:
+        """Put arms that are at their aims onto the flanks that their torques there press them to, once; whose this changed (k,)."""
+        flank = np.sign(self.torque[rows]) * np.abs(self.flank[rows])
+        turns = (flank != self.flank[rows]).any(axis=1) & ~self.turned[rows]
+        self.flank[rows[turns]] = flank[turns]
+        self.turned[rows[turns]] = True
+        self._evaluate(rows[turns], self.q[rows[turns]], jacobians=False)
+        return turns
+
+    def _hold_at_limits(self, rows: np.ndarray) -> np.ndarray:
+        """Mark arms within limits as found; hold the joint farthest beyond one there, where enough others are free; where (k,)."""
+        beyond = np.maximum(self.lower - self.q[rows], self.q[rows] - self.upper)
+        outside = (beyond > 0).any(axis=1)
+        self.found[rows] = ~outside & self.aim.reached(self.after[rows])
+        moves = ~self.held[rows] & (self.jacobian[rows] != 0).any(axis=1)
+        spare = outside & (moves.sum(axis=1) > self.aim.rows)
+        joint = np.argmax(beyond[spare], axis=1)
+        held = rows[spare]
+        self.held[held, joint] = True
+        self.origin[held, joint] = np.clip(self.q[held, joint], self.lower[joint], self.upper[joint])
+        return spare
+
+    def _step(self, rows: np.ndarray) -> None:
+        """Gauss-Newton from the origin, without the joints that are held there."""
+        jacobian = self.jacobian[rows]
+        moved = self.q[rows] - self.origin[rows]
+        wanted = (self.after[rows] + np.matmul(jacobian, moved[:, :, None])[:, :, 0]) * self.weight
+        free = np.where(self.held[rows][:, None, :], 0.0, jacobian * self.weight[:, None])
+        self.q[rows] = self.origin[rows] + damped_step(free, wanted, _DAMPING * self.model.reach)

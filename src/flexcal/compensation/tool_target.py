@@ -1,0 +1,58 @@
+"""What is wanted of the tool, and how far a pose is from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.model.kinematics import PointKinematics
+from flexcal.model.parts import rotation_vector
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import points_kinematics
+
+_NEAR = 1e-9
+"""A pose is reached where every coordinate of its point (m) and of its rotation (rad) is nearer than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Aim:
+    """Where N points, by name, are to be in the base frame: `position` (N, 3) m and, where it counts, `rotation` (N, 3, 3).
+
+    Residuals and Jacobians have m rows: three for the position, and three more for the rotation.
+    """
+
+    target: np.ndarray
+    position: np.ndarray
+    rotation: np.ndarray | None
+
+    @property
+    def rows(self) -> int:
+        """m, 3 or 6."""
+        return 3 if self.rotation is None else 6
+
+    def weight(self, model: RobotModel) -> np.ndarray:
+        """Factors (m,) that make lengths of all rows: a rotation counts as the motion of a point as far away as the robot reaches."""
+        return np.repeat([1.0, model.reach], 3)[: self.rows]
+
+    def subset(self, rows: np.ndarray | slice) -> Aim:
+        """The rows with these indices, or where this mask is true."""
+        turn = None if self.rotation is None else self.rotation[rows]
+        return Aim(self.target[rows], self.position[rows], turn)
+
+    def residual(self, at: PointKinematics) -> np.ndarray:
+        """Aim minus pose (N, m): m, then the rotation vector in base axes from the one to the other, rad."""
+        away = self.position - at.position
+        if self.rotation is None:
+            return away
+        turn = np.matmul(self.rotation, np.swapaxes(at.orientation, 1, 2))
+        return np.hstack([away, rotation_vector(turn)])
+
+    def reached(self, residual: np.ndarray) -> np.ndarray:
+        """Whether residuals (N, m) are as good as zero (N,)."""
+        return np.abs(residual).max(axis=1) < _NEAR
+
+    def nominal(self, model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Residual (N, m) and its negative Jacobian (N, m, n) of an undeflected robot at `q` (N, n)."""
+        at = points_kinematics(model, q, None, self.target, jacobians=True)
+        return self.residual(at), at.motion_jacobian[:, : self.rows, :, 2]

@@ -1,0 +1,22 @@
+from .multisines import MultisinePlan
+from .periodic_paths import FourierPaths, SplinePaths, fourier_basis, spline_basis
+from .plan_files import Plan, page_beside, read_plan, read_plan_of, write_plan
+from .poses import PosePlan
+from .timed_positions import TimedPositions
+from .trajectories import TrajectoryPlan
+
+__all__ = [
+    "FourierPaths",
+    "MultisinePlan",
+    "Plan",
+    "PosePlan",
+    "SplinePaths",
+    "TimedPositions",
+    "TrajectoryPlan",
+    "fourier_basis",
+    "page_beside",
+    "read_plan",
+    "read_plan_of",
+    "spline_basis",
+    "write_plan",
+]

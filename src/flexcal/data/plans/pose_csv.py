@@ -1,0 +1,60 @@
+"""A plan of poses as CSV: `pose`, `q1` … `qn` in rad (m where prismatic), and `payload` in kg where it is not the declared one."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.plans.poses import PosePlan
+from flexcal.data.poses import whole_numbers
+from flexcal.data.tables import Table, open_table, write_table
+from flexcal.errors import FlexcalError, InputError
+
+_OF_COMMANDS = ("target", "unambiguous")
+"""Columns that commands have besides, which do not matter to who moves the robot."""
+
+
+def write_pose_table(path: Path, plan: PosePlan) -> None:
+    """Write the poses in their order; the plan's name and seed are left out."""
+    columns = {"pose": plan.numbers}
+    columns |= {f"q{i + 1}": plan.q[:, i] for i in range(plan.joint_count)}
+    write_table(path, columns if plan.payload is None else columns | {"payload": plan.payload})
+
+
+def read_pose_table(path: Path) -> PosePlan:
+    """The poses in the order of the rows, named after the file.
+
+    Commands that 'flexcal compensate' wrote are such a plan too. Raises `InputError` with file, line and column where something is wrong,
+    and where the poses are not all of one `target`.
+    """
+    file = open_table(path)
+    joints = tuple(f"q{i}" for i in range(1, sum(name.startswith("q") for name in file.columns) + 1))
+    for name in joints or ("q1",):
+        if name not in file.columns:
+            raise file.error(
+                f"the column '{name}' is missing; a plan of poses has pose, q1 … qn, and payload or not."
+            )
+    for name in file.columns:
+        if name not in ("pose", "payload", *_OF_COMMANDS, *joints):
+            raise file.error(f"the column '{name}' is not known in a plan of poses; remove it.")
+    texts = tuple(name for name in _OF_COMMANDS if name in file.columns)
+    table = file.read(texts)
+    if "target" in texts and len(set(table.columns["target"].tolist())) > 1:
+        raise file.error("the poses are of several targets; measure one target at a time.")
+    pose = _numbers(table) if "pose" in file.columns else None
+    try:
+        return PosePlan(
+            q=np.column_stack([table.columns[name] for name in joints]),
+            payload=table.columns.get("payload"),
+            name=path.stem,
+            pose=pose,
+        )
+    except FlexcalError as problem:
+        raise InputError(f"{path}: {problem}") from problem
+
+
+def _numbers(table: Table) -> np.ndarray | None:
+    """The numbers (N,) of the poses; None where they only count from 1."""
+    numbers = whole_numbers(table, "pose", table.columns["pose"])
+    return None if np.array_equal(numbers, np.arange(1, len(numbers) + 1)) else numbers

@@ -1,0 +1,5 @@
+"""Measured poses, candidate poses and tool targets, and their files."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

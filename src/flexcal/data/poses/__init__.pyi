@@ -1,0 +1,30 @@
+from .candidate_pool import PosePool
+from .checks import check_metres, check_motion, check_same_pose
+from .columns import check_positive, unit_quaternions, whole_numbers
+from .measured_tables import read_pose_pool, read_poses, write_poses
+from .pose_set import DEFAULT_SIGMA, PoseSet, concatenate
+from .target_files import read_commands, read_targets, write_commands, write_targets
+from .tool_targets import ToolTargets
+from .working_files import read_working
+
+__all__ = [
+    "DEFAULT_SIGMA",
+    "PosePool",
+    "PoseSet",
+    "ToolTargets",
+    "check_metres",
+    "check_motion",
+    "check_positive",
+    "check_same_pose",
+    "concatenate",
+    "read_commands",
+    "read_pose_pool",
+    "read_poses",
+    "read_targets",
+    "read_working",
+    "unit_quaternions",
+    "whole_numbers",
+    "write_commands",
+    "write_poses",
+    "write_targets",
+]

@@ -1,0 +1,81 @@
+"""Checks of measured poses: plausible positions, and motion of every joint."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.data.poses.pose_set import PoseSet
+from flexcal.data.tables import Signal, Table
+from flexcal.errors import InputError
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import RobotModel
+
+STILL = 1e-3
+"""A joint that moves by less over all poses (rad or m) counts as never moving."""
+SAME_POSE = 0.02
+"""Rows of one pose may differ by this much in their joint positions (rad or m)."""
+
+
+def check_motion(poses: PoseSet, model: RobotModel, where: str) -> None:
+    """Raise `InputError` where there is one pose only, all are equal, or a joint never moves; `where` names the files."""
+    if len(np.unique(poses.pose)) < 2:
+        raise InputError(f"{where}: there is one pose only; measure more poses, in which every joint moves.")
+    travel = np.ptp(poses.q, axis=0)
+    if (travel < STILL).all():
+        raise InputError(
+            f"{where}: all poses are equal (columns q1…q{len(travel)}); measure poses in which every joint moves."
+        )
+    still = np.flatnonzero(travel < STILL)
+    if still.size:
+        listed = ", ".join(f"{model.joint_names[i]} (column q{i + 1})" for i in still)
+        word = "joints never move" if still.size > 1 else "joint never moves"
+        raise InputError(
+            f"{where}: the {word}: {listed}; add poses in which all joints take different angles."
+        )
+
+
+def check_same_pose(pose: np.ndarray, q: np.ndarray, table: Table) -> None:
+    """Raise `InputError` with the row where a `pose` (N,) has other joint positions `q` (N, n) than in its first row."""
+    numbers, first, inverse = np.unique(pose, return_index=True, return_inverse=True)
+    differs = np.abs(q - q[first[inverse]]) > SAME_POSE
+    if differs.any():
+        row, joint = (int(i) for i in np.argwhere(differs)[0])
+        original = int(first[inverse[row]])
+        raise table.error(
+            row,
+            f"q{joint + 1}",
+            f"pose {numbers[inverse[row]]} stands at {q[row, joint]:g} here, but at {q[original, joint]:g} "
+            f"in {table.file.row_word} {table.first + original}; give every pose its own number.",
+        )
+
+
+def check_metres(poses: PoseSet, model: RobotModel, table: Table, signal: Signal) -> None:
+    """Raise `InputError` where points cannot be in m.
+
+    The points of one target seen from one station lie within twice the robot's reach of each other, and the instrument
+    stands no farther than ten times the reach (at least 60 m) away: what lies beyond twice that is refused.
+    """
+    reach = float(model.reach)
+    values = poses.position if poses.length is None else poses.length[:, None]
+    distance = np.linalg.norm(values, axis=1)
+    spread = np.zeros(len(poses))
+    for station in poses.stations:
+        for target in poses.targets:
+            rows = (poses.station == station) & (poses.target == target)
+            if rows.any():
+                spread[rows] = np.linalg.norm(values[rows] - np.median(values[rows], axis=0), axis=1)
+    farthest = max(10 * reach, 60.0)
+    wrong = (spread > 4 * reach) | (distance > farthest)
+    if not wrong.any():
+        return
+    row = int(np.argmax(wrong))
+    column = signal.column_of(int(np.argmax(np.abs(values[row]))))
+    place = f"the point lies {distance[row]:.4g} m from the instrument and {spread[row]:.4g} m from the middle of all points"
+    if wrong.sum() > 0.2 * wrong.size and distance.max() * 1e-3 < farthest:
+        advice = "these look like millimetres: convert them to m, or declare 'unit: mm' under `signals:`."
+    else:
+        advice = "correct or remove the line."
+    raise table.error(row, column, f"{place}, but the robot reaches {reach:.3g} m; {advice}")

@@ -1,0 +1,188 @@
+"""Measured poses on disk: CSV or Parquet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.data.poses.candidate_pool import PosePool
+from flexcal.data.poses.checks import check_metres, check_motion, check_same_pose
+from flexcal.data.poses.columns import (
+    check_positive,
+    first_point,
+    payload_column,
+    target_column,
+    unit_quaternions,
+    whole_numbers,
+)
+from flexcal.data.poses.pose_set import DEFAULT_SIGMA, PoseSet, concatenate
+from flexcal.data.tables import (
+    TableFile,
+    assign,
+    check_joint_limits,
+    check_joint_units,
+    open_table,
+    standard_columns,
+    timestamp_columns,
+    with_seconds,
+    write_table,
+)
+from flexcal.errors import InputError
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import RobotModel
+
+_NUMBERS = ("quaternion", "sigma", "sigma_xyz", "tau", "payload", "temperature", "t")
+_TEXTS = ("target", "station")
+
+
+def read_poses(
+    paths: str | Path | Sequence[str | Path], model: RobotModel, *, require_motion: bool = True
+) -> PoseSet:
+    """Read measured poses from one file or several, joined in order (see `concatenate`).
+
+    Without a `target` column the point is the first under `points:`; without `station` the instrument stands at the
+    robot's first station; without `sigma` it is 0.1 mm and `sigma_given` is False.
+
+    Raises `InputError` with file, line and column for a missing, unknown or partial column, a value that is missing or
+    no number, angles that cannot be in rad, points that cannot be in m, an unknown target, a negative sigma or
+    payload, a quaternion that is not of unit norm, and joint positions that differ within one pose. With
+    `require_motion` also where all poses are equal or a joint never moves, from which nothing can be calibrated.
+    """
+    listed = [paths] if isinstance(paths, str | Path) else list(paths)
+    poses = concatenate([_read(Path(path), model) for path in listed])
+    if require_motion:
+        check_motion(poses, model, " and ".join(str(path) for path in listed))
+    return poses
+
+
+def read_pose_pool(path: str | Path, model: RobotModel) -> PosePool:
+    """Read poses to choose from: `pose`, `q1`… and, where all hold the same one, `payload`; what was measured in them is not used.
+
+    Rows of one pose count once. Raises `InputError` with file, line and column as `read_poses` does, for a pose outside the joint
+    limits, and for payloads that differ.
+    """
+    file = open_table(path)
+    texts = tuple(name for name in _TEXTS if name in file.columns)
+    signals = assign(file, model, ("pose", "q"), (*_NUMBERS, "xyz", "length"), texts)
+    stamps = timestamp_columns(signals)
+    (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
+    q = signals["q"].values(table)
+    check_joint_units(model, table, signals["q"], q)
+    columns = [signals["q"].column_of(joint) for joint in range(model.n)]
+    check_joint_limits(model, table, np.arange(len(q)), columns, q)
+    pose = whole_numbers(table, signals["pose"].columns[0], signals["pose"].values(table)[:, 0])
+    check_same_pose(pose, q, table)
+    first = np.sort(np.unique(pose, return_index=True)[1])
+    held = payload_column(table, signals, model)
+    if held is not None and np.ptp(held) > 0:
+        row = int(np.argmax(held != held[0]))
+        sentence = f"{held[row]:g} kg follow {held[0]:g} kg; choose from poses with one payload at a time."
+        raise table.error(row, signals["payload"].columns[0], sentence)
+    return PosePool(q[first], pose[first], None if held is None else float(held[0]))
+
+
+def write_poses(path: str | Path, poses: PoseSet) -> None:
+    """Write poses as CSV or Parquet by the file's suffix, atomically, under the standard columns in SI units."""
+    columns: dict[str, np.ndarray] = {"pose": poses.pose}
+    vectors = [("q", poses.q)]
+    vectors.append(("xyz", poses.position) if poses.length is None else ("length", poses.length[:, None]))
+    if poses.quaternion_wxyz is not None:
+        vectors.append(("quaternion", poses.quaternion_wxyz))
+    if poses.sigma_given:
+        vectors.append(("sigma_xyz", poses.sigma) if poses.length is None else ("sigma", poses.sigma[:, :1]))
+    if poses.torque is not None:
+        vectors.append(("tau", poses.torque))
+    for quantity, values in vectors:
+        if not np.isfinite(values).all():
+            row = int(np.argmin(np.isfinite(values).all(axis=1)))
+            raise InputError(
+                f"{path}: {quantity} of row {row + 1} is not finite, so the poses are not written."
+            )
+        names = standard_columns(quantity, poses.q.shape[1])
+        columns |= {name: values[:, i] for i, name in enumerate(names)}
+    for name in ("payload", "target", "station", "temperature"):
+        values = getattr(poses, name)
+        if values is not None:
+            columns[name] = values
+    if poses.time is not None:
+        columns["t"] = poses.time
+    write_table(path, columns)
+
+
+def _read(path: Path, model: RobotModel) -> PoseSet:
+    file = open_table(path)
+    texts = tuple(name for name in _TEXTS if name in file.columns)
+    place = _place(file, model)
+    _check_measured(file, model, place)
+    signals = assign(file, model, ("pose", "q", place), _NUMBERS, texts)
+    if "sigma" in signals and "sigma_xyz" in signals:
+        raise file.error("sigma and sigma_x, sigma_y, sigma_z are both there; keep one.")
+    stamps = timestamp_columns(signals)
+    (table,) = with_seconds([file.read((*texts, *stamps))], stamps)
+    found = {name: signal.values(table) for name, signal in signals.items()}
+    check_joint_units(model, table, signals["q"], found["q"])
+    rows = len(table)
+    position = found["xyz"] if place == "xyz" else np.full((rows, 3), np.nan)
+    sigma = found.get("sigma_xyz", found.get("sigma"))
+    for name in ("sigma", "sigma_xyz", "length"):
+        if name in found:
+            check_positive(table, signals[name], found[name], zero=False)
+    target = target_column(table, model) if "target" in texts else np.full(rows, first_point(file, model))
+    station = table.columns["station"] if "station" in texts else np.full(rows, _first_station(model))
+    poses = PoseSet(
+        q=found["q"],
+        position=position,
+        sigma=np.broadcast_to(DEFAULT_SIGMA if sigma is None else sigma, (rows, 3)).copy(),
+        torque=found.get("tau"),
+        payload=payload_column(table, signals, model),
+        target=target,
+        station=station,
+        temperature=found["temperature"][:, 0] if "temperature" in found else None,
+        time=found["t"][:, 0] if "t" in found else None,
+        pose=whole_numbers(table, signals["pose"].columns[0], found["pose"][:, 0]),
+        quaternion_wxyz=unit_quaternions(table, signals["quaternion"], found["quaternion"])
+        if "quaternion" in found
+        else None,
+        length=found["length"][:, 0] if "length" in found else None,
+        sigma_given=sigma is not None,
+    )
+    check_same_pose(poses.pose, poses.q, table)
+    check_metres(poses, model, table, signals[place])
+    return poses
+
+
+def _place(file: TableFile, model: RobotModel) -> str:
+    """Whether the file measures points or the length of a wire."""
+    mapped = model.config.signals
+    length = mapped["length"].columns if "length" in mapped else ()
+    wire = "length" in file.columns or (length and set(length) <= set(file.columns))
+    if wire and {"x", "y", "z"} & set(file.columns):
+        raise file.error("there are both 'length' and x, y, z; keep the columns of one instrument.")
+    return "length" if wire else "xyz"
+
+
+def _check_measured(file: TableFile, model: RobotModel, place: str) -> None:
+    """Raise `InputError` where a file is evidently another program's, or a plan that is still to be measured."""
+
+    def there(quantity: str) -> bool:
+        mapped = model.config.signals
+        named = mapped[quantity].columns if quantity in mapped else ()
+        return not {*standard_columns(quantity, model.n), *named}.isdisjoint(file.columns)
+
+    if not there("q") and "pose" not in file.columns:
+        raise file.error(
+            f"there is no column pose, nor q1 … q{model.n}; 'flexcal import' makes such a file of one with other columns."
+        )
+    if there("q") and not there(place):
+        raise file.error(
+            "there are joint positions, but no measured points x, y, z; measure these poses, and convert the measurements with "
+            "'flexcal import'."
+        )
+
+
+def _first_station(model: RobotModel) -> str:
+    return next(iter(getattr(model, "stations", ())), "tracker")

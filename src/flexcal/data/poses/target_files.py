@@ -1,0 +1,159 @@
+"""Tool targets on disk: CSV or Parquet."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.data.poses.columns import (
+    first_point,
+    payload_column,
+    target_column,
+    unit_quaternions,
+    whole_numbers,
+)
+from flexcal.data.poses.tool_targets import ToolTargets
+from flexcal.data.tables import (
+    Table,
+    TableFile,
+    assign,
+    check_joint_units,
+    mapped_signals,
+    open_table,
+    standard_columns,
+    write_table,
+)
+from flexcal.model.parts import rotation_wxyz, wxyz_rotation
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import RobotModel
+
+
+def read_targets(path: str | Path, model: RobotModel) -> ToolTargets:
+    """Read tool targets: `pose`, with q1…qn, or x, y, z and optionally qw, qx, qy, qz, or both.
+
+    Optional are `target`, `station` and `payload`. Raises `InputError` with file, line and column for a missing, unknown or partial
+    column, a value that is missing or no number, angles that cannot be in rad, points that cannot be in m, an unknown target or station, a
+    pose number that stands twice, a negative payload and a quaternion that is not of unit norm.
+    """
+    file = open_table(path)
+    texts = tuple(name for name in ("target", "station") if name in file.columns)
+    signals = assign(file, model, ("pose",), ("q", "xyz", "quaternion", "payload"), texts)
+    if "q" not in signals and "xyz" not in signals:
+        raise file.error(
+            f"there are no target positions; add x, y, z, or q1…q{model.n} of the nominal command."
+        )
+    for name in ("quaternion", "station"):
+        if (name in signals or name in texts) and "xyz" not in signals:
+            raise file.error(f"there is '{name}' but no x, y, z; add them, or remove it.")
+    table = file.read(texts)
+    found = {name: signal.values(table) for name, signal in signals.items()}
+    if "q" in found:
+        check_joint_units(model, table, signals["q"], found["q"])
+    if "xyz" in found and "station" not in texts:
+        _check_metres(table, signals["xyz"].columns, found["xyz"], model.reach)
+    if "station" in texts:
+        _check_stations(table, model)
+    pose = whole_numbers(table, signals["pose"].columns[0], found["pose"][:, 0])
+    quaternion = (
+        unit_quaternions(table, signals["quaternion"], found["quaternion"]) if "quaternion" in found else None
+    )
+    targets = ToolTargets(
+        pose=pose,
+        target=_points(file, table, model),
+        q=found.get("q"),
+        position=found.get("xyz"),
+        rotation=None if quaternion is None else wxyz_rotation(quaternion),
+        station=table.columns["station"] if "station" in texts else None,
+        payload=payload_column(table, signals, model),
+    )
+    _check_once(table, pose)
+    return targets
+
+
+def write_commands(
+    path: str | Path, model: RobotModel, commands: ToolTargets, unambiguous: np.ndarray, like: TableFile
+) -> None:
+    """Write motor commands as CSV or Parquet: `pose`, q1…qn, `target`, `payload` where given, `unambiguous` (N,).
+
+    Where the file `like` has the columns that `signals:` maps to q, the commands stand in these, in their units. Raises `InputError`
+    where the mapping has no inverse.
+    """
+    mapped = mapped_signals(model).get("q")
+    columns = _columns(commands)
+    if mapped is not None and commands.q is not None and set(mapped.columns) <= set(like.columns):
+        own = standard_columns("q", model.n)
+        kept = {name: values for name, values in columns.items() if name not in own}
+        columns = {"pose": kept.pop("pose")} | mapped.columns_of(commands.q) | kept
+    write_table(path, columns | {"unambiguous": unambiguous})
+
+
+def read_commands(path: str | Path, model: RobotModel) -> ToolTargets:
+    """Read motor commands: `pose`, q1…qn, and where given `target` and `payload`; `unambiguous` is not looked at.
+
+    Raises `InputError` as `read_targets` does.
+    """
+    file = open_table(path)
+    texts = tuple(name for name in ("target", "unambiguous") if name in file.columns)
+    signals = assign(file, model, ("pose", "q"), ("payload",), texts)
+    table = file.read(texts)
+    q = signals["q"].values(table)
+    check_joint_units(model, table, signals["q"], q)
+    pose = whole_numbers(table, signals["pose"].columns[0], signals["pose"].values(table)[:, 0])
+    _check_once(table, pose)
+    return ToolTargets(pose, _points(file, table, model), q, payload=payload_column(table, signals, model))
+
+
+def write_targets(path: str | Path, targets: ToolTargets) -> None:
+    """Write targets as CSV or Parquet, with the columns that `read_targets` reads."""
+    write_table(path, _columns(targets))
+
+
+def _columns(targets: ToolTargets) -> dict[str, np.ndarray]:
+    columns: dict[str, np.ndarray] = {"pose": targets.pose}
+    turn = None if targets.rotation is None else rotation_wxyz(targets.rotation)
+    for quantity, values in (("q", targets.q), ("xyz", targets.position), ("quaternion", turn)):
+        if values is not None:
+            names = standard_columns(quantity, values.shape[1])
+            columns |= {name: values[:, i] for i, name in enumerate(names)}
+    texts = {"target": targets.target, "station": targets.station, "payload": targets.payload}
+    return columns | {name: values for name, values in texts.items() if values is not None}
+
+
+def _points(file: TableFile, table: Table, model: RobotModel) -> np.ndarray:
+    if "target" in file.columns:
+        return target_column(table, model)
+    return np.full(len(table), first_point(file, model))
+
+
+def _check_once(table: Table, pose: np.ndarray) -> None:
+    first = np.unique(pose, return_index=True)[1]
+    if len(first) < len(pose):
+        row = int(np.setdiff1d(np.arange(len(pose)), first)[0])
+        raise table.error(row, "pose", f"{pose[row]} stands twice; give every target its own number.")
+
+
+def _check_stations(table: Table, model: RobotModel) -> None:
+    for row, name in enumerate(table.columns["station"].tolist()):
+        if name not in model.stations:
+            known = ", ".join(model.stations)
+            raise table.error(row, "station", f"there is no station '{name}' in robot.yaml; it has {known}.")
+
+
+def _check_metres(table: Table, columns: tuple[str, ...], position: np.ndarray, reach: float) -> None:
+    """Raise `InputError` for the first point that lies ten times farther from the base than the robot reaches."""
+    distance = np.linalg.norm(position, axis=1)
+    if (distance > 10 * reach).any():
+        row = int(np.argmax(distance > 10 * reach))
+        likely = np.median(distance) * 1e-3 < 2 * reach and np.median(distance) > 10 * reach
+        advice = (
+            "these look like millimetres: convert them to m, or declare 'unit: mm' under `signals:`."
+            if likely
+            else "correct or remove the line."
+        )
+        place = (
+            f"the point lies {distance[row]:.4g} m from the robot's base, but the robot reaches {reach:.3g} m"
+        )
+        raise table.error(row, columns[int(np.argmax(np.abs(position[row])))], f"{place}; {advice}")

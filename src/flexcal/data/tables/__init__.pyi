@@ -1,0 +1,36 @@
+from .joint_limits import check_joint_limits, check_joint_units
+from .signals import (
+    JOINT_QUANTITIES,
+    TIMESTAMP,
+    UNITS,
+    VECTORS,
+    Signal,
+    assign,
+    mapped_signals,
+    standard_columns,
+    timestamp_columns,
+)
+from .tabular_file import Table, TableFile, open_table, tables_in, write_table
+from .timestamps import STAMP, seconds_of, with_seconds
+
+__all__ = [
+    "JOINT_QUANTITIES",
+    "STAMP",
+    "TIMESTAMP",
+    "UNITS",
+    "VECTORS",
+    "Signal",
+    "Table",
+    "TableFile",
+    "assign",
+    "check_joint_limits",
+    "check_joint_units",
+    "mapped_signals",
+    "open_table",
+    "seconds_of",
+    "standard_columns",
+    "tables_in",
+    "timestamp_columns",
+    "with_seconds",
+    "write_table",
+]

@@ -1,0 +1,359 @@
+"""Strict reading of tables, CSV or Parquet: every cell must be present and finite."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Collection, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, BinaryIO
+
+import numpy as np
+
+from flexcal.errors import InputError, unreadable
+from flexcal.files.transaction import atomic_path, current
+from flexcal.units import LARGEST
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_SHOWN = 4
+"""Tables named of a folder's."""
+BLOCK_BYTES = 64 * 2**20
+_DECODED = 100_000
+"""Rows of Parquet that are decoded together: to slice some, all of their row group is."""
+_QUOTED = 20
+"""Letters of a number that a message quotes."""
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """Rows of a file: numbers as float64 arrays (N,), texts as arrays (N,) of `str`, by column."""
+
+    file: TableFile
+    first: int
+    columns: Mapping[str, np.ndarray]
+
+    def __len__(self) -> int:
+        return len(next(iter(self.columns.values())))
+
+    def error(self, row: int, column: str | None, sentence: str) -> InputError:
+        """An `InputError` that places `sentence` at a row (index in this table) and a column."""
+        place = f"{self.file.path} {self.file.row_word} {self.first + row}"
+        return InputError(f"{place}{f', column {column}' if column else ''}: {sentence}")
+
+
+@dataclass(frozen=True)
+class TableFile:
+    """A table whose header is read. `first` is the number of its first row: a line in CSV, else counted from 1."""
+
+    path: Path
+    columns: tuple[str, ...]
+    first: int
+
+    @property
+    def row_word(self) -> str:
+        return "line" if self.path.suffix == ".csv" else "row"
+
+    def error(self, sentence: str) -> InputError:
+        """An `InputError` about the header."""
+        place = f" line {self.first - 1}" if self.path.suffix == ".csv" else ""
+        return InputError(f"{self.path}{place}: {sentence}")
+
+    def read(self, texts: Collection[str] = ()) -> Table:
+        """All rows; `texts` are the columns that hold names. Raises `InputError` with row and column of the first fault."""
+        blocks = list(self.blocks(texts, None))
+        if not blocks:
+            raise self.error("the file has a header but no rows; add some.")
+        return blocks[0]
+
+    def blocks(self, texts: Collection[str] = (), rows: int | None = 1_000_000) -> Iterator[Table]:
+        """The rows in blocks of about this many (None: all at once), in order; raises `InputError` as `read` does."""
+        if self.path.suffix == ".csv":
+            yield from self._csv_blocks(texts, rows)
+        else:
+            yield from self._parquet_blocks(texts, rows)
+
+    def _csv_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
+        line = self.first
+        with _open(self.path) as stream:
+            for _ in range(self.first - 1):
+                stream.readline()
+            size = None if rows is None else max(1, min(BLOCK_BYTES, rows * 12 * len(self.columns)))
+            for content in _whole_lines(stream, size):
+                table = Table(self, line, _parse(self, content, texts, line))
+                yield table
+                line += len(table)
+
+    def _parquet_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
+        import polars as pl
+
+        scan = pl.scan_parquet(current(self.path))
+        try:
+            schema = scan.collect_schema()
+            for column in self.columns:
+                if column not in texts and not schema[column].is_numeric():
+                    raise self.error(
+                        f"the column '{column}' holds {schema[column]}, not numbers; convert it."
+                    )
+            scan = scan.with_columns(
+                [pl.col(c).cast(pl.String if c in texts else pl.Float64) for c in self.columns]
+            )
+            start = 0
+            while True:
+                decoded = scan if rows is None else scan.slice(start, max(1, _DECODED // rows) * rows)
+                frames = decoded.collect()
+                if not len(frames):
+                    return
+                for frame in frames.iter_slices(rows or len(frames)):
+                    table = Table(self, 1 + start, _arrays(frame))
+                    _check_finite(table, frame)
+                    yield table
+                    start += len(frame)
+                if rows is None:
+                    return
+        except pl.exceptions.PolarsError as problem:
+            raise InputError(
+                f"{self.path}: not a readable Parquet file ({_one_line(problem)}); export it again."
+            ) from problem
+
+
+def open_table(path: str | Path) -> TableFile:
+    """Read the header of a `.csv` (lines that start with # may precede it) or `.parquet` file.
+
+    Raises `InputError` where the file cannot be read, has no header, or names a column twice.
+    """
+    path = Path(path)
+    if path.is_dir():
+        raise InputError(f"{path} is a folder; name a table{tables_in(path)}.")
+    if path.suffix not in (".csv", ".parquet"):
+        raise InputError(f"{path}: a table must end in .csv or .parquet; convert it or rename it.")
+    with _open(path) as stream:
+        if path.suffix == ".csv":
+            columns, first = _csv_header(path, stream)
+            file = TableFile(path, columns, first)
+        else:
+            file = TableFile(path, _parquet_columns(path), 1)
+    twice = [name for i, name in enumerate(file.columns) if name in file.columns[:i]]
+    if twice:
+        raise file.error(f"the column '{twice[0]}' stands twice; rename or remove one.")
+    return file
+
+
+def write_table(path: str | Path, columns: Mapping[str, np.ndarray]) -> None:
+    """Write columns (N,) as CSV or Parquet by the file's suffix, atomically; numbers come back bit by bit."""
+    import polars as pl
+
+    path = Path(path)
+    if path.suffix not in (".csv", ".parquet"):
+        raise InputError(f"{path}: a table must end in .csv or .parquet; give another name.")
+    frame = pl.DataFrame({name: pl.Series(values) for name, values in columns.items()})
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        if path.suffix == ".csv":
+            frame.write_csv(stream)
+        else:
+            frame.write_parquet(stream)
+
+
+def tables_in(folder: Path) -> str:
+    """Which tables a folder holds, for a message; a few of them."""
+    try:
+        tables = [file for file in folder.iterdir() if file.suffix in (".csv", ".parquet")]
+    except OSError:
+        tables = []
+    found = [str(file) for file in sorted(tables, key=lambda file: (file.stem != "poses", file.name))]
+    if not found:
+        return "; there is none in it"
+    if len(found) == 1:
+        return f" in it, {found[0]}"
+    shown = ", ".join(found[:_SHOWN]) + (f" and {len(found) - _SHOWN} others" if len(found) > _SHOWN else "")
+    return f" in it: {shown}"
+
+
+def _open(path: Path) -> BinaryIO:
+    try:
+        return current(path).open("rb")
+    except OSError as problem:
+        raise unreadable(path, problem) from problem
+
+
+def _parquet_columns(path: Path) -> tuple[str, ...]:
+    import polars as pl
+
+    try:
+        str(path).encode("utf-8")
+    except UnicodeEncodeError:
+        raise InputError(f"{path}: the path of a Parquet file must be UTF-8; rename what is not.") from None
+    try:
+        return tuple(pl.read_parquet_schema(current(path)))
+    except (pl.exceptions.PolarsError, OSError) as problem:
+        raise InputError(
+            f"{path}: not a readable Parquet file ({_one_line(problem)}); export it again."
+        ) from problem
+
+
+def _csv_header(path: Path, stream: BinaryIO) -> tuple[tuple[str, ...], int]:
+    for number, raw in enumerate(stream, start=1):
+        text = _decoded(path, raw, number).lstrip("\ufeff").strip()
+        if not text or text.startswith("#"):
+            continue
+        if "\r" in text:
+            raise InputError(
+                f"{path} line {number}: lines end with CR alone; save the file with other line ends, or let 'flexcal import' read it."
+            )
+        names = tuple(_row(path, number, text))
+        if len(names) == 1 and any(mark in text for mark in ";\t"):
+            raise InputError(
+                f"{path} line {number}: the columns are not separated by commas; save it with commas, or let 'flexcal import' read it."
+            )
+        if all(_is_number(name) for name in names):
+            raise InputError(
+                f"{path} line {number}: the header with the names of the columns is missing; add it."
+            )
+        if "" in names:
+            raise InputError(
+                f"{path} line {number}: column {names.index('') + 1} has no name; name or remove it."
+            )
+        return names, number + 1
+    raise InputError(f"{path} line 1: the file is empty; it needs a header and rows.")
+
+
+def _decoded(path: Path, raw: bytes, line: int) -> str:
+    try:
+        return raw.decode("utf-8")
+    except UnicodeDecodeError as problem:
+        raise InputError(
+            f"{path} line {line}: not UTF-8 text; save the file as UTF-8, or let 'flexcal import' read it."
+        ) from problem
+
+
+def _whole_lines(stream: BinaryIO, size: int | None) -> Iterator[bytes]:
+    """The rest of the stream in parts that end with a line; blank lines at its very end are left out."""
+    rest = b""
+    while True:
+        content = stream.read() if size is None else stream.read(size)
+        if size is None or not content:
+            last = (rest + content).rstrip()
+            if last:
+                yield last
+            return
+        cut = content.rfind(b"\n") + 1
+        if cut:
+            part = rest + content[:cut]
+            kept = part.rstrip(b"\r\n \t")
+            end = (
+                part.find(b"\n", len(kept)) + 1
+            )  # blank lines at the end of a part wait for what follows them
+            if kept:
+                yield part[:end]
+                rest = part[end:] + content[cut:]
+            else:
+                rest = part + content[cut:]
+        else:
+            rest += content
+
+
+def _parse(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
+    import polars as pl
+
+    schema = {name: pl.String if name in texts else pl.Float64 for name in file.columns}
+    try:
+        frame = pl.read_csv(io.BytesIO(content), has_header=False, schema=schema)
+    except pl.exceptions.PolarsError:
+        return _read_cells(file, content, texts, line)
+    arrays = _arrays(frame)
+    if any(frame[c].null_count() or (c not in texts and not _measurable(v).all()) for c, v in arrays.items()):
+        return _read_cells(file, content, texts, line)
+    return arrays
+
+
+def _arrays(frame: pl.DataFrame) -> dict[str, np.ndarray]:
+    return {name: _array(frame[name]) for name in frame.columns}
+
+
+def _array(series: pl.Series) -> np.ndarray:
+    if not series.dtype.is_numeric():
+        return np.array([value or "" for value in series.to_list()], dtype=str)
+    return series.to_numpy()
+
+
+def _read_cells(file: TableFile, content: bytes, texts: Collection[str], line: int) -> dict[str, np.ndarray]:
+    """The slow way, cell by cell, which finds the first fault; raises `InputError` there."""
+    cells: dict[str, list[Any]] = {name: [] for name in file.columns}
+    for number, raw in enumerate(content.split(b"\n"), start=line):
+        text = _decoded(file.path, raw, number).strip("\r")
+        if not text and number == line + content.count(b"\n"):
+            break
+        if not text.strip():
+            raise InputError(f"{file.path} line {number}: the line is empty; remove it.")
+        row = _row(file.path, number, text)
+        if len(row) != len(file.columns):
+            raise InputError(
+                f"{file.path} line {number}: there are {len(row)} values, but the header names {len(file.columns)} columns; "
+                "complete the line or remove it."
+            )
+        for name, cell in zip(file.columns, row, strict=True):
+            fault = _fault(cell, name in texts)
+            if fault:
+                raise InputError(f"{file.path} line {number}, column {name}: {fault}")
+            cells[name].append(cell if name in texts else float(cell))
+    return {
+        name: np.array(values, dtype=str if name in texts else np.float64) for name, values in cells.items()
+    }
+
+
+def _row(path: Path, line: int, text: str) -> list[str]:
+    try:
+        return [cell.strip() for cell in next(csv.reader([text]))]
+    except csv.Error as problem:
+        raise InputError(f"{path} line {line}: the line cannot be read ({problem}); correct it.") from problem
+
+
+def _measurable(values: np.ndarray) -> np.ndarray:
+    """Which of some numbers (N,) can be measurements: finite, and below `LARGEST`."""
+    return np.abs(values) <= LARGEST
+
+
+def _fault(cell: str, is_text: bool) -> str | None:
+    if not cell:
+        return "the value is missing; complete or remove this line, and others like it."
+    if is_text:
+        return None
+    if not _is_number(cell):
+        comma = " with a decimal point" if _is_number(cell.replace(",", ".")) else ""
+        return f"'{cell}' is not a number; write one{comma}."
+    number = float(cell)
+    if not abs(number) <= LARGEST:
+        shown = cell if len(cell) < _QUOTED else f"{number:g}"
+        return f"the value is {shown}, which is no measurement; remove this line, and others like it, or measure them again."
+    return None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell
+
+
+def _check_finite(table: Table, frame: pl.DataFrame) -> None:
+    for name, values in table.columns.items():
+        if frame[name].null_count():
+            raise table.error(
+                int(np.argmax(frame[name].is_null().to_numpy())),
+                name,
+                "the value is missing; complete or remove this row, and others like it.",
+            )
+        if values.dtype.kind == "f" and not _measurable(values).all():
+            row = int(np.argmin(_measurable(values)))
+            raise table.error(
+                row,
+                name,
+                f"the value is {values[row]}, which is no measurement; remove this row, and others like it, or measure them again.",
+            )
+
+
+def _one_line(problem: BaseException) -> str:
+    return " ".join(str(problem).split())

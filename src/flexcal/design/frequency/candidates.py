@@ -1,0 +1,72 @@
+"""Random candidate poses of frequency experiments: room for the motion, no collision, gaps closed by gravity."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan
+from flexcal.design.frequency.backlash_limit import gap_load, share
+from flexcal.design.frequency.multisines import room
+from flexcal.design.poses import preloaded
+from flexcal.design.scene import CollisionChecker
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import joint_ranges
+from flexcal.progress import Progress, silent
+
+_BATCH = 256
+_TRIES = 400
+
+
+class ExcitablePoses:
+    """Where a robot can be excited as `plan` says: within its limits with room for the motion, touching nothing, every gap closed.
+
+    The robot is checked for collisions at the middle and at both ends of the reference motion. Raises `FlexcalError` that names the joint
+    whose range is too small for the motion.
+    """
+
+    def __init__(self, checker: CollisionChecker, plan: MultisinePlan) -> None:
+        self.checker, self.plan, self.model = checker, plan, checker.model
+        lower, upper = joint_ranges(self.model)
+        need = room(self.model, plan.reference_amplitude)
+        self.lower, self.upper = lower + need, upper - need
+        for name, low, high, free in zip(self.model.joint_names, self.lower, self.upper, need, strict=True):
+            if low >= high:
+                raise FlexcalError(
+                    f"the limits of {name} leave less room than the {np.degrees(free):.3g}° that the motion under the excitation needs "
+                    "on either side; lower the reference motion."
+                )
+
+    def random(self, count: int, rng: np.random.Generator, progress: Progress = silent) -> np.ndarray:
+        """`count` poses (count, n) rad, uniform; raises `FlexcalError`, with what each check threw out, where too few are found."""
+        found: list[np.ndarray] = []
+        lost = {"gravity preload": 0, "collision": 0}
+        for drawn in range(1, _TRIES + 1):
+            q = rng.uniform(self.lower, self.upper, (_BATCH, self.model.n))
+            found += list(self.kept(q, lost))
+            progress("candidates", min(1.0, len(found) / count))
+            if len(found) >= count:
+                return np.array(found[:count])
+            if drawn * _BATCH >= 40 * count + 1000 and len(found) < 0.02 * count:
+                break
+        losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
+        raise FlexcalError(
+            f"of {drawn * _BATCH} random poses of {self.model.name} only {len(found)} of the wanted {count} can be excited: {losses}; "
+            "lower the excitation or the reference motion, or hold a heavier payload."
+        )
+
+    def near(self, q: np.ndarray, count: int, spread: float, rng: np.random.Generator) -> np.ndarray:
+        """Of `count` poses about each of `q` (P, n), with the standard deviation `spread` (rad) in every joint, those that can be used."""
+        moved = np.repeat(q, count, axis=0) + spread * rng.standard_normal((count * len(q), self.model.n))
+        return self.kept(np.clip(moved, self.lower, self.upper))
+
+    def kept(self, q: np.ndarray, lost: dict[str, int] | None = None) -> np.ndarray:
+        """Those of `q` (samples, n) that pass all checks; what each throws out is added to `lost`."""
+        lost = {"gravity preload": 0, "collision": 0} if lost is None else lost
+        swing = np.isin(np.arange(self.model.n), self.plan.joints) * self.plan.reference_amplitude
+        ends = np.outer([0.0, 1.0, -1.0], swing)
+        held = q[preloaded(self.model, q, self.plan.payload)]
+        free = [x for x in held if not self.checker.collides(x + ends).any()]
+        closed = [x for x in free if share(gap_load(self.model, x, self.plan), self.plan.amplitude) >= 1]
+        lost["collision"] += len(held) - len(free)
+        lost["gravity preload"] += len(q) - len(held) + len(free) - len(closed)
+        return np.array(closed).reshape(-1, self.model.n)

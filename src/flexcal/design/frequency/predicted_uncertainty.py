@@ -1,0 +1,88 @@
+"""Predicted standard deviations from the frequency responses of a plan."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan
+from flexcal.design.frequency.response_jacobian import (
+    PoseResponse,
+    friction_in,
+    known_before,
+    pose_response,
+    response_parameters,
+)
+from flexcal.design.frequency.response_noise import COMMON_SENSORS, ResponseSensors
+from flexcal.design.frequency.spring_precision import largest_stiffness_std, spring_std
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Parameters, Sensitivity
+from flexcal.model.robot import RobotModel
+
+FEWEST, MOST = 3, 24
+"""Realisations: fewer leave no covariance, more bring next to nothing."""
+MOST_PERIODS = 16
+"""Kept periods of a recording."""
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedResponses:
+    """The `responses` in the poses of `plan`, and the shared `parameters` with the `prior_information` (p, p) about them."""
+
+    plan: MultisinePlan
+    parameters: Parameters
+    prior_information: np.ndarray
+    responses: tuple[PoseResponse, ...]
+
+    @classmethod
+    def of(
+        cls, model: RobotModel, plan: MultisinePlan, sensors: ResponseSensors = COMMON_SENSORS
+    ) -> PlannedResponses:
+        """Of a robot as it is known."""
+        parameters = response_parameters(model, plan)
+        responses = (
+            pose_response(model, q, plan, parameters, friction_in(model, q, plan), sensors)
+            for q in plan.poses
+        )
+        return cls(plan, parameters, known_before(model, parameters), tuple(responses))
+
+    @cached_property
+    def sensitivity(self) -> Sensitivity:
+        """Every pose of the plan as a candidate."""
+        rows = np.array([response.rows(self.plan) for response in self.responses])
+        return Sensitivity(rows, self.parameters, self.prior_information)
+
+    def std(self) -> dict[str, float]:
+        """Predicted relative standard deviation of every stiffness and damping."""
+        return spring_std(self.sensitivity)
+
+    def reaching(self, wanted: float) -> PlannedResponses:
+        """With the realisations and periods of the shortest experiment in which every stiffness has the `wanted` standard deviation.
+
+        Kept periods come in twos, after which the reference motion repeats. Raises `FlexcalError` that says what is reached where the
+        distortion that realisations share, or what is not known of the links, leaves more.
+        """
+        step = self.plan.periods - self.plan.settle_periods
+        tried = [
+            (realisations * (self.plan.settle_periods + kept), realisations, kept)
+            for realisations in range(FEWEST, MOST + 1)
+            for kept in range(step, MOST_PERIODS + 1, step)
+        ]
+        most = self._measured(MOST, MOST_PERIODS // step * step)
+        name, reached = largest_stiffness_std(most.sensitivity)
+        if reached > wanted:
+            raise FlexcalError(
+                f"a standard deviation of {100 * wanted:g} % is not reached with any duration: {MOST} realisations leave "
+                f"{100 * reached:.2g} % for {name}; choose more poses or hold a payload off the wrist's axis."
+            )
+        for _, realisations, kept in sorted(tried):
+            found = self._measured(realisations, kept)
+            if largest_stiffness_std(found.sensitivity)[1] <= wanted:
+                return found
+        return most
+
+    def _measured(self, realisations: int, kept: int) -> PlannedResponses:
+        periods = self.plan.settle_periods + kept
+        return replace(self, plan=replace(self.plan, realisations=realisations, periods=periods))

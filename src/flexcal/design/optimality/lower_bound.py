@@ -1,0 +1,37 @@
+"""Lower bound of the criterion for a number of poses, from the equivalence theorem."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.design.optimality.criteria import TraceOptimal
+from flexcal.design.optimality.rank_updates import greedy
+from flexcal.estimation import Sensitivity
+
+LOOKED_AT = 2000
+"""Candidates among which a good design is sought."""
+SPREAD = 4
+"""Candidates in that design, per parameter: so many that their weights come near the best."""
+
+
+def least_trace(sensitivity: Sensitivity, criterion: TraceOptimal, counts: np.ndarray) -> np.ndarray:
+    """Numbers (K,) that tr(W M'⁻¹) of no set of `counts` (K,) candidates is below, M' their information with the prior P.
+
+    tr(W M⁻¹) is convex in M and goes with 1/t as M with t, so that for every M', M and t > 0 it is at least 2 φ/t - tr(S M')/t², with φ
+    its value and S = M⁻¹ W M⁻¹ at M; the best t is tr(S M')/φ, and tr(S M') is at most tr(S P) + count · maxᵢ tr(S ΘᵢᵀΘᵢ). Whatever M,
+    φ² / (tr(S P) + count · maxᵢ tr(S ΘᵢᵀΘᵢ)) is such a number, and the nearer M is to optimal the tighter (Pukelsheim, Optimal Design
+    of Experiments, ch. 7). M here is of a large set found greedily, weighted to as many poses as the counts are in the middle.
+    """
+    size, prior = len(sensitivity.parameters), sensitivity.prior_information
+    few = np.unique(np.linspace(0, len(sensitivity) - 1, min(len(sensitivity), LOOKED_AT)).astype(int))
+    looked_at = sensitivity.subset(few)
+    many = min(len(few), SPREAD * size)
+    rows = looked_at.jacobian[greedy(looked_at, many, criterion).chosen].reshape(-1, size)
+    middle = float(np.sqrt(np.min(counts) * np.max(counts)))
+    information = prior + middle / many * (rows.T @ rows)
+    value = criterion.trace(information)
+    slope = 2 * value * criterion.gradient(information)
+    values, vectors = np.linalg.eigh(slope)
+    seen = sensitivity.jacobian.reshape(-1, size) @ (vectors * np.sqrt(np.maximum(values, 0.0)))
+    best = float(np.square(seen, out=seen).reshape(len(sensitivity), -1).sum(axis=1).max())
+    return value**2 / (float(np.sum(slope * prior)) + np.asarray(counts) * best)

@@ -1,0 +1,42 @@
+from .accuracy_curve import PoseCurve, pose_curve
+from .candidates import random_candidates
+from .feasibility import PoseCandidates, pose_candidates
+from .geometry_sensitivity import (
+    BaseSensitivity,
+    Tolerances,
+    base_sensitivity,
+    geometry_jacobian,
+    pose_sensitivity,
+)
+from .gravity_preload import preloaded
+from .ordering import VisitingOrder, visiting_order
+from .selection import CriterionName, PoseDesign, choose_poses, design_poses, fewest_poses, random_poses
+from .sequential_selection import NextPoses, next_poses
+from .working_volume import WorkingVolume, working_box, working_points
+
+__all__ = [
+    "BaseSensitivity",
+    "CriterionName",
+    "NextPoses",
+    "PoseCandidates",
+    "PoseCurve",
+    "PoseDesign",
+    "Tolerances",
+    "VisitingOrder",
+    "WorkingVolume",
+    "base_sensitivity",
+    "choose_poses",
+    "design_poses",
+    "fewest_poses",
+    "geometry_jacobian",
+    "next_poses",
+    "pose_candidates",
+    "pose_curve",
+    "pose_sensitivity",
+    "preloaded",
+    "random_candidates",
+    "random_poses",
+    "visiting_order",
+    "working_box",
+    "working_points",
+]

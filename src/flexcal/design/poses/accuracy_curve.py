@@ -1,0 +1,66 @@
+"""Predicted tool error against the number of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.design.optimality import TraceOptimal, greedy
+from flexcal.design.poses.selection import PoseDesign, tool_error
+from flexcal.errors import FlexcalError
+from flexcal.progress import Progress, silent
+
+
+@dataclass(frozen=True, eq=False)
+class PoseCurve:
+    """Root mean square tool error (K,), m, predicted after measuring `counts` (K,) poses: `chosen` one by one, and at `random`.
+
+    `random` is the median over sets drawn from the same candidates. Both are from tracker noise alone.
+    """
+
+    counts: np.ndarray
+    chosen: np.ndarray
+    random: np.ndarray
+
+    def enough(self, excess: float = 0.1) -> int:
+        """The first count after which the chosen error falls by less than `excess` (relative) when the poses are doubled.
+
+        Noise alone falls by √½ with every doubling, so what is compared is the excess over that law. The last count if none does.
+        """
+        scaled = self.chosen * np.sqrt(self.counts)
+        level = scaled[-1]
+        good = np.flatnonzero(scaled <= (1 + excess) * level)
+        return int(self.counts[good[0]])
+
+
+def pose_curve(
+    design: PoseDesign,
+    *,
+    rng: np.random.Generator,
+    counts: Sequence[int] = (),
+    random_sets: int = 15,
+    progress: Progress = silent,
+) -> PoseCurve:
+    """The curve for `counts`, by default from the fewest that determine the parameters to four times as many as were chosen.
+
+    The chosen sets are nested (each adds the best candidate), so they lie slightly above what an exchange for that count reaches.
+    """
+    sensitivity = design.base.sensitivity
+    total, rows, size = sensitivity.jacobian.shape
+    least = -(-size // rows)
+    if not len(counts):
+        most = min(total, 4 * len(design.plan))
+        counts = np.unique(np.geomspace(least, most, 16).round().astype(int)).tolist()
+    if min(counts) < 1 or max(counts) > total:
+        raise FlexcalError(f"counts must lie between 1 and the {total} candidates.")
+    progress("how many", 0.0)
+    order = greedy(sensitivity, max(counts), TraceOptimal(design.tool_weight, "c")).chosen
+    chosen = [tool_error(design.base, design.tool_weight, order[:k]) for k in counts]
+    random = []
+    for k in counts:
+        sets = (rng.choice(total, k, replace=False) for _ in range(random_sets))
+        random.append(np.median([tool_error(design.base, design.tool_weight, drawn) for drawn in sets]))
+        progress("how many", len(random) / len(counts))
+    return PoseCurve(np.array(counts), np.array(chosen), np.array(random))

@@ -1,0 +1,70 @@
+"""Random candidate configurations: within limits, free of collision, visible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from flexcal.design.poses.gravity_preload import preloaded
+from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup, visible
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import joint_ranges, point_kinematics
+from flexcal.progress import Progress, silent
+
+_TRIES = 100
+
+
+def random_candidates(
+    checker: CollisionChecker,
+    count: int,
+    rng: np.random.Generator,
+    setup: MeasuringSetup = STANDARD,
+    *,
+    preload: bool = False,
+    progress: Progress = silent,
+) -> np.ndarray:
+    """`count` configurations (count, n), uniform over the joint ranges where nothing collides and the target is seen.
+
+    With `preload`, only those where gravity surely settles the flank of every backlash. The target too stays above the floor. Only the
+    poses are checked, not the ways between them. Raises `FlexcalError`, with what each check threw out, when too few are left.
+    """
+    model = checker.model
+    lower, upper = joint_ranges(model)
+    checks: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "floor": lambda q: above_floor(checker, q, setup.point)
+    }
+    if preload:
+        checks["flank preload"] = lambda q: preloaded(model, q, setup.payload)
+    checks["collision"] = lambda q: ~checker.collides(q)
+    checks["visibility"] = lambda q: visible(checker, q, setup)
+    lost = dict.fromkeys(checks, 0)
+    found: list[np.ndarray] = []
+    have = drawn = 0
+    while have < count:
+        progress("candidates", have / count)
+        if drawn >= _TRIES * count + 1000:
+            losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
+            raise FlexcalError(
+                f"of {drawn} random poses of {model.name} only {have} of the wanted {count} are usable: {losses}; "
+                "relax the most restrictive one (station, acceptance, obstacles, floor, payload)."
+            )
+        share = max(have / drawn, 0.02) if drawn else 0.5
+        q = rng.uniform(lower, upper, (int(1.1 * (count - have) / share) + 16, model.n))
+        drawn += len(q)
+        for name, check in checks.items():
+            passed = check(q)
+            lost[name] += int(np.sum(~passed))
+            q = q[passed]
+        found.append(q)
+        have += len(q)
+    progress("candidates", 1.0)
+    return np.concatenate(found or [np.zeros((0, model.n))])[:count]
+
+
+def above_floor(checker: CollisionChecker, q: np.ndarray, point: str | None = None) -> np.ndarray:
+    """Whether the target is above the floor, by the checker's margin, at each configuration of `q` (samples, n), as (samples,) of bool."""
+    if checker.floor is None:
+        return np.ones(len(q), dtype=bool)
+    position = point_kinematics(checker.model, q, point=point, jacobians=False).position
+    return position[:, 2] > checker.floor + checker.margin

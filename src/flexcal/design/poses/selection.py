@@ -1,0 +1,241 @@
+"""Selection of calibration poses, and random verification poses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from flexcal.data.plans import PosePlan
+from flexcal.data.poses import PosePool
+from flexcal.design.optimality import (
+    Criterion,
+    DOptimal,
+    Selection,
+    SpectralCriterion,
+    TraceOptimal,
+    choose,
+    greedy,
+    least_trace,
+    observability,
+)
+from flexcal.design.poses.candidates import random_candidates
+from flexcal.design.poses.feasibility import PoseCandidates, pose_candidates
+from flexcal.design.poses.geometry_sensitivity import BaseSensitivity
+from flexcal.design.poses.gravity_preload import preload_joints
+from flexcal.design.scene import STANDARD, CollisionChecker, MeasuringSetup
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Identifiability
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import gravity_torque
+from flexcal.progress import Progress, silent
+from flexcal.units import MILLIMETRE
+
+CriterionName = Literal["c", "A", "D", "E", "O1", "O2", "O3", "O4", "O5"]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseDesign:
+    """A plan of N poses, with candidates, criterion and predicted errors.
+
+    `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
+    `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
+    (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
+    instrument does not see.
+    """
+
+    plan: PosePlan
+    criterion: Criterion
+    candidates: PosePool
+    selection: Selection
+    base: BaseSensitivity
+    tool_weight: np.ndarray
+    flank_joints: tuple[str, ...]
+    flank: np.ndarray
+    hidden: np.ndarray
+
+    @classmethod
+    def of(
+        cls, found: PoseCandidates, criterion: Criterion, selection: Selection, rng: np.random.Generator
+    ) -> PoseDesign:
+        """The design that takes this `selection` of the candidates; `rng` draws the plan's seed."""
+        chosen = found.pool.q[selection.chosen]
+        loose = list(preload_joints(found.model))
+        return cls(
+            plan=_plan(chosen, found.setup, rng),
+            criterion=criterion,
+            candidates=found.pool,
+            selection=selection,
+            base=found.base,
+            tool_weight=found.tool_weight,
+            flank_joints=tuple(found.model.joint_names[i] for i in loose),
+            flank=np.sign(gravity_torque(found.model, chosen, found.setup.payload))[:, loose],
+            hidden=found.hidden,
+        )
+
+    def in_order(self, order: np.ndarray) -> PoseDesign:
+        """The same poses in this order (N,)."""
+        return replace(
+            self,
+            plan=replace(self.plan, q=self.plan.q[order]),
+            selection=replace(self.selection, chosen=self.selection.chosen[order]),
+            flank=self.flank[order],
+        )
+
+    @property
+    def identifiability(self) -> Identifiability:
+        """Rank of the candidates' kinematic Jacobian, and what absorbed the dropped parameters."""
+        return self.base.identifiability
+
+    @property
+    def numbers(self) -> np.ndarray:
+        """The numbers (N,) of the chosen poses among the candidates, in the order of the plan."""
+        return self.candidates.pose[self.selection.chosen]
+
+    @property
+    def tool_error(self) -> float:
+        """Predicted error of the calibrated tool position, m: root mean square of its length over the working poses.
+
+        From tracker noise alone; what deflection, backlash near its crossing or repeatability add is not in it.
+        """
+        return tool_error(self.base, self.tool_weight, self.selection.chosen)
+
+    @property
+    def least_possible(self) -> float:
+        """A tool error, m, that no choice of as many of the candidates could predict less than (see `least_trace`)."""
+        trace = TraceOptimal(self.tool_weight, "c")
+        return float(least_trace(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
+
+    @property
+    def criteria(self) -> dict[CriterionName, float]:
+        """What every criterion says of the chosen poses.
+
+        `c` is the tool error (m); `A` the sum of the parameters' variances in units of their tolerances and `D` log det M / p, both with
+        the tolerances as prior; `E` (σ_min of ΘᵀΘ) and O1-O5 are of the measurements alone.
+        """
+        sensitivity, chosen = self.base.sensitivity, self.selection.chosen
+        factor = sensitivity.factor(chosen)
+        information = factor.T @ factor
+        seen = observability(sensitivity, chosen)
+        return {
+            "c": self.tool_error,
+            "A": TraceOptimal(np.eye(len(information)), "A").trace(information),
+            "D": DOptimal().merit(information),
+            "E": seen.sigma_min,
+            "O1": seen.o1,
+            "O2": seen.o2,
+            "O3": seen.o3,
+            "O4": seen.o4,
+            "O5": seen.o5,
+        }
+
+
+def tool_error(base: BaseSensitivity, tool_weight: np.ndarray, chosen: np.ndarray) -> float:
+    """Predicted root mean square (m) of the tool error over the working poses behind `tool_weight` after measuring `chosen`."""
+    factor = base.sensitivity.factor(chosen)
+    return TraceOptimal(tool_weight, "c").trace(factor.T @ factor) ** 0.5
+
+
+def design_poses(
+    model: RobotModel,
+    count: int,
+    *,
+    rng: np.random.Generator,
+    criterion: CriterionName = "c",
+    candidates: int | PosePool = 4000,
+    setup: MeasuringSetup = STANDARD,
+    working: np.ndarray | None = None,
+    checker: CollisionChecker | None = None,
+    progress: Progress = silent,
+) -> PoseDesign:
+    """Choose `count` of many random poses, or of a pool of given ones, by exchange (P1 §5.2).
+
+    What counts as a candidate, and `working`, are as in `pose_candidates`. Their sensitivities to the geometric errors are reduced to
+    what can be identified. Criteria: `c` the tool error predicted over the working poses; `A` the sum of the variances in units of the
+    tolerances; `D` the volume of the confidence ellipsoid; `E` σ_min of ΘᵀΘ; `O1`-`O5` the observability indices.
+
+    Raises `FlexcalError` for an unknown criterion, where the poses are fewer than the parameters need, where too few candidates pass the
+    checks, and where all of them press a backlash onto one flank.
+    """
+    found = pose_candidates(
+        model,
+        rng=rng,
+        candidates=candidates,
+        least=count,
+        setup=setup,
+        working=working,
+        checker=checker,
+        progress=progress,
+    )
+    return choose_poses(found, count, rng=rng, criterion=criterion, progress=progress)
+
+
+def choose_poses(
+    found: PoseCandidates,
+    count: int,
+    *,
+    rng: np.random.Generator,
+    criterion: CriterionName = "c",
+    progress: Progress = silent,
+) -> PoseDesign:
+    """As `design_poses`, from candidates that have been found; `rng` draws the plan's seed."""
+    rank = found.base.identifiability.rank
+    if 3 * count < rank:
+        raise FlexcalError(
+            f"{count} poses cannot determine {rank} geometric parameters of {found.model.name}; "
+            f"choose at least {-(-rank // 3)}, better twice as many."
+        )
+    wanted = criterion_named(criterion, found.tool_weight)
+    selection = choose(found.base.sensitivity, count, wanted, progress=progress)
+    return PoseDesign.of(found, wanted, selection, rng)
+
+
+def fewest_poses(found: PoseCandidates, most: int, wanted: float) -> int:
+    """How many candidates, chosen one by one, predict a tool error of at most `wanted` (m); raises `FlexcalError` where `most` do not."""
+    weight, sensitivity = found.tool_weight, found.base.sensitivity
+    order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
+    least = -(-found.base.identifiability.rank // 3)
+    for count in range(least, most + 1):
+        if tool_error(found.base, weight, order[:count]) <= wanted:
+            return count
+    reached = tool_error(found.base, weight, order)
+    raise FlexcalError(
+        f"{most} poses predict a tool error of {reached / MILLIMETRE:.4f} mm from tracker noise alone, not {wanted / MILLIMETRE:.4f} mm; "
+        "allow more poses, or a larger error."
+    )
+
+
+def random_poses(
+    model: RobotModel,
+    count: int,
+    rng: np.random.Generator,
+    setup: MeasuringSetup = STANDARD,
+    *,
+    checker: CollisionChecker | None = None,
+) -> PosePlan:
+    """Verification poses: uniform over the joint ranges, free of collision, visible, on whatever flank they happen to be.
+
+    Raises `FlexcalError` where too few random poses pass the checks.
+    """
+    checker = CollisionChecker(model) if checker is None else checker
+    return _plan(random_candidates(checker, count, rng, setup), setup, rng)
+
+
+def criterion_named(name: CriterionName, weight: np.ndarray) -> Criterion:
+    """The criterion a user names; `weight` (rank, rank) is for `c`. Raises `FlexcalError` for an unknown name."""
+    match name:
+        case "c":
+            return TraceOptimal(weight, "c")
+        case "A":
+            return TraceOptimal(np.eye(len(weight)), "A")
+        case "D":
+            return DOptimal()
+        case "E" | "O1" | "O2" | "O3" | "O4" | "O5":
+            return SpectralCriterion(name)
+    raise FlexcalError(f"there is no criterion '{name}'; choose one of {', '.join(get_args(CriterionName))}.")
+
+
+def _plan(q: np.ndarray, setup: MeasuringSetup, rng: np.random.Generator) -> PosePlan:
+    masses = None if setup.payload is None else np.full(len(q), setup.payload)
+    return PosePlan(q=q, payload=masses, seed=int(rng.integers(2**31)))

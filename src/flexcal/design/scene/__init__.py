@@ -1,0 +1,5 @@
+"""Bodies, obstacles, instrument and line of sight around the robot."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,26 @@
+from .criterion import TrajectoryCriterion
+from .excitation_problem import NEAR
+from .motion_space import Kind
+from .optimisation import TrajectoryDesign, design_trajectories
+from .regressor_columns import TorqueColumns
+from .required_limits import COULOMB, VISCOUS, require_stated_limits, with_assumed_friction
+from .rest_to_rest import TimedMotion, timed_motion
+from .sequences import SequenceName, Stage, sequence
+
+__all__ = [
+    "COULOMB",
+    "NEAR",
+    "VISCOUS",
+    "Kind",
+    "SequenceName",
+    "Stage",
+    "TimedMotion",
+    "TorqueColumns",
+    "TrajectoryCriterion",
+    "TrajectoryDesign",
+    "design_trajectories",
+    "require_stated_limits",
+    "sequence",
+    "timed_motion",
+    "with_assumed_friction",
+]

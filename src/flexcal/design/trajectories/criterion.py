@@ -1,0 +1,202 @@
+"""Criterion of an exciting trajectory, given prior information."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from flexcal.design.optimality import ColumnCondition, Criterion, DOptimal, LeastEigenvalue, TraceOptimal
+from flexcal.design.trajectories.regressor_columns import DRIVE, TorqueColumns
+from flexcal.errors import InputError
+from flexcal.model.robot import RobotModel, declared, uncertain_inertials
+
+TrajectoryCriterion = Literal["compound", "condition", "D", "E", "A", "posterior", "c"]
+_STEP = 1e-4
+_SEEN = 1e-6
+"""Share of an unknown that may lie in what torques and prior leave open."""
+_FAINT = 1e-9
+"""Information on a scaled base parameter that stands for nothing, so that what a joint at rest hides does not stop a search."""
+CONDITIONING = 0.3
+"""Weight of -log cond(W) in the compound criterion, beside log det a parameter: for a tenth more standard deviation of each, condition
+numbers of 5 in place of 15 to 90."""
+_CONDITION = ColumnCondition()
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """Unknowns with `names` (p,): base columns = `directions` (r, p) times them, in units in which `prior` (p, p) is their information."""
+
+    names: tuple[str, ...]
+    directions: np.ndarray
+    prior: np.ndarray
+
+    def information(self, base: np.ndarray) -> np.ndarray:
+        """(p, p) from that on the base columns (r, r), with the prior."""
+        return self.directions.T @ base @ self.directions + self.prior
+
+
+@dataclass(frozen=True, eq=False)
+class TorqueGoal:
+    """A criterion of unknowns after `gathered` information (r, r) on the base columns, and `instants` of a new motion.
+
+    The merit is that of the criterion and, `conditioning` times, -log cond(W) of the base columns: with both, a compound criterion
+    (Atkinson, Donev & Tobias 2007, ch. 21).
+    """
+
+    criterion: Criterion
+    unknowns: Unknowns
+    gathered: np.ndarray
+    instants: float
+    conditioning: float = 0.0
+
+    def total(self, information: np.ndarray) -> np.ndarray:
+        """Information (r, r) on the base columns with a motion whose instants add `information` on average."""
+        return self.gathered + self.instants * information
+
+    def merit(self, information: np.ndarray) -> float:
+        total = self.total(information)
+        merit = self.criterion.merit(self.unknowns.information(total))
+        return merit + self.conditioning * _CONDITION.merit(total) if self.conditioning else merit
+
+    def gradient(self, information: np.ndarray) -> np.ndarray:
+        """Derivative (r, r) of the merit by the mean information of an instant."""
+        total = self.total(information)
+        slope = self.criterion.gradient(self.unknowns.information(total))
+        directions = self.unknowns.directions
+        by_total = directions @ slope @ directions.T
+        if self.conditioning:
+            by_total += self.conditioning * _CONDITION.gradient(total)
+        return self.instants * by_total
+
+    def about(self, wanted: Sequence[str]) -> TorqueGoal:
+        """The same of some of the unknowns only, the others eliminated (Ds-optimality)."""
+        return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(wanted))))
+
+    def after(self, information: np.ndarray) -> TorqueGoal:
+        """The goal of the next motion."""
+        return replace(self, gathered=self.total(information))
+
+
+@dataclass(frozen=True, eq=False)
+class MarginalD:
+    """log det of the information on the `wanted` unknowns, the others eliminated, per wanted one (Ds-optimality)."""
+
+    wanted: np.ndarray
+    name: str = "D"
+    uses_prior: bool = True
+
+    def merit(self, information: np.ndarray) -> float:
+        sign, value = np.linalg.slogdet(information)
+        other = np.linalg.slogdet(information[np.ix_(~self.wanted, ~self.wanted)])[1]
+        return float(value - other) / max(int(self.wanted.sum()), 1) if sign > 0 else -np.inf
+
+    def gradient(self, information: np.ndarray) -> np.ndarray:
+        slope = np.linalg.inv(information)
+        slope[np.ix_(~self.wanted, ~self.wanted)] -= np.linalg.inv(
+            information[np.ix_(~self.wanted, ~self.wanted)]
+        )
+        return slope / max(int(self.wanted.sum()), 1)
+
+
+def torque_goal(
+    columns: TorqueColumns,
+    criterion: TrajectoryCriterion,
+    of: Sequence[str],
+    sizes: np.ndarray,
+    instants: float,
+) -> TorqueGoal:
+    """The goal of the first motion. `sizes` (r,) of the base columns are what D, E and A count them in.
+
+    condition, D, E and A are of the base parameters without prior; posterior (D) and c (the variances of the parameters `of`, which get
+    no prior) of masses, centres of mass and drives with that of robot.yaml; compound is posterior and condition. Raises `InputError` for
+    names that the torques cannot tell.
+    """
+    nothing = np.zeros((columns.rank, columns.rank))
+    if bool(of) != (criterion == "c"):
+        raise InputError(
+            "name the parameters that the criterion c is of, and only for c; for example --criterion c --of link_3.mass."
+        )
+    faint = _FAINT * np.eye(columns.rank)
+    if criterion in ("compound", "posterior", "c"):
+        unknowns = declared_unknowns(columns, tuple(of))
+        if criterion == "c":
+            _require_visible(columns, unknowns, of)
+            chosen = np.isin(unknowns.names, list(of)).astype(float)
+            return TorqueGoal(TraceOptimal(np.diag(chosen), "c"), unknowns, nothing, instants)
+        wanted = np.array([name.rpartition(".")[2] not in DRIVE[1:] for name in unknowns.names])
+        if criterion == "posterior":
+            return TorqueGoal(MarginalD(wanted, criterion), unknowns, nothing, instants)
+        return TorqueGoal(
+            MarginalD(wanted, criterion), unknowns, faint * np.outer(sizes, sizes), instants, CONDITIONING
+        )
+    names = columns.found.kept_names
+    if criterion == "condition":
+        return TorqueGoal(
+            ColumnCondition(), Unknowns(names, np.eye(columns.rank), nothing), nothing, instants
+        )
+    of_base = Unknowns(names, np.diag(1 / sizes), faint)
+    kinds: dict[str, Criterion] = {
+        "D": DOptimal(),
+        "E": LeastEigenvalue(),
+        "A": TraceOptimal(np.eye(columns.rank), "A"),
+    }
+    return TorqueGoal(kinds[criterion], of_base, nothing, instants)
+
+
+def declared_unknowns(columns: TorqueColumns, free: tuple[str, ...] = ()) -> Unknowns:
+    """What robot.yaml's prior is about, in units of its standard deviations, then friction and the parameters `free`, without one."""
+    model = columns.model
+    names = uncertain_inertials(model, range(model.n))
+    names += [
+        f"{joint}.rotor_inertia"
+        for joint, value in zip(model.joint_names, model.rotor_inertia, strict=True)
+        if value > 0
+    ]
+    names += [f"{joint}.{key}" for key in DRIVE[1:] for joint in model.joint_names]
+    held = model.nominal_payload
+    if held is not None and held.mass_std > 0 and columns.payload is None:
+        names.append("payload.mass")
+    names += [name for name in free if name not in names]
+    known = np.array([name not in free and _has_prior(model, name) for name in names])
+    directions = np.column_stack([_direction(columns, name) for name in names])
+    return Unknowns(tuple(names), columns.found.regrouping @ directions, np.diag(known.astype(float)))
+
+
+def _has_prior(model: RobotModel, name: str) -> bool:
+    """Whether robot.yaml's prior is about it; friction and torque offsets have none, and may have no value."""
+    return name.rpartition(".")[2] not in DRIVE[1:] and bool(np.isfinite(declared(model, name).prior_std))
+
+
+def _direction(columns: TorqueColumns, name: str) -> np.ndarray:
+    """Change (p,) of all columns' values by one prior standard deviation of a parameter, or by one of its coordinate without prior."""
+    if name in columns.found.names and name.rpartition(".")[2] in DRIVE[1:]:
+        return np.eye(len(columns.found.names))[columns.found.names.index(name)]
+    model: RobotModel = columns.model
+    item = declared(model, name)
+    size = item.prior_std if np.isfinite(item.prior_std) else 1.0
+    ends = [item.natural(item.coordinate(item.value) + sign * _STEP * size) for sign in (1, -1)]
+    above, below = (replace(columns, model=model.with_values({name: end})).values for end in ends)
+    return (above - below) / (2 * _STEP)
+
+
+def _require_visible(columns: TorqueColumns, unknowns: Unknowns, of: Sequence[str]) -> None:
+    stacked = np.vstack([unknowns.directions, unknowns.prior])
+    norms = np.maximum(np.linalg.norm(stacked, axis=0), 1e-300)
+    _, sizes, right = np.linalg.svd(stacked / norms)
+    open_ways = right[np.sum(sizes > 1e-9 * sizes[0]) :] if len(sizes) else right
+    hidden = open_ways.T @ open_ways
+    for name in of:
+        place = unknowns.names.index(name)
+        if np.linalg.norm(stacked[:, place]) == 0 or hidden[place, place] > _SEEN:
+            others = [
+                unknowns.names[k]
+                for k in np.argsort(-np.abs(hidden[place]))
+                if k != place and abs(hidden[place, k]) > 0.05 * abs(hidden[place, place])
+            ]
+            how = f"only together with {', '.join(others[:5])}" if others else "not at all"
+            raise InputError(
+                f"the criterion is about {name}, which torques determine {how}; choose another parameter, or give a prior to the others."
+            )

@@ -1,0 +1,71 @@
+"""Feasible start of the design of an exciting trajectory: a posture and a small motion about it within all limits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.design.trajectories.excitation_problem import ExcitingProgram
+from flexcal.errors import FlexcalError, InputError
+from flexcal.model.kinematics import even_configurations
+
+FINER = 10
+"""How much finer the grid is on which limits are to hold than that of the search."""
+_PLACES = 400
+_TRIES = 30
+_HALVINGS = 14
+_FIRST_SWING = 0.5
+
+
+def feasible_places(program: ExcitingProgram) -> np.ndarray:
+    """Configurations (k, n) in which the robot can stand: no limit of torque or box is passed and nothing touches.
+
+    Raises `FlexcalError` that names what stands in the way least where there is none.
+    """
+    model = program.columns.model
+    places = even_configurations(model, _PLACES)
+    excess = program.standing(places)
+    worst = excess.max(axis=1)
+    if (worst < 0).any():
+        return places[worst < 0]
+    best = int(np.argmin(worst))
+    raise FlexcalError(
+        f"{model.name} has no feasible posture within its limits: at best, at q = {_written(places[best])}, "
+        f"{program.standing_limit(places[best])}; correct that limit."
+    )
+
+
+def require_standing(program: ExcitingProgram, q: np.ndarray) -> None:
+    """Raise `InputError` that names the limit which a robot at rest in `q` (n,) passes."""
+    if not program.standing(q[None]).max() < 0:
+        raise InputError(
+            f"the start q = {_written(q)} is not possible: {program.standing_limit(q)}; choose another one."
+        )
+
+
+def feasible_swing(
+    program: ExcitingProgram, places: np.ndarray | None, rng: np.random.Generator
+) -> np.ndarray:
+    """Coordinates of a random motion within all limits, about one of the `places` where the space leaves that open.
+
+    Raises `FlexcalError` where even small motions pass a limit.
+    """
+    shape = program.space.shape
+    fine = program.finer(FINER)
+    for _ in range(_TRIES):
+        swing = _FIRST_SWING * rng.standard_normal(shape)
+        still = np.zeros(shape)
+        if places is not None:
+            still[0] = program.space.place(places[rng.integers(len(places))])
+            swing[0] = 0.0
+        for _ in range(_HALVINGS):
+            x = (still + swing).ravel()
+            if program.within(x) and fine.kept_by(x):
+                return x
+            swing /= 2
+    raise FlexcalError(
+        f"no motion of {program.columns.model.name} was found within its limits, however small; widen its limits of torque, box or bodies."
+    )
+
+
+def _written(q: np.ndarray) -> str:
+    return "[" + ", ".join(f"{value:.3g}" for value in q) + "]"

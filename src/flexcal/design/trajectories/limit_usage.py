@@ -1,0 +1,54 @@
+"""Limits of a motion: joints, drives and target point, each used to a fraction between -1 and 1."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.model.kinematics import joint_ranges
+from flexcal.model.robot import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLimits:
+    """Ranges of the joints `lower`, `upper` (n,), rad or m, and largest `velocity`, `acceleration` and motor `torque` (n,), inf for none.
+
+    The target point stays in `box` (2, 3), m in the base frame, and is no faster than `speed`, m/s; inf for none.
+    """
+
+    lower: np.ndarray
+    upper: np.ndarray
+    velocity: np.ndarray
+    acceleration: np.ndarray
+    torque: np.ndarray
+    box: np.ndarray
+    speed: float
+
+    @classmethod
+    def of(cls, model: RobotModel, share: float = 1.0) -> MotionLimits:
+        """Those of the URDF and of robot.yaml's `limits:`; `share` is how much of velocity, acceleration and torque may be used.
+
+        Raises `FlexcalError` for limits that cross and `InputError` for lists that do not fit the robot.
+        """
+        lower, upper = joint_ranges(model)
+        own = model.config.limits
+        speed = np.inf if own.speed is None else own.speed
+        box = [[-np.inf] * 3, [np.inf] * 3] if own.box is None else [own.box.lower, own.box.upper]
+        acceleration = np.full(model.n, np.inf) if own.acceleration is None else np.array(own.acceleration)
+        velocity = np.array([joint.velocity for joint in model.joints])
+        torque = np.array([joint.effort for joint in model.joints])
+        return cls(
+            lower,
+            upper,
+            share * np.where(velocity > 0, velocity, np.inf),
+            share * acceleration,
+            share * np.where(torque > 0, torque, np.inf),
+            np.array(box, dtype=float),
+            speed,
+        )
+
+    @property
+    def cartesian(self) -> bool:
+        """Whether the target point is limited."""
+        return bool(np.isfinite(self.speed) or np.isfinite(self.box).any())

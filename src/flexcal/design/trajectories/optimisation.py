@@ -1,0 +1,295 @@
+"""Optimal exciting trajectories within a robot's limits (Swevers 1997)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data.plans import FourierPaths, SplinePaths, TrajectoryPlan
+from flexcal.design.scene import Clearance, CollisionChecker
+from flexcal.design.trajectories.criterion import (
+    TorqueGoal,
+    TrajectoryCriterion,
+    declared_unknowns,
+    torque_goal,
+)
+from flexcal.design.trajectories.excitation_problem import NEAR, ExcitingProgram
+from flexcal.design.trajectories.feasible_start import (
+    FINER,
+    feasible_places,
+    feasible_swing,
+    require_standing,
+)
+from flexcal.design.trajectories.interior_point import minimise
+from flexcal.design.trajectories.limit_usage import MotionLimits
+from flexcal.design.trajectories.motion_space import Kind, MotionSpace
+from flexcal.design.trajectories.regressor_columns import TorqueColumns
+from flexcal.design.trajectories.required_limits import require_stated_limits
+from flexcal.design.trajectories.sequences import Stage
+from flexcal.errors import InputError
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+SETTLE_PERIODS = 1
+RATE_HZ = 1000.0
+"""Of the log where robot.yaml declares no controller."""
+TORQUE_ERROR = 1e-3
+"""1σ of an instant's torque, relative to the joint's effort, and how many of these a second are independent."""
+INDEPENDENT_HZ = 40.0
+_INSTANTS_A_HARMONIC = 20
+_INSTANTS_HZ = 20.0
+"""Least number of instants a second: with fewer, a fast arm passes through itself between two of them, and the repair costs more."""
+_SCREENING, _REFINING = (0.3,), (0.1, 0.03, 0.01)
+_REPAIRS = 12
+_SHRINKING, _SMALLEST = 0.97, 0.05
+"""A motion that passes a limit is made smaller in such steps, and given up when it is smaller than that."""
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryDesign:
+    """A `plan`, and for each of its trajectories the information (r, r) on the base `columns` after it, all before it included.
+
+    `limits` are those that it keeps, `goal` is what it was designed for, `merits` how much of that there is after each trajectory.
+    `clearance` is the least distance of bodies beyond their margins, m, up to 0.05; None where the URDF has no shapes that could collide.
+    """
+
+    model: RobotModel
+    plan: TrajectoryPlan
+    columns: TorqueColumns
+    limits: MotionLimits
+    goal: TorqueGoal
+    merits: tuple[float, ...]
+    information: tuple[np.ndarray, ...]
+    clearance: float | None
+
+    def shares(self, motion: np.ndarray) -> dict[str, np.ndarray]:
+        """Shares (N, n) of the limits that q, q̇, q̈ (3, N, n) take; motor torques are with friction, what has no limit is left out."""
+        q, dq, ddq = motion
+        limits = self.limits
+        half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
+        torque = np.einsum("jrn,r->nj", self.columns.write(motion), self.columns.base_values)
+        found = {"position": (q - middle) / half, "velocity": dq / limits.velocity}
+        if np.isfinite(limits.acceleration).any():
+            found["acceleration"] = ddq / limits.acceleration
+        return found | {"torque": torque / limits.torque}
+
+    def largest_shares(self) -> dict[str, float]:
+        """The largest share of each over all trajectories, at instants 0.1 % of a period apart."""
+        plan = self.plan
+        time = np.arange(1000) / (1000 * plan.base_frequency_hz)
+        each = [self.shares(np.array(plan.motion(number, time))) for number in range(len(plan))]
+        return {key: max(float(np.abs(shares[key]).max()) for shares in each) for key in each[0]}
+
+    def prior_gain(self) -> dict[str, float]:
+        """Standard deviation after all trajectories over that of robot.yaml's prior, of everything that this knows."""
+        unknowns = declared_unknowns(self.columns)
+        known = np.diag(unknowns.prior) > 0
+        covariance = np.linalg.pinv(unknowns.information(self.information[-1]), hermitian=True)
+        after = np.sqrt(np.diag(covariance))
+        return {name: float(std) for name, std, has in zip(unknowns.names, after, known, strict=True) if has}
+
+
+def design_trajectories(
+    model: RobotModel,
+    count: int = 1,
+    *,
+    criterion: TrajectoryCriterion = "condition",
+    of: Sequence[str] = (),
+    kind: Kind = "fourier",
+    duration: float = 10.0,
+    base_frequency_hz: float | None = None,
+    harmonics: int = 5,
+    sequence: Sequence[Stage] = (),
+    after: TrajectoryPlan | None = None,
+    rest: bool = False,
+    start: np.ndarray | None = None,
+    share: float = 1.0,
+    payload: float | None = None,
+    starts: int = 3,
+    steps: int = 40,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> TrajectoryDesign:
+    """Design `count` trajectories, each optimal given the previous ones, from the best of `starts` random starts.
+
+    A trajectory lasts `duration` s beside one period to settle, and repeats itself at `base_frequency_hz` (once in the duration by
+    default). It has `harmonics`, or three times as many control points where `kind` is spline; with `rest` every period begins and ends
+    at rest, with `start` (n,) at this configuration and at rest. `share` of the URDF's velocities and efforts and of robot.yaml's
+    accelerations may be used; position, box, speed and bodies count in full. `payload` kg is what the robot holds. Searches take at
+    most `steps` steps at each height of the barrier, so that the seed decides everything. Limits hold on a grid ten times finer than
+    that of the search.
+
+    A `sequence` of stages replaces `count`: one trajectory each, with the joints and the parameters of its own, for the criterion D.
+    What was recorded by another plan, `after`, counts as known.
+
+    Raises `InputError` or `FlexcalError` where the URDF lacks velocities, efforts or masses, the duration does not hold a period, limits
+    cross, the start is not possible, the robot can stand nowhere, or torques cannot tell the parameters `of`.
+    """
+    require_stated_limits(model)
+    frequency = 1 / duration if base_frequency_hz is None else base_frequency_hz
+    periods = _periods(duration, frequency)
+    limits = MotionLimits.of(model, share)
+    columns = TorqueColumns.of(model, payload)
+    size = harmonics if kind == "fourier" else 3 * harmonics
+    begin = None if start is None else np.asarray(start, dtype=float)
+    space = MotionSpace.of(
+        kind,
+        size,
+        1 / frequency,
+        max(_INSTANTS_A_HARMONIC * harmonics, int(np.ceil(_INSTANTS_HZ / frequency))),
+        limits,
+        rest=rest or begin is not None,
+        start=begin,
+    )
+    weights = 1 / (TORQUE_ERROR * np.array([joint.effort for joint in model.joints]))
+    goal = torque_goal(columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration)
+    if sequence and criterion != "D":
+        raise InputError("a sequence is designed by the criterion D of each stage's parameters; choose D.")
+    program = ExcitingProgram(space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR))
+    if after is not None:
+        if after.payload != payload or after.joint_count != model.n:
+            raise InputError("the plan before is for another robot or payload; design both alike.")
+        time = np.arange(space.instants) / (space.instants * after.base_frequency_hz)
+        for number in range(len(after)):
+            goal = goal.after(program.information(np.array(after.motion(number, time))))
+    stages = sequence or (Stage(tuple(range(model.n)), ()),) * count
+    rng = np.random.default_rng(seed)
+    coefficients, merits, information = [], [], []
+    least, compares = NEAR, program.clearance.compares
+    for number, stage in enumerate(stages):
+        aim = goal.about(stage.wanted) if stage.wanted else goal
+        program = replace(program, merit=aim, space=space.moving(stage.moving))
+        x = _designed(program, begin, starts, steps, rng, progress, number, len(stages))
+        fine = program.finer(FINER)
+        motion = fine.space.motion(x)
+        found = program.information(motion)
+        merits.append(aim.merit(found))
+        goal = goal.after(found)
+        information.append(goal.gathered)
+        coefficients.append(program.space.coefficients(x))
+        least = fine.clearance.near(motion[0])[1].min(initial=least)
+    progress("trajectories", 1.0)
+    of_kind = FourierPaths if kind == "fourier" else SplinePaths
+    controller = model.controller
+    plan = TrajectoryPlan(
+        name="exciting",
+        paths=of_kind.of_coefficients(np.array(coefficients)),
+        payload=payload,
+        base_frequency_hz=frequency,
+        periods=periods + SETTLE_PERIODS,
+        settle_periods=SETTLE_PERIODS,
+        kp=None if controller is None else np.array(controller.kp),
+        kd=None if controller is None else np.array(controller.kd),
+        rate_hz=RATE_HZ if controller is None else controller.rate_hz,
+        torque="held",
+        seed=seed,
+    )
+    return TrajectoryDesign(
+        model,
+        plan,
+        columns,
+        limits,
+        goal,
+        tuple(merits),
+        tuple(information),
+        float(least) if compares else None,
+    )
+
+
+def _periods(duration: float, frequency: float) -> int:
+    if not (duration > 0 and frequency > 0):
+        raise InputError("duration and base frequency must be positive.")
+    periods = duration * frequency
+    if periods < 1 - 1e-9:
+        raise InputError(
+            f"a duration of {duration:g} s is too short for the base frequency {frequency:g} Hz, whose period is {1 / frequency:g} s; "
+            "make one of them larger."
+        )
+    if abs(periods - round(periods)) > 1e-6:
+        raise InputError(
+            f"{duration:g} s are {periods:g} periods of {frequency:g} Hz; choose a duration of whole periods."
+        )
+    return round(periods)
+
+
+def _sizes(columns: TorqueColumns, weights: np.ndarray, limits: MotionLimits) -> np.ndarray:
+    """Root mean square (r,) of the base columns at random states within the limits, relative to the torques' noise."""
+    rng = np.random.default_rng(0)
+    swing = rng.uniform(-1, 1, (3, 500, len(weights)))
+    velocity = np.where(np.isfinite(limits.velocity), limits.velocity, 1.0)
+    half, middle = (limits.upper - limits.lower) / 2, (limits.upper + limits.lower) / 2
+    motion = swing * np.array([half, velocity, velocity**2 / half])[:, None]
+    motion[0] += middle
+    weighted = columns.write(motion) * weights[:, None, None]
+    return np.sqrt(np.mean(np.sum(weighted**2, axis=0), axis=1))
+
+
+def _designed(
+    program: ExcitingProgram,
+    begin: np.ndarray | None,
+    starts: int,
+    steps: int,
+    rng: np.random.Generator,
+    progress: Progress,
+    number: int,
+    count: int,
+) -> np.ndarray:
+    """Coordinates of one trajectory: from the most promising start, and from the next ones where its repair cost more than lies between."""
+    if begin is None:
+        places = feasible_places(program)
+    else:
+        require_standing(program, begin)
+        places = None
+    tried = []
+    for k in range(starts):
+        progress("trajectories", (number + 0.7 * k / starts) / count)
+        first = feasible_swing(program, places, rng)
+        x = minimise(program, first, list(_SCREENING), steps)
+        tried.append((_merit(program, x), k, x, first))
+    best, most = tried[0][3], -np.inf
+    for promised, k, x, first in sorted(tried, reverse=True):
+        if promised <= most:
+            break
+        progress("trajectories", (number + 0.7 + 0.3 * k / starts) / count)
+        kept = _kept(program, minimise(program, x, list(_REFINING), steps), first, steps)
+        if (merit := _merit(program, kept)) > most:
+            best, most = kept, merit
+    return best
+
+
+def _merit(program: ExcitingProgram, x: np.ndarray) -> float:
+    return program.merit.merit(program.information(program.space.motion(x)))
+
+
+def _kept(program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, steps: int) -> np.ndarray:
+    """`x` changed so that all limits hold on the finer grid: the coarse one gets tighter where they did not.
+
+    `inside` keeps them.
+    """
+    fine = program.finer(FINER)
+    tight = program
+    for _ in range(_REPAIRS):
+        excess = fine.excess(x)
+        if excess is None:
+            return x
+        tight = tight.tightened(excess)
+        within = _smaller(tight, x, inside, tight.within)
+        x = minimise(tight, within, [_REFINING[-1]], steps // 2)
+    return _smaller(program, x, inside, fine.kept_by)
+
+
+def _smaller(
+    program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, keeps: Callable[[np.ndarray], bool]
+) -> np.ndarray:
+    """Of the motions between `x` and the same place without a swing, and between `x` and `inside`, the best of the first two that keep
+    the limits."""
+    found = [inside]
+    for towards in (program.space.still(x), inside):
+        share = 1.0
+        while share > _SMALLEST and not keeps(towards + share * (x - towards)):
+            share *= _SHRINKING
+        if share > _SMALLEST:
+            found.append(towards + share * (x - towards))
+    return max(found, key=lambda y: _merit(program, y))

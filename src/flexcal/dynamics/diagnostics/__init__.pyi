@@ -1,0 +1,16 @@
+from .elimination import EssentialParameters, essential_parameters
+from .force_sensor_check import ExternalExcess, ExternalShare, external_share
+from .gravity_ratio import WeightShare, weight_shares
+from .torque_prediction import TorquePrediction, predict_torques
+
+__all__ = [
+    "EssentialParameters",
+    "ExternalExcess",
+    "ExternalShare",
+    "TorquePrediction",
+    "WeightShare",
+    "essential_parameters",
+    "external_share",
+    "predict_torques",
+    "weight_shares",
+]

@@ -1,0 +1,5 @@
+"""Identification of drives: torque gains, backlash, and bias of stiffnesses."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,66 @@
+"""Uncertainty of an estimate by the inertials that stay nominal in the equations of bearings that tilt."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexcal.dynamics.estimators import noise_levels, weighted_system
+from flexcal.dynamics.inverse_model import Observation
+from flexcal.dynamics.regression import RegressionData
+from flexcal.estimation import Estimate
+from flexcal.model.robot import declared, uncertain_inertials
+
+_STEP = 1e-4
+"""Of the central differences, in estimation coordinates."""
+
+
+def with_nominal_spread(data: RegressionData, estimate: Estimate) -> Estimate:
+    """The estimate, its covariance larger by what nominal values of parameters that it does not estimate may be off.
+
+    In a rigid arm the others absorb these exactly, by the regrouping. In the equation of a bearing a link also adds torque in proportion to
+    the tilt and to its acceleration, too little to be told from the spring's, so that errors of CAD bias the stiffness. With δ the
+    deviations that robot.yaml's `prior:` admits (masses, centres of mass, and moments of inertia by the share of the masses), the estimate
+    deviates by (W_k⁺ W_d - β) δ_d, with β the regrouping (parameters considered but not estimated: Schmidt 1966). Without tilts nothing
+    changes. Raises `FlexcalError` as `noise_levels` does.
+    """
+    observation = data.observation
+    if not isinstance(observation, Observation) or not observation.bearings:
+        return estimate
+    names = estimate.parameters.names
+    kept = np.flatnonzero(estimate.identifiable)
+    nominal = np.flatnonzero(~np.array(estimate.identifiable))
+    matrix = weighted_system(data, noise_levels(data)).matrix
+    scale = np.linalg.norm(matrix[:, kept], axis=0)
+    absorbed = np.linalg.lstsq(matrix[:, kept] / scale, matrix[:, nominal], rcond=None)[0] / scale[:, None]
+    number = {name: row for row, name in enumerate(names[i] for i in kept)}
+    column = {name: k for k, name in enumerate(names[i] for i in nominal)}
+    for entry in estimate.dropped:
+        for heir, share in entry.absorbed_by:
+            if heir in number and entry.name in column:
+                absorbed[number[heir], column[entry.name]] -= share
+    root = absorbed @ _deviations(observation)[nominal]
+    covariance = estimate.covariance.copy()
+    covariance[np.ix_(kept, kept)] += root @ root.T
+    return replace(estimate, covariance=covariance)
+
+
+def _deviations(observation: Observation) -> np.ndarray:
+    """Columns (p, d) of one standard deviation each of what CAD may have wrong of the links, in all parameters of the observation."""
+    model, columns = observation.model, []
+    for name in uncertain_inertials(model, range(model.n)):
+        item = declared(model, name)
+        at = item.coordinate(model.value(name))
+        ends = [
+            replace(observation, model=model.with_values({name: item.natural(at + step)})).values()
+            for step in (_STEP, -_STEP)
+        ]
+        columns.append(item.prior_std * (ends[0] - ends[1]) / (2 * _STEP))
+    names = list(observation.names)
+    for number, joint in enumerate(model.joints):
+        for axis, key in enumerate(("Ixx", "Iyy", "Izz")):
+            column = np.zeros(len(names))
+            column[names.index(f"{joint.link}.{key}")] = model.prior.mass * model.inertia[number, axis, axis]
+            columns.append(column)
+    return np.array(columns).T

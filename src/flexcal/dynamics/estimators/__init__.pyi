@@ -1,0 +1,39 @@
+from .column_noise import column_errors, noisy_logs
+from .didim import direct_and_inverse
+from .ekf import kalman_filter
+from .energy_model import energy_least_squares
+from .feasible import feasible_least_squares
+from .idim_iv import instrumental_variables
+from .irls import huber_least_squares
+from .iv_estimate import InstrumentalFit, instrumental_fit
+from .linear_least_squares import Unknowns, weighted_system
+from .ols import ordinary_least_squares
+from .periodic_likelihood import maximum_likelihood
+from .physical_constraints import extended
+from .power_model import power_least_squares
+from .recorded_rows import RecordedRows
+from .tls import total_least_squares
+from .wls import noise_levels, weighted_least_squares
+
+__all__ = [
+    "InstrumentalFit",
+    "RecordedRows",
+    "Unknowns",
+    "column_errors",
+    "direct_and_inverse",
+    "energy_least_squares",
+    "extended",
+    "feasible_least_squares",
+    "huber_least_squares",
+    "instrumental_fit",
+    "instrumental_variables",
+    "kalman_filter",
+    "maximum_likelihood",
+    "noise_levels",
+    "noisy_logs",
+    "ordinary_least_squares",
+    "power_least_squares",
+    "total_least_squares",
+    "weighted_least_squares",
+    "weighted_system",
+]

@@ -1,0 +1,113 @@
+"""Errors of the observation matrix due to position noise, from a second pass with added noise."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.dynamics.estimators.recorded_rows import RecordedRows
+from flexcal.dynamics.regression import Batch, ExperimentSystem, RegressionData, Rows, reduced, rows
+from flexcal.dynamics.signals import Experiment, JointLog, Motion, filtered_motion, log_blocks
+from flexcal.errors import FlexcalError
+from flexcal.model.robot import RobotModel
+
+_EXACT = (
+    "coulomb",
+    "load_coulomb",
+    "load_stribeck",
+    "stribeck",
+    "presliding",
+    "coulomb_warm_up",
+    "torque_offset",
+)
+"""What names of columns begin with that are constants or signs of a velocity: these have no errors but at a reversal."""
+_ORDER = 4
+_GAIN = 70.0
+"""Variance of the fourth difference of white noise, over its own."""
+_SEED = 1994
+
+
+def column_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> RegressionData:
+    """Rows of W with the noise of the experiments `noisy`, less those of the recorded ones; zero in Y, signs and constants.
+
+    Of either, one pass. Each of the noisy experiments has the samples of its recorded one, and errors of the same size on top of its own.
+    """
+    observation = recorded.observation
+    exact = np.array([name.rpartition(".")[2].startswith(_EXACT) for name in observation.names])
+    systems = []
+    for experiment, other, window in zip(recorded.experiments, noisy, recorded.windows, strict=True):
+        passes = (rows(observation, each, recorded.decimation, window) for each in (experiment, other))
+        held = [np.zeros((0, width)) for width in observation.widths]
+        count = 0
+        for block, spoilt in zip(*passes, strict=True):
+            keep = ~block.still if recorded.mask_standstill else np.ones(len(block), dtype=bool)
+            count += int(keep.sum())
+            parts = _difference(block.where(keep), spoilt.where(keep))
+            held = [reduced([h, part.T]) for h, part in zip(held, parts, strict=True)]
+        whole = []
+        for table, spread, members in zip(held, observation.spread, observation.members, strict=True):
+            whole.append(np.column_stack([table[:, :-1] @ spread, table[:, -1]]))
+            whole[-1][:, :-1][:, exact[members]] = 0.0
+        systems.append(ExperimentSystem((Batch(0, count, tuple(whole)),), count, 0.0, 0))
+    return RegressionData.of(observation, recorded.base, systems)
+
+
+def _difference(block: Rows, spoilt: Rows) -> Iterable[np.ndarray]:
+    for own, other in zip(block.reduced, spoilt.reduced, strict=True):
+        yield np.vstack([other[:-1] - own[:-1], np.zeros_like(own[-1:])])
+
+
+def noisy_logs(recorded: RecordedRows) -> list[NoisyLog]:
+    """The recorded logs with their own position noise added once more; raises `FlexcalError` for an experiment that is no log."""
+    model = recorded.observation.model
+    logs = [experiment for experiment in recorded.experiments if isinstance(experiment, JointLog)]
+    if len(logs) < len(recorded.experiments):
+        raise FlexcalError("total least squares needs the positions as they were logged, with their noise.")
+    return [
+        NoisyLog(log, model, position_noise(log, model), _SEED + number) for number, log in enumerate(logs)
+    ]
+
+
+def position_noise(log: JointLog, model: RobotModel) -> np.ndarray:
+    """Standard deviation (n,) of the logged positions, rad or m, for white noise: by fourth differences, which no motion has."""
+    squares, count = np.zeros(model.n), 0
+    for recording in log_blocks(log.path, model):
+        rest = np.diff(recording.q, _ORDER, axis=0)
+        squares += np.sum(rest**2, axis=0)
+        count += len(rest)
+    return np.sqrt(squares / (_GAIN * max(1, count)))
+
+
+@dataclass(frozen=True, eq=False)
+class NoisyLog:
+    """A log whose positions have more white noise, of standard deviations `std` (n,), the same at every pass."""
+
+    log: JointLog
+    model: RobotModel
+    std: np.ndarray
+    seed: int
+
+    @property
+    def name(self) -> str:
+        return self.log.name
+
+    @property
+    def samples(self) -> int:
+        return self.log.samples
+
+    @property
+    def top_speed(self) -> np.ndarray:
+        return self.log.top_speed
+
+    @property
+    def cutoff_hz(self) -> float:
+        return self.log.cutoff_hz
+
+    def blocks(self) -> Iterator[Motion]:
+        rng = np.random.default_rng(self.seed)
+        recordings = log_blocks(self.log.path, self.model)
+        noisy = (replace(r, q=r.q + self.std * rng.normal(size=r.q.shape)) for r in recordings)
+        motions = filtered_motion(noisy, self.log.cutoff_hz, self.model.config.dynamics.torque)
+        return map(self.log.settled, motions)

@@ -1,0 +1,81 @@
+"""Scores of the innovations of a Kalman filter with fixed parameters, batch by batch."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.dynamics.regression import Scores
+from flexcal.dynamics.simulation import ForwardModel, ForwardModels
+
+
+class InnovationScores:
+    """Gradient of −½ Σ eᵀS⁻¹e by the kept parameters, and the information Σ ψᵀS⁻¹ψ, of the innovations e of one experiment.
+
+    ψ are the derivatives of the predicted positions, which go through the gains of the filter. `root` (k, k) is that of the covariance of
+    the parameters: scores are in coordinates in which it is one. Batches have so many steps: `length`.
+    """
+
+    def __init__(
+        self, parameters: np.ndarray, kept: list[int], root: np.ndarray, position_noise: float, length: int
+    ) -> None:
+        self._parameters, self._kept, self._root = parameters, kept, root
+        self._noise, self._length = position_noise, length
+        self._number = 0
+        self._state: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
+        self._found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
+
+    def follow(self, models: ForwardModels, torque_noise: np.ndarray, first_speed: float) -> None:
+        """Steps that follow those before; `torque_noise` (n,) is the standard deviation of a step's mean torque (N m)."""
+        steps = models.steps
+        n, size = len(torque_noise), self._root.shape[1]
+        if steps.begins:
+            self._state = None
+        for k in range(len(steps.torque)):
+            self._number += 1
+            if steps.still[k]:
+                self._state = None
+                continue
+            if self._state is None:
+                spread = np.diag(np.repeat([self._noise**2, first_speed**2], n))
+                self._state = (
+                    np.concatenate([steps.before[k], steps.speed[k]]),
+                    spread,
+                    np.zeros((2 * n, size)),
+                )
+            self._step(models.step(k, self._state[0], self._parameters), steps.after[k], torque_noise)
+
+    def _step(self, model: ForwardModel, after: np.ndarray, torque_noise: np.ndarray) -> None:
+        assert self._state is not None
+        n = len(after)
+        _, spread, slope = self._state
+        pushed = model.by_torque * torque_noise
+        spread = model.by_state @ spread @ model.by_state.T + pushed @ pushed.T
+        slope = model.by_state @ slope + model.by_parameters[:, self._kept] @ self._root
+        innovation_covariance = spread[:n, :n] + self._noise**2 * np.eye(n)
+        innovation = after - model.predicted[:n]
+        weighted = np.linalg.solve(
+            innovation_covariance, np.column_stack([innovation, slope[:n], spread[:n]])
+        )
+        batch = (self._number - 1) // self._length
+        score, information = self._found.get(batch, (0.0, 0.0))
+        self._found[batch] = (
+            score + slope[:n].T @ weighted[:, 0],
+            information + slope[:n].T @ weighted[:, 1 : 1 + slope.shape[1]],
+        )
+        gain = weighted[:, 1 + slope.shape[1] :].T
+        spread = spread - gain @ spread[:n]
+        self._state = (
+            model.predicted + gain @ innovation,
+            0.5 * (spread + spread.T),
+            slope - gain @ slope[:n],
+        )
+
+    @property
+    def scores(self) -> Scores:
+        """Of all steps so far."""
+        size = self._root.shape[1]
+        length = max(self._found, default=0) + 1
+        score, information = np.zeros((length, size)), np.zeros((length, size, size))
+        for number, (own, part) in self._found.items():
+            score[number], information[number] = own, part
+        return Scores(score, information, len(self._found))

@@ -1,0 +1,18 @@
+from .catalogue import FRICTION_TERMS
+from .selection import FrictionSelection, select_friction
+from .stepwise import Candidate, Trial
+from .terms import AsymmetricCoulomb, LoadCoulomb, Presliding, Stribeck, SublinearViscous, WarmUp
+
+__all__ = [
+    "FRICTION_TERMS",
+    "AsymmetricCoulomb",
+    "Candidate",
+    "FrictionSelection",
+    "LoadCoulomb",
+    "Presliding",
+    "Stribeck",
+    "SublinearViscous",
+    "Trial",
+    "WarmUp",
+    "select_friction",
+]

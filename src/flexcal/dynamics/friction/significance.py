@@ -1,0 +1,62 @@
+"""Significance of friction terms, with noise that may have a memory."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.special import stdtr
+
+from flexcal.dynamics.estimators import weighted_least_squares
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import ExperimentSystem, RegressionData
+from flexcal.estimation import Estimate
+
+_FREEDOM = 8.0
+"""Degrees of freedom of a significance test, at least."""
+
+
+@dataclass(frozen=True, eq=False)
+class WideFit:
+    """Weighted least squares of some columns of an observation that has all candidates' columns side by side.
+
+    `plain` are the numbers of the columns that are always in.
+    """
+
+    observation: Observation
+    systems: Sequence[ExperimentSystem]
+    plain: Sequence[int]
+
+    def estimate(self, further: Sequence[int]) -> Estimate:
+        """With the plain columns and `further` ones, by their numbers; raises `FlexcalError` as `weighted_least_squares` does."""
+        kept = tuple(sorted({*self.plain, *further}))
+        names = self.observation.names
+        regrouping = np.zeros((len(kept), len(names)))
+        regrouping[range(len(kept)), kept] = 1.0
+        base = replace(
+            BaseParameters.of(replace(self.observation, terms=())).found,
+            names=names,
+            rank=len(kept),
+            kept=kept,
+            regrouping=regrouping,
+        )
+        return weighted_least_squares(RegressionData.of(self.observation, BaseParameters(base), self.systems))
+
+    def p_value(self, before: Sequence[int], group: Sequence[int]) -> float:
+        """Probability that noise alone makes the parameters of a `group` of columns, beside those `before`, as large as they are.
+
+        That of the largest ratio of a parameter to its standard deviation, by Student's t with the degrees of freedom of the covariance,
+        times the number of parameters (Bonferroni). The covariance allows for noise with a memory; a term that acts at one joint counts.
+        At least eight degrees of freedom are taken: torques that a model with too few terms misses pass for noise with a long memory.
+        """
+        found = self.estimate([*before, *group])
+        ratios = [
+            abs(found.parameters[number].value) / np.sqrt(found.covariance[number, number])
+            for number in group
+            if found.identifiable[number]
+        ]
+        if not ratios:
+            return 1.0
+        freedom = max(_FREEDOM, found.covariance_freedom or _FREEDOM)
+        return float(min(1.0, 2.0 * len(ratios) * stdtr(freedom, -max(ratios))))

@@ -1,0 +1,143 @@
+"""Selection of friction terms: forward selection by cross-validation and significance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.dynamics.inverse_model import Column, DriveTerm, Memory, Observation
+from flexcal.dynamics.regression import Fold, prediction_errors
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel
+
+_WORTH = 0.01
+"""A term is worth its parameters if the error falls by this share of itself."""
+_LEVEL = 0.05
+"""Probability, at most, that noise alone makes any of the candidates as significant as the one that is taken."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A friction term of robot.yaml in one `shape` (empty for a term that has none)."""
+
+    name: str
+    shape: str
+    term: DriveTerm
+
+    @property
+    def label(self) -> str:
+        """As it is printed."""
+        return f"{self.name} ({self.shape})" if self.shape else self.name
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        """Those of the term, named by the shape too, so that several shapes stand side by side."""
+        for column in self.term.columns(model, motion, memory):
+            yield replace(column, name=self.column(column.name))
+
+    def column(self, name: str) -> str:
+        """What the column `name` of the term is called here."""
+        return f"{name} {self.shape}"
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A set of friction terms beyond the classic ones, and its cross-validation error ‖Y - W χ‖ / ‖Y‖.
+
+    `p_value` is that of the last of the terms, times the number of candidates; None where the error alone decided.
+    """
+
+    terms: tuple[str, ...]
+    error: float
+    p_value: float | None = None
+
+
+@dataclass(frozen=True)
+class FrictionChoice:
+    """The candidates chosen, and everything that was tried, in order."""
+
+    chosen: tuple[Candidate, ...]
+    trials: tuple[Trial, ...]
+
+    @property
+    def rivals(self) -> tuple[tuple[str, ...], ...]:
+        """Other terms, by their labels, that predict as well: as many with an error larger by less than a hundredth, or one more with a
+        smaller error, which is not significant or saves less than a hundredth."""
+        labels = tuple(candidate.label for candidate in self.chosen)
+        (error,) = (trial.error for trial in self.trials if trial.terms == labels)
+        most = {len(labels): (1 + _WORTH) * error, len(labels) + 1: error}
+        return tuple(
+            trial.terms
+            for trial in self.trials
+            if set(trial.terms) != set(labels) and trial.error < most.get(len(trial.terms), 0.0)
+        )
+
+
+def forward_selection(
+    folds: Sequence[Fold],
+    plain: Sequence[int],
+    groups: Mapping[Candidate, Sequence[int]],
+    p_value: Callable[[Sequence[int], Sequence[int]], float],
+) -> FrictionChoice:
+    """Adds the significant candidate that lowers the error most, one term after the other, while it falls by a hundredth of itself.
+
+    `plain` are the numbers of the columns that are always in, `groups` those of each candidate. `p_value` is that of the columns of a
+    candidate beside those of the terms before it; times the number of candidates it must be 0.05 at most (Bonferroni). Cross-validation
+    alone takes a false term in up to a half of recordings whose noise remembers itself.
+    """
+    chosen: list[Candidate] = []
+    (error,) = prediction_errors(folds, plain, [[]])
+    trials = [Trial((), error)]
+    while left := [c for c in groups if c.name not in {taken.name for taken in chosen}]:
+        before = [number for candidate in chosen for number in groups[candidate]]
+        _, tried = _best(folds, plain, groups, chosen, left)
+        taken = None
+        for number in np.argsort([t.error for t in tried]):
+            if taken is not None or tried[number].error > (1 - _WORTH) * error:
+                break
+            probability = min(1.0, len(groups) * p_value(before, groups[left[number]]))
+            tried[number] = replace(tried[number], p_value=probability)
+            taken = number if probability <= _LEVEL else None
+        trials += tried
+        if taken is None:
+            break
+        chosen.append(left[taken])
+        error = tried[taken].error
+    return FrictionChoice(tuple(chosen), tuple(trials))
+
+
+def best_shapes(
+    folds: Sequence[Fold],
+    plain: Sequence[int],
+    groups: Mapping[Candidate, Sequence[int]],
+    names: Sequence[str],
+) -> FrictionChoice:
+    """The terms `names`, one after the other, each in the shape with the smallest error; all of them are taken."""
+    chosen: list[Candidate] = []
+    trials: list[Trial] = []
+    for name in names:
+        found, tried = _best(folds, plain, groups, chosen, [c for c in groups if c.name == name])
+        trials += tried
+        chosen.append(found)
+    return FrictionChoice(tuple(chosen), tuple(trials))
+
+
+def _best(
+    folds: Sequence[Fold],
+    plain: Sequence[int],
+    groups: Mapping[Candidate, Sequence[int]],
+    chosen: Sequence[Candidate],
+    left: Sequence[Candidate],
+) -> tuple[Candidate, list[Trial]]:
+    fixed = [*plain, *(number for candidate in chosen for number in groups[candidate])]
+    errors = prediction_errors(folds, fixed, [groups[candidate] for candidate in left])
+    before = tuple(candidate.label for candidate in chosen)
+    tried = [Trial((*before, c.label), error) for c, error in zip(left, errors, strict=True)]
+    return left[errors.index(min(errors))], tried
+
+
+def candidate_columns(observation: Observation, candidate: Candidate) -> list[int]:
+    """Numbers of a candidate's columns in an observation that has it among its terms."""
+    own = Observation(observation.model, (candidate,)).names
+    return [observation.names.index(name) for name in own if name.endswith(candidate.column(""))]

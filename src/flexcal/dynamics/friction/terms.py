@@ -1,0 +1,188 @@
+"""Friction terms beyond viscous and Coulomb friction, on the motor axes; shapes are fixed, coefficients are identified."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from flexcal.dynamics.inverse_model import Column, Memory, MotorAxis, motor_axes
+from flexcal.dynamics.signals import Motion
+from flexcal.model.robot import RobotModel, unknown_parallel
+from flexcal.model.torques import torque_regressor
+
+
+class _PerMotor:
+    """One parameter a motor; a joint that the motor turns along feels its share of the torque."""
+
+    key: ClassVar[str]
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        raise NotImplementedError
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        for axis in motor_axes(model):
+            torque = self.torque(model, motion, axis, memory)
+            for joint, ratio in axis.shares:
+                yield Column(f"{axis.name}.{self.key}", joint, ratio * torque)
+
+
+@dataclass(frozen=True)
+class AsymmetricCoulomb(_PerMotor):
+    """`<joint>.coulomb_asymmetry` · |sign ṡ|: half the difference between the directions; equals a torque offset except at rest."""
+
+    key = "coulomb_asymmetry"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        return np.abs(np.sign(axis.of(motion.dq)))
+
+
+@dataclass(frozen=True)
+class SublinearViscous(_PerMotor):
+    """`<joint>.sublinear_viscous` · sign(ṡ) √|ṡ|: shear-thinning grease."""
+
+    key = "sublinear_viscous"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        speed = axis.of(motion.dq)
+        return np.sign(speed) * np.sqrt(np.abs(speed))
+
+
+@dataclass(frozen=True)
+class Stribeck(_PerMotor):
+    """`<joint>.stribeck` · sign(ṡ) exp(-(ṡ/v)²), with `velocities` v of the axes, rad/s or m/s (Armstrong-Hélouvry 1994)."""
+
+    velocities: tuple[float, ...]
+    key = "stribeck"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        speed = axis.of(motion.dq)
+        return np.sign(speed) * np.exp(-((speed / self.velocities[axis.joint]) ** 2))
+
+
+@dataclass(frozen=True)
+class Presliding(_PerMotor):
+    """`<joint>.presliding` · z, dz/ds = (1 - z sign ṡ)/δ, with `travels` δ of the axes, rad or m (Dahl 1968).
+
+    Coulomb friction that builds up over the travel after a reversal instead of jumping; z starts at 0 with the recording.
+    """
+
+    travels: tuple[float, ...]
+    key = "presliding"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        position, travel = axis.of(motion.q), self.travels[axis.joint]
+        key = f"{axis.name}.{self.key} {travel!r}"
+        place, state = memory.get(key, (position[0], 0.0))
+        states = dahl(np.append(place, position), travel, state)[1:]
+        memory[key] = (position[-1], states[-1])
+        return states
+
+
+@dataclass(frozen=True)
+class WarmUp(_PerMotor):
+    """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: decreasing viscosity during warm-up."""
+
+    time: float
+    key = "warm_up"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        return axis.of(motion.dq) * _cold(motion, self.time, memory)
+
+
+@dataclass(frozen=True)
+class CoulombWarmUp(_PerMotor):
+    """`<joint>.coulomb_warm_up` · sign(ṡ) exp(-t/τ), with `time` τ, s: as `WarmUp`, of Coulomb friction."""
+
+    time: float
+    key = "coulomb_warm_up"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        return np.sign(axis.of(motion.dq)) * _cold(motion, self.time, memory)
+
+
+@dataclass(frozen=True)
+class Cables:
+    """`<joint>.cable_stiffness` · q: cables and hoses along the arm; where they are at rest is part of the torque offset.
+
+    A joint whose declared spring is identified has that in its place: the columns are the same.
+    """
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        for i, name in enumerate(model.joint_names):
+            if "spring_stiffness" in unknown_parallel(model, name):
+                continue
+            yield Column(f"{name}.cable_stiffness", i, motion.q[:, i])
+
+
+class _PerLoad:
+    """One parameter a motor, of what the links alone ask of its joint.
+
+    That is by `inertials` (10 n,) as a fit without this term found them: the measured torque would put the noise of Y into W, and the
+    answer into a prediction.
+    """
+
+    inertials: np.ndarray
+    key: ClassVar[str]
+
+    def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
+        raise NotImplementedError
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        load = np.abs(torque_regressor(model, motion.q, motion.dq, motion.ddq) @ self.inertials)
+        for axis in motor_axes(model):
+            torque = load[:, axis.joint] * self.share(axis.of(motion.dq), axis)
+            for joint, ratio in axis.shares:
+                yield Column(f"{axis.name}.{self.key}", joint, ratio * torque)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadCoulomb(_PerLoad):
+    """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears."""
+
+    inertials: np.ndarray
+    key = "load_coulomb"
+
+    def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
+        return np.sign(speed)
+
+
+@dataclass(frozen=True, eq=False)
+class LoadStribeck(_PerLoad):
+    """`<joint>.load_stribeck` · |load| sign(ṡ) exp(-(ṡ/v)²), with `velocities` v as `Stribeck` (Bittencourt & Gunnarsson 2012)."""
+
+    inertials: np.ndarray
+    velocities: tuple[float, ...]
+    key = "load_stribeck"
+
+    def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
+        return np.sign(speed) * np.exp(-((speed / self.velocities[axis.joint]) ** 2))
+
+
+def _cold(motion: Motion, time: float, memory: Memory) -> np.ndarray:
+    """exp(-t/τ) from the start of the recording."""
+    begun, _ = memory.setdefault("begun", (motion.time[0], 0.0))
+    return np.exp(-(motion.time - begun) / time)
+
+
+def dahl(position: np.ndarray, travel: float, start: float) -> np.ndarray:
+    """z (N,) of `Presliding` along `position` (N,) from z = `start`, exact for straight moves from sample to sample.
+
+    On a stretch without reversal 1 - z sign ṡ falls by exp(-path/δ), so only the reversals are stepped through.
+    """
+    move = np.diff(position, prepend=position[0])
+    path = np.cumsum(np.abs(move)) / travel
+    moving = np.flatnonzero(move)
+    turns = moving[np.flatnonzero(np.diff(np.sign(move[moving]), prepend=0.0))]
+    directions, begins = np.sign(move[turns]), path[turns - 1]
+    left = np.exp(-np.diff(begins))
+    states = np.full(len(turns) + 1, start)
+    for k, direction in enumerate(directions[:-1]):
+        states[k + 1] = direction + (states[k] - direction) * left[k]
+    stretch = np.searchsorted(turns, np.arange(len(position)), side="right") - 1
+    before = stretch < 0
+    to = np.where(before, start, np.append(directions, 0.0)[stretch])
+    since = path - np.where(before, 0.0, np.append(begins, 0.0)[stretch])
+    return to + (states[stretch] - to) * np.exp(-since)

@@ -1,0 +1,148 @@
+"""The torques of exciting trajectories as rows of a least-squares problem, linearised about an elastic robot (Eq. 2.26)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.dynamics.inverse_model import CLASSIC
+from flexcal.dynamics.signals import Motion, PeriodicMotion, real_rows
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Parameter, Parameters
+from flexcal.model.robot import GEOMETRY, PARALLEL, SPRINGS, RobotModel, declared, uncertain_inertials
+from flexcal.model.vibration import periodic_torque
+
+SAMPLES_PER_LINE = 4
+_STEP = 1e-3
+"""Of the central differences, in estimation coordinates: torques are polynomials of these, nearly linear over the step."""
+_REVERSAL_VELOCITY = 0.02
+"""rad/s below which friction need not be Coulomb's."""
+_FIRST_SIGMA = 0.01
+"""Noise to begin with, relative to the torques of the joint."""
+
+
+def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
+    """All unknowns of the torques with their prior, and the names of those that are the robot's dynamics.
+
+    These are mass and centre of mass of every link, and the classic terms of the drives; the others are spring stiffnesses, geometric
+    errors and what friction does at a reversal. Raises `FlexcalError` where a rotor inertia is missing.
+    """
+    lacking = [
+        name for name, value in zip(model.joint_names, model.rotor_inertia, strict=True) if not value > 0
+    ]
+    if lacking:
+        raise FlexcalError(
+            f"{model.path} gives {lacking[0]} no rotor inertia, which the prior needs; add `drives: {{rotor_inertia: […]}}`."
+        )
+    own = [*uncertain_inertials(model, range(model.n)), *_drive_names(model)]
+    beside = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
+    beside += [f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY]
+    start = model.with_values({name: 0.0 for name in own if np.isnan(model.value(name))})
+    items = [declared(start, name) for name in (*own, *beside)]
+    items += [Parameter(_reversal(joint), "1", 0.0, prior_std=1.0) for joint in model.joint_names]
+    return Parameters(items), tuple(own)
+
+
+@dataclass(frozen=True, eq=False)
+class TrajectoryRows:
+    """T trajectories, n joints, 2 K + 1 coefficients: `measured` minus predicted torque is `residual` (T, 2 K + 1, n), N m.
+
+    `jacobian` (T, 2 K + 1, n, p) is the derivative of the prediction in estimation coordinates, at the values of `parameters`.
+    """
+
+    parameters: Parameters
+    measured: np.ndarray
+    residual: np.ndarray
+    jacobian: np.ndarray
+
+    @classmethod
+    def about(
+        cls,
+        model: RobotModel,
+        parameters: Parameters,
+        motions: Sequence[PeriodicMotion],
+        payload: float | None,
+    ) -> TrajectoryRows:
+        """Linearised at the values of the parameters."""
+        x = parameters.coordinates()
+        measured, predicted, jacobians = [], [], []
+        for motion in motions:
+            measured.append(real_rows(motion.torque))
+            torque, jacobian = _links(model, parameters, x, motion, payload)
+            for name, joint, rows in (*drive_rows(model, motion), *_reversals(model, motion)):
+                number = parameters.index(name)
+                torque[:, joint] += rows * parameters[number].value
+                jacobian[:, joint, number] += rows * parameters.natural_slope(x)[number]
+            predicted.append(torque)
+            jacobians.append(jacobian)
+        seen = np.array(measured)
+        return cls(parameters, seen, seen - np.array(predicted), np.array(jacobians))
+
+    @property
+    def lines(self) -> np.ndarray:
+        """Line (2 K + 1,) of every coefficient."""
+        above = np.arange(1, self.measured.shape[1] // 2 + 1)
+        return np.concatenate([[0], above, above])
+
+    @property
+    def size(self) -> np.ndarray:
+        """Root mean square (n,) of the coefficients of each joint, N m."""
+        return np.sqrt(np.mean(self.measured**2, axis=(0, 1)))
+
+    def first_sigma(self) -> np.ndarray:
+        """Noise (2 K + 1, n) to begin with, N m."""
+        return np.broadcast_to(_FIRST_SIGMA * self.size, self.measured.shape[1:])
+
+
+def _links(
+    model: RobotModel, parameters: Parameters, x: np.ndarray, motion: PeriodicMotion, payload: float | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows of the arm's torques (2 K + 1, n), and their derivatives (2 K + 1, n, p)."""
+    states = motion.states(SAMPLES_PER_LINE * motion.lines)
+    moved = [k for k, name in enumerate(parameters.names) if name in model.values and not _of_drive(name)]
+    names = [parameters.names[k] for k in moved]
+
+    def rows(at: np.ndarray) -> np.ndarray:
+        robot = model.with_values(dict(zip(names, parameters.natural(at)[moved], strict=True)))
+        return motion.rows(periodic_torque(robot, *states, 1 / motion.base_frequency_hz, payload))
+
+    torque = rows(x)
+    jacobian = np.zeros((*torque.shape, len(parameters)))
+    for k in moved:
+        step = _STEP * (np.arange(len(x)) == k)
+        jacobian[:, :, k] = (rows(x + step) - rows(x - step)) / (2 * _STEP)
+    return torque, jacobian
+
+
+def drive_rows(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
+    """Parameter, joint and rows (2 K + 1,) of every column of the drives, evaluated at the full rate."""
+    q, dq, ddq = motion.states(motion.samples)
+    full = Motion(np.arange(motion.samples), q, dq, ddq, np.zeros_like(q))
+    for term in CLASSIC:
+        for column in term.columns(model, full, {}):
+            yield column.name, column.joint, motion.rows(column.values)
+
+
+def _reversals(model: RobotModel, motion: PeriodicMotion) -> Iterator[tuple[str, int, np.ndarray]]:
+    """The same of what friction does at a reversal."""
+    dq = motion.states(motion.samples)[1]
+    rounded = np.nan_to_num(model.coulomb) * (np.tanh(dq / _REVERSAL_VELOCITY) - np.sign(dq))
+    for joint, name in enumerate(model.joint_names):
+        yield _reversal(name), joint, motion.rows(rounded[:, joint])
+
+
+def _drive_names(model: RobotModel) -> tuple[str, ...]:
+    still = np.zeros((1, model.n))
+    motion = Motion(np.zeros(1), still, still, still, still)
+    return tuple(dict.fromkeys(column.name for term in CLASSIC for column in term.columns(model, motion, {})))
+
+
+def _of_drive(name: str) -> bool:
+    key = name.rpartition(".")[2].partition("_at_")[0]
+    return key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", *PARALLEL)
+
+
+def _reversal(joint: str) -> str:
+    return f"{joint}.reversal"

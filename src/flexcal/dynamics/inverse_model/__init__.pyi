@@ -1,0 +1,42 @@
+from .base_parameters import BaseParameters
+from .bearing_spring import BearingSpring
+from .drive_spring import DriveSpring, Play
+from .drive_terms import (
+    CLASSIC,
+    Column,
+    Coulomb,
+    Coupling,
+    DriveTerm,
+    JointSprings,
+    Memory,
+    RotorInertia,
+    TorqueOffset,
+    Viscous,
+)
+from .equations import Equations
+from .motor_axis import MotorAxis, motor_axes, motor_shares
+from .observation import Observation
+from .sensor_offset import SensorOffset
+
+__all__ = [
+    "CLASSIC",
+    "BaseParameters",
+    "BearingSpring",
+    "Column",
+    "Coulomb",
+    "Coupling",
+    "DriveSpring",
+    "DriveTerm",
+    "Equations",
+    "JointSprings",
+    "Memory",
+    "MotorAxis",
+    "Observation",
+    "Play",
+    "RotorInertia",
+    "SensorOffset",
+    "TorqueOffset",
+    "Viscous",
+    "motor_axes",
+    "motor_shares",
+]

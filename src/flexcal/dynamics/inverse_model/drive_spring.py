@@ -1,0 +1,81 @@
+"""Torque of the spring between motor and arm of an elastic joint, and its columns (Eq. 2.22)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.dynamics.inverse_model.drive_terms import Column
+from flexcal.dynamics.signals import Motion
+from flexcal.errors import FlexcalError
+from flexcal.model.robot import RobotModel
+
+
+@dataclass(frozen=True)
+class Play:
+    """Backlash in a drive: no torque while q - θ is nearer to `centre` than `half_gap`, both in rad."""
+
+    centre: float
+    half_gap: float
+
+
+@dataclass(frozen=True)
+class DriveSpring:
+    """The drive of the elastic `joint` (its number), with `play` where backlash is looked for.
+
+    The equation of the motor alone, which follows those of all joints, gains - `<joint>.drive.stiffness` (q - θ),
+    - `.drive.damping` (q̇ - θ̇) and + `.drive.torque_offset`, τ_k0; with play also + `.drive.gap_torque` sign(q - θ - centre), the
+    stiffness times half the gap, and none of them within the gap. Arm and motor together gain what turns and rubs on the arm side of
+    the drive (Eq. 2.23a): `.arm_inertia` q̈, `.arm_viscous` q̇ and `.arm_coulomb` sign q̇. Thanks to them nothing that the arm's model
+    misses, as bearing tilts, reaches the motor's inertia and friction, and through them the stiffness.
+    """
+
+    joint: int
+    play: Play | None = None
+
+    def with_play(self, model: RobotModel, values: Mapping[str, float]) -> DriveSpring:
+        """With the play that `values` by name amount to."""
+        name = f"{model.joint_names[self.joint]}.drive"
+        stiffness = values[f"{name}.stiffness"]
+        half_gap = max(0.0, values.get(f"{name}.gap_torque", 0.0) / stiffness)
+        return replace(self, play=Play(values[f"{name}.torque_offset"] / stiffness, half_gap))
+
+    def columns(self, model: RobotModel, motion: Motion, motor: int) -> Iterator[Column]:
+        """The columns, where `motor` is the number of the motor's equation; raises `FlexcalError` for a motion without arm side."""
+        arm = motion.arm
+        if arm is None:
+            raise FlexcalError(f"{motion.name} has no positions on the arm side of the elastic joints.")
+        name, at = model.joint_names[self.joint], (slice(None), self.joint)
+        twist, rate = arm.q[at] - motion.q[at], arm.dq[at] - motion.dq[at]
+        yield Column(f"{name}.arm_inertia", self.joint, arm.ddq[at])
+        yield Column(f"{name}.arm_viscous", self.joint, arm.dq[at])
+        yield Column(f"{name}.arm_coulomb", self.joint, np.sign(arm.dq[at]))
+        stretch = twist if self.play is None else twist - self.play.centre
+        gap = 0.0 if self.play is None else self.play.half_gap
+        touches = (np.abs(stretch) >= gap).astype(float)
+        yield Column(f"{name}.drive.stiffness", motor, -touches * twist)
+        yield Column(f"{name}.drive.damping", motor, -touches * rate)
+        yield Column(f"{name}.drive.torque_offset", motor, touches)
+        if self.play is not None:  # last, so that recordings of one flank tell the offset and not the gap
+            yield Column(f"{name}.drive.gap_torque", motor, touches * np.sign(stretch))
+
+
+def coupled_columns(model: RobotModel, motion: Motion, motors: Mapping[int, int]) -> Iterator[Column]:
+    """What springs between the motors and a coupling add to the motors' equations, whose numbers are `motors` by joint.
+
+    Motor m, which also turns joint j by the ratio r, stretches its spring by (q - θ)_m + r (q - θ)_j: `<m>.drive.stiffness_at_<j>` is
+    what either motor feels of the other's twist, r times the stiffness before the coupling, and zero for springs behind it. What a motor
+    feels of its own twist stands in its own stiffness, r² of the other's before the coupling included. Damping likewise.
+    """
+    arm = motion.arm
+    for entry in model.config.drives.coupling:
+        m, j = model.joint_index(entry.motor), model.joint_index(entry.joint)
+        if arm is None or m not in motors or j not in motors:
+            continue
+        for key, far, near in (("stiffness", arm.q, motion.q), ("damping", arm.dq, motion.dq)):
+            twist = far - near
+            name = f"{entry.motor}.drive.{key}_at_{entry.joint}"
+            yield Column(name, motors[m], -entry.ratio * twist[:, j])
+            yield Column(name, motors[j], -entry.ratio * twist[:, m])

@@ -1,0 +1,230 @@
+"""The observation matrix of a robot, joint by joint: link inertials and drive terms, rigid (Eq. 2.20) or flexible (Eq. 2.22)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.dynamics.inverse_model.bearing_spring import BearingSpring
+from flexcal.dynamics.inverse_model.drive_spring import DriveSpring, coupled_columns
+from flexcal.dynamics.inverse_model.drive_terms import Column, DriveTerm, JointSprings, Memory
+from flexcal.dynamics.inverse_model.independent_inertials import LinkColumns, link_columns
+from flexcal.dynamics.inverse_model.sensor_offset import SensorOffset
+from flexcal.dynamics.inverse_model.tilted_bearings import TiltedArm
+from flexcal.dynamics.signals import ArmSide, Motion
+from flexcal.model.parts import INERTIAL
+from flexcal.model.robot import RobotModel
+from flexcal.model.torques import inertial_names, torque_regressor, write_torque_regressor
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """Columns of the joint torques: link inertials and drive terms of a robot.
+
+    There is one equation a joint, and after them one a motor that is connected by one of the `springs`: that of the motor alone. The
+    joint's own is arm and motor together, Eq. 2.22's two rows added: the spring cancels, links move with the arm, drives with the motor,
+    and what acts from outside (τ_ext) stands beside the motor's torque. After them comes one a bearing spring, where tilts were measured:
+    that of the links about the tilt's axis, whose right-hand side is zero.
+
+    Of the columns of a joint that the links bring, some always are combinations of others, whatever the motion is. `reduced` leaves them
+    out, and `spread` (one an equation) says how the others give them back: W = W_reduced · spread.
+    """
+
+    model: RobotModel
+    terms: tuple[DriveTerm, ...]
+    springs: tuple[DriveSpring, ...] = ()
+    bearings: tuple[BearingSpring, ...] = ()
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Names of all columns: the links' inertials in chain order, then the terms'."""
+        drives = [column.name for column in self._at_rest]
+        return (*inertial_names(self.model), *dict.fromkeys(drives))
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The joints' names, then those of the motors alone, then the bearings'."""
+        bearings = (bearing.name(self.model) for bearing in self.bearings)
+        return (*self.model.joint_names, *(f"{motor}, motor" for motor in self.motors), *bearings)
+
+    @property
+    def undriven(self) -> range:
+        """Numbers of the equations whose right-hand side is zero: those of the bearings."""
+        first = self.model.n + len(self.springs)
+        return range(first, first + len(self.bearings))
+
+    @property
+    def motors(self) -> tuple[str, ...]:
+        """The joints whose motors have equations of their own, in the order of these."""
+        return tuple(self.model.joint_names[spring.joint] for spring in self.springs)
+
+    @cached_property
+    def _torques(self) -> list[int]:
+        """For every equation the joint whose motor torque is its right side."""
+        return [*range(self.model.n), *(spring.joint for spring in self.springs)]
+
+    @cached_property
+    def members(self) -> tuple[np.ndarray, ...]:
+        """For every equation the numbers of the columns that it can feel, ascending."""
+        return tuple(
+            np.concatenate([links.felt, own]) for links, own in zip(self._links, self._drives, strict=True)
+        )
+
+    @cached_property
+    def spread(self) -> tuple[np.ndarray, ...]:
+        """For every equation (reduced, members): its columns from its reduced ones."""
+        found = []
+        for links, own in zip(self._links, self._drives, strict=True):
+            kept, felt = links.spread.shape
+            spread = np.eye(kept + len(own), felt + len(own), k=felt - kept)
+            spread[:kept, :felt] = links.spread
+            found.append(spread)
+        return tuple(found)
+
+    @cached_property
+    def _links(self) -> tuple[LinkColumns, ...]:
+        """For every equation; a motor alone feels no link, and where bearings tilt none of the columns is left out."""
+        nothing = LinkColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
+        motors = (nothing for _ in self.springs)
+        if self._tilted is None:
+            return (*link_columns(self.model), *motors)
+        joints = [(joint, 2) for joint in range(self.model.n)]
+        tilts = [(bearing.joint, bearing.component) for bearing in self.bearings]
+        every = [[_all_of(self._tilted.felt(at)) for at in some] for some in (joints, tilts)]
+        return (*every[0], *motors, *every[1])
+
+    @cached_property
+    def _tilted(self) -> TiltedArm | None:
+        """The arm with its tilts, where there are any."""
+        tilting = sorted({bearing.joint for bearing in self.bearings})
+        return TiltedArm(self.model, tilting) if tilting else None
+
+    @cached_property
+    def _at_rest(self) -> list[Column]:
+        state = np.zeros((1, self.model.n))
+        side = ArmSide(state, state, state)
+        still = Motion(np.zeros(1), state, state, state, state, replace(side, tilts=(side, side)))
+        return list(self._drive_columns(still, {}))
+
+    @cached_property
+    def _drives(self) -> list[np.ndarray]:
+        """For every equation the numbers of the drive columns that it feels, ascending."""
+        number = {name: i for i, name in enumerate(self.names)}
+        felt: list[set[int]] = [set() for _ in self.labels]
+        for column in self._at_rest:
+            felt[column.joint].add(number[column.name])
+        return [np.array(sorted(numbers), dtype=int) for numbers in felt]
+
+    @cached_property
+    def widths(self) -> list[int]:
+        """For every equation the number of its reduced columns, and one for its torque."""
+        return [len(spread) + 1 for spread in self.spread]
+
+    @cached_property
+    def _places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of `reduced`: of the links' entries (coordinates, 10 n), -1 for those left out, and of every drive column.
+
+        Coordinates are the joints, or those of the tilted arm.
+        """
+        starts = np.cumsum([0, *self.widths])
+        tilts = {
+            (bearing.joint, bearing.component): at
+            for bearing, at in zip(self.bearings, self.undriven, strict=True)
+        }
+        coordinates = [(joint, 2) for joint in range(self.model.n)]
+        coordinates = coordinates if self._tilted is None else self._tilted.coordinates
+        links = np.full((len(coordinates), len(INERTIAL) * self.model.n), -1)
+        for number, (joint, component) in enumerate(coordinates):
+            equation = joint if component == 2 else tilts[joint, component]
+            own = self._links[equation]
+            links[number, own.kept] = starts[equation] + np.arange(len(own.kept))
+        number = {name: i for i, name in enumerate(self.names)}
+        drives = [
+            starts[c.joint]
+            + len(self._links[c.joint].kept)
+            + np.searchsorted(self._drives[c.joint], number[c.name])
+            for c in self._at_rest
+        ]
+        return links, np.array(drives, dtype=int)
+
+    def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
+        """For every equation its reduced columns and, last, its torque, below each other (Σ widths, N), at every sample of the motion.
+
+        The motion continues what `memory` is of, which is brought up to its end; it begins an experiment without. Raises `FlexcalError`
+        where there are springs and the motion has no arm side.
+        """
+        links, drives = self._places
+        found = np.empty((sum(self.widths), len(motion)))
+        if self._tilted is None:
+            write_torque_regressor(self.model, *self._link_states(motion), links, found)
+        else:
+            self._tilted.write(self._link_states(motion), motion, links, found)
+        undriven = np.zeros((len(motion), len(self.bearings)))
+        right = [motion.net, motion.torque[:, self._torques[self.model.n :]], undriven]
+        found[np.cumsum(self.widths) - 1] = np.hstack(right).T
+        columns = self._drive_columns(motion, {} if memory is None else memory)
+        for place, column in zip(drives, columns, strict=True):
+            found[place] = column.values
+        return found
+
+    def systems(self, motion: Motion, memory: Memory | None = None) -> list[np.ndarray]:
+        """For every equation all its columns and, last, its torque (members + 1, N), where `reduced` leaves some out."""
+        parts = np.split(self.reduced(motion, memory), np.cumsum(self.widths)[:-1])
+        return [np.vstack([s.T @ part[:-1], part[-1]]) for s, part in zip(self.spread, parts, strict=True)]
+
+    def follow(self, motion: Motion, memory: Memory) -> None:
+        """Bring `memory` up to the end of a motion whose columns are not needed."""
+        for _ in self._drive_columns(motion, memory):
+            pass
+
+    def _drive_columns(self, motion: Motion, memory: Memory) -> Iterator[Column]:
+        motors = {spring.joint: self.model.n + k for k, spring in enumerate(self.springs)}
+        behind = replace(motion, q=self._link_states(motion)[0])
+        for term in self.terms:
+            on_arm = isinstance(term, JointSprings | SensorOffset)
+            for column in term.columns(self.model, behind if on_arm else motion, memory):
+                yield column
+                if column.joint in motors and not on_arm:
+                    yield Column(column.name, motors[column.joint], column.values)
+        for spring in self.springs:
+            yield from spring.columns(self.model, motion, motors[spring.joint])
+        yield from coupled_columns(self.model, motion, motors)
+        for bearing, equation in zip(self.bearings, self.undriven, strict=True):
+            yield from bearing.columns(self.model, motion, equation)
+
+    def _link_states(self, motion: Motion) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions, velocities and accelerations of the links: behind the springs, else as the motors."""
+        states = motion.q, motion.dq, motion.ddq
+        if motion.arm is None or not self.springs:
+            return states
+        behind = np.isin(np.arange(self.model.n), [spring.joint for spring in self.springs])
+        arm = motion.arm.q, motion.arm.dq, motion.arm.ddq
+        q, dq, ddq = (np.where(behind, far, near) for far, near in zip(arm, states, strict=True))
+        return q, dq, ddq
+
+    def columns(self, motion: Motion) -> list[np.ndarray]:
+        """For every equation all its columns (members, N) at every sample of the motion, none left out."""
+        if self._tilted is not None:
+            return [system[:-1] for system in self.systems(motion)]
+        links = torque_regressor(self.model, *self._link_states(motion))
+        found = [np.zeros((len(members), len(motion))) for members in self.members]
+        for joint, own in enumerate(self._links[: self.model.n]):
+            found[joint][: len(own.felt)] = links[:, joint, own.felt].T
+        number = {name: i for i, name in enumerate(self.names)}
+        for column in self._drive_columns(motion, {}):
+            members = self.members[column.joint]
+            found[column.joint][np.searchsorted(members, number[column.name])] = column.values
+        return found
+
+    def values(self) -> np.ndarray:
+        """The model's values of all columns (p,), zero where it knows none."""
+        known = self.model.values
+        return np.nan_to_num([known.get(name, 0.0) for name in self.names])
+
+
+def _all_of(felt: np.ndarray) -> LinkColumns:
+    """All columns that are felt, each its own."""
+    return LinkColumns(felt, felt, np.eye(len(felt)))

@@ -1,0 +1,89 @@
+"""Columns of the links' inertials in the torques of an arm whose bearings tilt: about every joint, and about the bearings' axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.dynamics.signals import Motion
+from flexcal.kernels import Tree
+from flexcal.model.kinematics import joint_placement
+from flexcal.model.parts import INERTIAL, bearing_frame
+from flexcal.model.robot import RobotModel
+
+_TURNED = {2: (0, 1, 2), 1: (2, 0, 1), 0: (1, 2, 0)}
+"""Axes of the bearing frame in cyclic order, that of the coordinate last."""
+
+
+class TiltedArm:
+    """The robot's tree with a joint for each tilt of the bearings of `tilting` joints, in the order of Eq. (1).
+
+    `coordinates` are (joint, component) from base to tool: 2 the joint itself, 1 tilt about y, 0 tilt about x.
+    """
+
+    def __init__(self, model: RobotModel, tilting: Sequence[int]) -> None:
+        self.model, self._tilting = model, tuple(tilting)
+        components = {e.index: e.components for e in model.elastic if e.index in self._tilting}
+        self.coordinates = [(i, c) for i in range(model.n) for c in components.get(i, (2,))]
+        last = {joint: number for number, (joint, _) in enumerate(self.coordinates)}
+        self._links = np.concatenate(
+            [len(INERTIAL) * last[joint] + np.arange(len(INERTIAL)) for joint in range(model.n)]
+        )
+        parents, slides, turns, offsets, normals, frames = [], [], [], [], [], []
+        for number, (joint, component) in enumerate(self.coordinates):
+            nominal = model.joints[joint]
+            first = number == 0 or self.coordinates[number - 1][0] != joint
+            offset, turn = joint_placement(model, joint) if first else (np.zeros(3), np.eye(3))
+            own = model.bearing_frames.get(joint)
+            frame = bearing_frame(nominal) if own is None else own
+            parents.append(number - 1 if not first else last[nominal.parent] if nominal.parent >= 0 else -1)
+            slides.append(nominal.kind == "prismatic")
+            turns.append(turn)
+            offsets.append(offset)
+            normals.append(nominal.normals)
+            frames.append(frame[:, _TURNED[component]])
+        self._tree = Tree.build(
+            parents, slides, np.array(turns), np.array(offsets), np.array(normals), np.array(frames), False
+        )
+        self._geometry = np.zeros((len(self.coordinates), 6))
+        for number, (joint, component) in enumerate(self.coordinates):
+            if component == 2:
+                self._geometry[number, 0] = model.geometry[joint, 0]
+
+    def __reduce__(self) -> tuple[type[TiltedArm], tuple[RobotModel, tuple[int, ...]]]:
+        """The kernels' view is built anew where it arrives: other processes can be handed arms."""
+        return TiltedArm, (self.model, self._tilting)
+
+    def felt(self, coordinate: tuple[int, int]) -> np.ndarray:
+        """Numbers of the inertials, of all links, that a coordinate feels: those of the links beyond its joint."""
+        beyond = []
+        for link in range(self.model.n):
+            at = link
+            while at > coordinate[0]:
+                at = self.model.joints[at].parent
+            if at == coordinate[0]:
+                beyond.append(link)
+        return np.concatenate([len(INERTIAL) * link + np.arange(len(INERTIAL)) for link in beyond])
+
+    def write(
+        self,
+        states: tuple[np.ndarray, np.ndarray, np.ndarray],
+        motion: Motion,
+        places: np.ndarray,
+        out: np.ndarray,
+    ) -> None:
+        """Column c of coordinate k becomes row `places`[k, c] of `out` (rows, N), -1 for those that are not needed.
+
+        `states` are the links' q, q̇, q̈ (N, n); the tilts are those of the motion's arm side.
+        """
+        q, dq, ddq = (self._whole(values, motion, order) for order, values in enumerate(states))
+        wide = np.full((len(self.coordinates), len(INERTIAL) * len(self.coordinates)), -1)
+        wide[:, self._links] = places
+        self._tree.torque_regressor(self._geometry, self.model.gravity, q, dq, ddq, wide, out)
+
+    def _whole(self, values: np.ndarray, motion: Motion, order: int) -> np.ndarray:
+        found = np.empty((len(values), len(self.coordinates)))
+        for number, (joint, component) in enumerate(self.coordinates):
+            found[:, number] = values[:, joint] if component == 2 else motion.tilt(component, order)[:, joint]
+        return found

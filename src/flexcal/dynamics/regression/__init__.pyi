@@ -1,0 +1,51 @@
+from .assembly import RegressionData, Subsystem, batches_each, observe
+from .batches import Batch, ExperimentSystem, batch_length, batched, experiment_system, reduced
+from .blocks import Rows, rows
+from .covariance import (
+    BatchCovariance,
+    batch_covariance,
+    covariance_of_scores,
+    mixed_covariance,
+    offset_scores,
+    rows_of,
+    score_covariance,
+)
+from .cross_validation import Fold, fold_numbers, folds, prediction_errors, solutions
+from .cutoff_selection import CutoffChoice, Piece, choose_cutoff, pieces
+from .scores import Scores
+from .triangular_factor import Triangle, stacked, triangular
+
+__all__ = [
+    "Batch",
+    "BatchCovariance",
+    "CutoffChoice",
+    "ExperimentSystem",
+    "Fold",
+    "Piece",
+    "RegressionData",
+    "Rows",
+    "Scores",
+    "Subsystem",
+    "Triangle",
+    "batch_covariance",
+    "batch_length",
+    "batched",
+    "batches_each",
+    "choose_cutoff",
+    "covariance_of_scores",
+    "experiment_system",
+    "fold_numbers",
+    "folds",
+    "mixed_covariance",
+    "observe",
+    "offset_scores",
+    "pieces",
+    "prediction_errors",
+    "reduced",
+    "rows",
+    "rows_of",
+    "score_covariance",
+    "solutions",
+    "stacked",
+    "triangular",
+]

@@ -1,0 +1,89 @@
+"""Covariance of scores where the torque noise of a joint remembers itself for long, as a first-order autoregressive process."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.linalg import cholesky, solve_triangular
+
+from flexcal.dynamics.regression.scores import Scores
+
+_BATCHES = 64
+"""Batches of an experiment, at most, in which memory is looked for: short memory is not what this is for."""
+_FEWEST = 12
+"""Contrasts between batches without which nothing is told about memory."""
+_SHARES = (1.0, 0.8, 0.5, 0.2)
+"""Shares of the variance of a batch that the process with memory has; the rest is white."""
+_LONGEST = 1 / 3
+"""Longest memory, as share of the recording: longer ones are drift, which an offset absorbs."""
+_STEPS = 14
+_TAKEN = 1e-4
+"""Share of a contrast between batches below which the fit has taken it: nothing is left there to tell noise by."""
+
+
+def remembered(experiments: Sequence[Scores], offsets: np.ndarray) -> tuple[np.ndarray, float]:
+    """Covariance (k, k) of the scores summed, and the longest time constant of a joint's noise, as a number of batches.
+
+    A column of `offsets` (k, joints) times a score is that of a joint's torque offset: the sum of its residuals in the batch. Its size over
+    the root of its information is the noise at low frequency, less what the fit took from there. Level, share and time constant have a
+    posterior with flat priors (of the logarithm of the time constant; half of it on white noise), from the likelihood of these residuals
+    with the covariance that the projection of the fit leaves (as restricted maximum likelihood, Patterson & Thompson 1971); the covariance
+    is averaged over it, since a recording of a few time constants tells little about them.
+    """
+    size = len(offsets)
+    total, longest = np.zeros((size, size)), 0.0
+    for experiment in experiments:
+        merged = -(-len(experiment.score) // _BATCHES)
+        score, information = (
+            _merged(values, merged) for values in (experiment.score, experiment.information)
+        )
+        for offset in offsets.T:
+            mean = information @ offset
+            level = mean @ offset
+            seen = level > 1e-3 * level.max(initial=0.0)
+            own, memory = _own(np.flatnonzero(seen), (score @ offset)[seen], mean[seen], level[seen])
+            total += own
+            longest = max(longest, memory * merged)
+    return total, longest
+
+
+def _merged(values: np.ndarray, count: int) -> np.ndarray:
+    return np.add.reduceat(values, np.arange(0, len(values), count), axis=0)
+
+
+def _own(
+    number: np.ndarray, sums: np.ndarray, rows: np.ndarray, level: np.ndarray
+) -> tuple[np.ndarray, float]:
+    """Of one joint and experiment: batches with these numbers, sums (B,) of residuals, of regressors (B, k), and numbers of rows."""
+    batches, size = rows.shape
+    root = np.sqrt(level)
+    residual, regressors = sums / root, rows / root[:, None]
+    taken, directions = np.linalg.eigh(np.eye(batches) - regressors @ regressors.T)
+    contrasts = directions[:, taken > _TAKEN]
+    if contrasts.shape[1] < _FEWEST:
+        return np.zeros((size, size)), 0.0
+    left = contrasts.T - (contrasts.T @ regressors) @ regressors.T
+    others = contrasts.T @ regressors @ (np.eye(size) - regressors.T @ regressors) @ regressors.T @ contrasts
+    seen = contrasts.T @ residual
+    lag = np.abs(np.subtract.outer(number, number))
+    sizes = np.outer(root, root) / np.mean(level)
+    memories = np.geomspace(0.5, max(1.0, _LONGEST * (number[-1] + 1)), _STEPS)
+    tried = [(0.0, np.eye(batches))]
+    tried += [
+        (share * memory, share * np.exp(-lag / memory) * sizes + (1.0 - share) * np.eye(batches))
+        for memory in memories
+        for share in _SHARES
+    ]
+    evidence, squares = [], []
+    for _, noise in tried:
+        factor = cholesky(left @ noise @ left.T + others, lower=True)
+        squares.append(float(np.sum(solve_triangular(factor, seen, lower=True) ** 2)))
+        evidence.append(-np.sum(np.log(np.diag(factor))) - 0.5 * len(seen) * np.log(squares[-1]))
+    weights = np.exp(np.array(evidence) - np.max(evidence))
+    weights[0] *= len(tried) - 1.0
+    weights /= weights.sum()
+    each = zip(weights, squares, tried, strict=True)
+    noise = sum(w * s / (len(seen) - 2.0) * matrix for w, s, (_, matrix) in each)
+    memory = float(sum(w * time for w, (time, _) in zip(weights, tried, strict=True)))
+    return regressors.T @ noise @ regressors, memory

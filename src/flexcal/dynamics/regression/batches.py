@@ -1,0 +1,141 @@
+"""Equations of one experiment as upper-triangular factors of consecutive batches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.inverse_model import Equations
+from flexcal.dynamics.regression.blocks import Rows, rows
+from flexcal.dynamics.regression.triangular_factor import triangular
+from flexcal.dynamics.signals import Experiment, Window
+from flexcal.errors import FlexcalError
+from flexcal.kernels import append
+
+BATCHES = 128
+"""Largest number of batches of an experiment, sufficient for the autocorrelation of its errors at any length."""
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Rows that follow each other: `factors` has for every equation of the observation a matrix F with FᵀF = [W, Y]ᵀ[W, Y], by
+    reflections of its rows.
+
+    `number` counts the batches of the experiment, whatever is left out; a batch without rows does not exist.
+    """
+
+    number: int
+    rows: int
+    factors: tuple[np.ndarray, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class ExperimentSystem:
+    """All that estimators need of one experiment; `masked` are the rows left out because the robot stood still.
+
+    A batch without gaps has `batch_rows` rows. The rows lie within `duration` (s).
+    """
+
+    batches: tuple[Batch, ...]
+    batch_rows: int
+    duration: float
+    masked: int
+
+
+def experiment_system(
+    observation: Equations,
+    experiment: Experiment,
+    decimation: Decimation,
+    window: Window,
+    *,
+    mask_standstill: bool,
+    batches: int = BATCHES,
+    weights: np.ndarray | None = None,
+) -> ExperimentSystem:
+    """One pass over an experiment, in at most about so many `batches` of equal length.
+
+    `weights` (equations, rows) are those of every equation's rows by their numbers; without, all count alike.
+    Raises `FlexcalError` where no row is left, or a column comes out as not finite.
+    """
+    blocks = rows(observation, experiment, decimation, window)
+    if weights is not None:
+        blocks = (block.weighted(weights[:, block.number]) for block in blocks)
+    length = batch_length(experiment, decimation, batches)
+    return batched(blocks, experiment.name, length, mask_standstill=mask_standstill)
+
+
+def batch_length(experiment: Experiment, decimation: Decimation, batches: int) -> int:
+    """Rows of a batch without gaps, for at most about so many `batches`."""
+    total = max(0, experiment.samples - 2 * decimation.support - 1) // decimation.factor + 1
+    return -(-total // batches)
+
+
+def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: bool) -> ExperimentSystem:
+    """The rows of the experiment `name` in batches of `length`; raises `FlexcalError` as `experiment_system` does."""
+    found: list[Batch] = []
+    masked = 0
+    current: _Growing | None = None
+    first, last = math.inf, -math.inf
+    for block in blocks:
+        if mask_standstill:
+            masked += int(block.still.sum())
+            block = block.where(~block.still)
+        if len(block):
+            first = min(first, float(block.time[0]))
+            last = float(block.time[-1])
+        for part in _split(block, length):
+            number = int(part.number[0]) // length
+            if current is None or current.number != number:
+                found += [] if current is None else [current.batch()]
+                current = _Growing(number, part.spread)
+            current.add(part)
+    found += [] if current is None else [current.batch()]
+    if not all(np.isfinite(factor).all() for batch in found for factor in batch.factors):
+        raise FlexcalError(f"the equations of {name} are not finite.")
+    if not found:
+        raise FlexcalError(
+            f"no equations remain of {name}: it, or the part that is fitted or held out, is too short for its filters, "
+            "or the robot stands still in it."
+        )
+    return ExperimentSystem(tuple(found), length, last - first, masked)
+
+
+class _Growing:
+    """A batch to which rows come; it holds none of them."""
+
+    def __init__(self, number: int, spread: tuple[np.ndarray, ...]) -> None:
+        self.number = number
+        self._rows = 0
+        self._spread = spread
+        self._factors = [np.zeros((len(own) + 1, len(own) + 1)) for own in spread]
+
+    def add(self, part: Rows) -> None:
+        """Spends the rows: what they are in is overwritten."""
+        self._rows += len(part)
+        for factor, system in zip(self._factors, part.reduced, strict=True):
+            append(factor, np.ascontiguousarray(system))
+
+    def batch(self) -> Batch:
+        whole = [
+            np.column_stack([factor[:, :-1] @ spread, factor[:, -1]])
+            for factor, spread in zip(self._factors, self._spread, strict=True)
+        ]
+        return Batch(self.number, self._rows, tuple(whole))
+
+
+def reduced(systems: list[np.ndarray]) -> np.ndarray:
+    """R of systems [W, Y] (·, k + 1) stacked, or just the stack where that has no more rows than R would."""
+    stack = np.hstack([system.T for system in systems]).T
+    return stack if len(stack) <= stack.shape[1] else triangular(stack)
+
+
+def _split(block: Rows, length: int) -> list[Rows]:
+    """By batch."""
+    numbers = block.number // length
+    if len(numbers) == 0 or numbers[0] == numbers[-1]:
+        return [block] if len(numbers) else []
+    return [block.where(numbers == number) for number in np.unique(numbers)]

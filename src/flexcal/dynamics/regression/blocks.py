@@ -1,0 +1,163 @@
+"""The equations of one experiment, filtered and decimated, block by block (Eq. 2.26)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data.recordings import Decimation, DecimationStream
+from flexcal.dynamics.inverse_model import Equations, Memory
+from flexcal.dynamics.signals import Experiment, Motion, Window, slowest_speeds, stretches
+
+_BLOCK = 1000
+"""Samples, about, whose columns are in memory at once; they fit a processor's cache, of which a power of two would use little."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """M equations of every kind (of each joint, and of motors alone) that follow each other.
+
+    `reduced` has for every kind the reduced columns of W and, last, Y transposed (·, M), and `spread` what gives W back, as an
+    `Observation` has them. `number` (M,) counts the rows of the experiment, whatever is left out; `time` (M,) is s, and `still` (M,)
+    tells where the robot stands still within a row: no joint is faster than a hundredth of its top speed.
+    """
+
+    number: np.ndarray
+    time: np.ndarray
+    still: np.ndarray
+    reduced: list[np.ndarray]
+    spread: tuple[np.ndarray, ...]
+
+    def __len__(self) -> int:
+        return len(self.number)
+
+    @property
+    def columns(self) -> list[np.ndarray]:
+        """For every kind W transposed (members, M)."""
+        return [spread.T @ own[:-1] for spread, own in zip(self.spread, self.reduced, strict=True)]
+
+    @property
+    def torque(self) -> np.ndarray:
+        """Y of all kinds (·, M)."""
+        return np.array([own[-1] for own in self.reduced])
+
+    def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
+        """W χ of all kinds (·, M) for `parameters` (p,), of which `members` are the numbers of each kind's own."""
+        each = zip(members, self.spread, self.reduced, strict=True)
+        return np.array([(spread @ parameters[felt]) @ own[:-1] for felt, spread, own in each])
+
+    def where(self, keep: np.ndarray) -> Rows:
+        """The rows that `keep` (M,) marks."""
+        if keep.all():
+            return self
+        reduced = [own[:, keep] for own in self.reduced]
+        return Rows(self.number[keep], self.time[keep], self.still[keep], reduced, self.spread)
+
+    def weighted(self, weights: np.ndarray) -> Rows:
+        """The rows of every kind times the root of their `weights` (·, M)."""
+        reduced = [own * root for own, root in zip(self.reduced, np.sqrt(weights), strict=True)]
+        return Rows(self.number, self.time, self.still, reduced, self.spread)
+
+
+def rows(
+    observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
+) -> Iterator[Rows]:
+    """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
+
+    No row reaches across a gap of the experiment. Memory does not grow with the recording. A pass with the same arguments gives the same
+    blocks again.
+    """
+    memory: Memory = {}
+    slowest = slowest_speeds(experiment)
+    done = 0
+
+    def counted(motions: Iterable[Motion]) -> Iterator[Motion]:
+        nonlocal done
+        for motion in motions:
+            done += len(motion)
+            yield motion
+
+    for stretch in stretches(experiment.blocks()):
+        first = -(-done // decimation.factor)
+        yield from _stretch_rows(observation, counted(stretch), slowest, decimation, window, memory, first)
+
+
+def _stretch_rows(
+    observation: Equations,
+    motions: Iterable[Motion],
+    slowest: np.ndarray,
+    decimation: Decimation,
+    window: Window,
+    memory: Memory,
+    first: int,
+) -> Iterator[Rows]:
+    """The rows of motions without gaps, from the number `first` on; friction remembers what was before."""
+    ends = np.cumsum(observation.widths)
+    stream = DecimationStream(decimation)
+    centres = _Centres(decimation, first)
+    reach = math.inf
+    for start, piece in _pieces(motions, decimation.factor * max(1, _BLOCK // decimation.factor)):
+        if len(piece) > 1:
+            reach = (decimation.support + 1) * float(piece.time[1] - piece.time[0])
+        if piece.time[-1] < window.start - reach:
+            observation.follow(piece, memory)
+            continue
+        if piece.time[0] > window.end + reach:
+            return
+        still = np.asarray((np.abs(piece.dq) <= slowest).all(axis=1))
+        centres.push(start, piece.time, still)
+        reduced = stream.push(observation.reduced(piece, memory))
+        number, time, still = centres.pop(reduced.shape[1])
+        found = Rows(number, time, still, np.split(reduced, ends[:-1]), observation.spread)
+        inside = (time >= window.start) & (time < window.end)
+        if inside.any():
+            yield found.where(inside)
+
+
+class _Centres:
+    """Time and standstill of the samples that decimated rows stand for, until their rows are complete.
+
+    A row stands still where the robot does anywhere in the main lobe of its filter, one row to either side: what friction is at rest, no
+    sign of a velocity tells, and the row holds a part of it.
+    """
+
+    def __init__(self, decimation: Decimation, number: int) -> None:
+        self._decimation = decimation
+        self._start = number
+        self._number: int | None = None
+        self._first = decimation.support
+        self._held = np.zeros((2, 0))
+
+    def push(self, start: int, time: np.ndarray, still: np.ndarray) -> None:
+        if self._number is None:
+            self._number = self._start + start // self._decimation.factor
+        self._held = np.hstack([self._held, [time, still]])
+
+    def pop(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        factor, size = self._decimation.factor, self._held.shape[1]
+        centres = self._first + factor * np.arange(count)
+        time, still = self._held
+        before = np.concatenate([[0.0], np.cumsum(still)])
+        low, high = np.maximum(centres - factor + 1, 0), np.minimum(centres + factor, size)
+        number = (self._number or 0) + np.arange(count)
+        self._number = (self._number or 0) + count
+        spent = min(size, max(0, self._first + factor * (count - 1)))
+        self._held, self._first = self._held[:, spent:], self._first + factor * count - spent
+        return number, time[centres], before[high] > before[low]
+
+
+def _pieces(motions: Iterable[Motion], size: int) -> Iterator[tuple[int, Motion]]:
+    """Parts of `size` samples (the last one shorter), each with the number of its first sample."""
+    start, held = 0, None
+    for motion in motions:
+        whole = motion if held is None else Motion.joined([held, motion])
+        full = len(whole) // size * size
+        for first in range(0, full, size):
+            yield start + first, whole.part(first, first + size)
+        start += full
+        held = whole.part(full, len(whole))
+    if held is not None and len(held):
+        yield start, held

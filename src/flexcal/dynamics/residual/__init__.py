@@ -1,0 +1,5 @@
+"""Learned residual torques of the motors by Gaussian process regression."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

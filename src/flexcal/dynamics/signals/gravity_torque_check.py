@@ -1,0 +1,83 @@
+"""Ratio of logged torques to the gravity torques of the links; close to zero for torques on the motor side."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.data.recordings import Recording
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import gravity_torque
+
+_POSES = 200
+"""Samples of a block whose weight is looked at."""
+_TOO_WEAK = 1 / 20
+"""Torques that follow less than this share of the weight are of the motors' side: gears begin beyond, currents in A do not reach it."""
+_HEAVY = 1 / 10
+"""Share of the heaviest joint's weight that a joint must carry to tell which way it pulls."""
+_AGAINST = -1 / 2
+"""Correlation below which torques pull the way that the weight does; friction brings it near zero, but not beyond."""
+_LIVELY = 2.0
+"""Torques of more than so many times the weight are those of accelerations, which may well go against it: they tell nothing of the sign."""
+_SMALL = 1 / 8
+"""Of the weight's; friction may add that to torques of motors."""
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedWeight:
+    """Sums over samples `of_weight` (n,) and `of_torque` (n,) of the squares, (N m)², and `of_both` (n,) of the products.
+
+    The weight is that of the links, and of what a log says that they hold; zero at joints with a declared spring, which may balance it.
+    """
+
+    of_weight: np.ndarray
+    of_torque: np.ndarray
+    of_both: np.ndarray
+
+    @classmethod
+    def empty(cls, joints: int) -> CarriedWeight:
+        """Of no samples."""
+        return cls(*np.zeros((3, joints)))
+
+    @classmethod
+    def of(cls, recording: Recording, model: RobotModel) -> CarriedWeight:
+        """Of some samples, evenly spread."""
+        some = slice(None, None, max(1, len(recording) // _POSES))
+        held = None if recording.payload is None else recording.payload[some]
+        weight, torque = gravity_torque(model, recording.q[some], held), recording.torque[some]
+        if recording.external_torque is not None:
+            torque = torque + recording.external_torque[some]
+        balanced = [entry.joint for entry in model.config.dynamics.joint_springs]
+        weight[:, [name in balanced for name in model.joint_names]] = 0.0
+        return cls(*(np.sum(x, axis=0) for x in (weight**2, torque**2, weight * torque)))
+
+    def __add__(self, other: CarriedWeight) -> CarriedWeight:
+        return CarriedWeight(
+            self.of_weight + other.of_weight, self.of_torque + other.of_torque, self.of_both + other.of_both
+        )
+
+    @property
+    def heaviest(self) -> int:
+        """The joint whose weight is largest."""
+        return int(np.argmax(self.of_weight))
+
+    @property
+    def share(self) -> float:
+        """Of its weight that the torques of the heaviest joint follow; 1 where nothing weighs."""
+        k = self.heaviest
+        return float(abs(self.of_both[k]) / self.of_weight[k]) if self.of_weight[k] > 0 else 1.0
+
+    @property
+    def reversed(self) -> int | None:
+        """The first joint of some weight whose torques do not hold it but pull it down; None where there is none."""
+        heavy = self.of_weight > _HEAVY**2 * self.of_weight.max()
+        told = self.of_torque < _LIVELY**2 * self.of_weight
+        against = self.of_both < _AGAINST * np.sqrt(self.of_weight * self.of_torque)
+        return next((int(k) for k in np.flatnonzero(heavy & told & against)), None)
+
+    @property
+    def by_motors(self) -> bool:
+        """Whether the torques are too weak for joints, and too small for friction to be the reason."""
+        k = self.heaviest
+        return self.share < _TOO_WEAK and bool(self.of_torque[k] < _SMALL**2 * self.of_weight[k])

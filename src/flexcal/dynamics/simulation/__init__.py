@@ -1,0 +1,5 @@
+"""Direct dynamic model: closed-loop simulation and discrete state transitions."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,5 @@
+"""Stiffness identification: global search, fit, score tests, lack of fit, comparison of bearing axes."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

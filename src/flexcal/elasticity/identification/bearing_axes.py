@@ -1,0 +1,97 @@
+"""Comparison of bearing axes fixed to the parent link with axes that turn with the child, from frequency responses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from flexcal.elasticity.identification.fit import ResponseData, ResponseFit, first_fit, fit_responses
+from flexcal.errors import FlexcalError
+from flexcal.estimation import vuong_statistic
+from flexcal.model.parts import Bearings
+from flexcal.model.robot import RobotModel
+
+CERTAIN = 3.0
+"""Vuong's statistic from which a preference is no chance."""
+
+
+@dataclass(frozen=True)
+class ResponseBearings:
+    """Comparison of fits with bearings that tilt `before` and `after` the joint's rotation, from frequency responses.
+
+    `declared` are those of robot.yaml, None where it has none. `statistic` is Vuong's over clusters of neighbouring lines, positive where
+    `before` fits better; `preferred` the clearly better ones, None where both fit about as well.
+    """
+
+    declared: Bearings | None
+    reduced_chi2: Mapping[Bearings, float]
+    statistic: float
+
+    @classmethod
+    def compare(
+        cls, declared: Bearings | None, before: ResponseFit, after: ResponseFit, weighing: ResponseFit
+    ) -> ResponseBearings:
+        """Two fits to the same responses, both weighed as that of the third (one of the two)."""
+        first, second = (weighing.whiten(fit.residual.residual(fit.x)) for fit in (before, after))
+        groups = weighing.problem.groups
+        assert groups is not None
+        chi2: dict[Bearings, float] = {
+            "before": before.estimate.reduced_chi2,
+            "after": after.estimate.reduced_chi2,
+        }
+        return cls(declared, chi2, vuong_statistic(first, second, groups))
+
+    @property
+    def preferred(self) -> Bearings | None:
+        """The bearings that the responses clearly fit better."""
+        if abs(self.statistic) < CERTAIN:
+            return None
+        return "before" if self.statistic > 0 else "after"
+
+    @property
+    def taken(self) -> Bearings:
+        """The declared ones; without a declaration the preferred, or as Eq. (1) has them."""
+        return self.declared or self.preferred or "after"
+
+    @property
+    def contradicted(self) -> bool:
+        """Whether the responses clearly prefer other bearings than the declared ones."""
+        return self.preferred not in (None, self.taken)
+
+
+def with_fitting_bearings(
+    model: RobotModel,
+    data: ResponseData,
+    first: ResponseFit,
+    complete: Callable[[RobotModel, ResponseFit], tuple[RobotModel, ResponseFit]],
+) -> tuple[RobotModel, ResponseFit, ResponseBearings | None]:
+    """What `complete` makes of a robot's `first` fit, or of a first fit with the other bearings where these are taken; and why.
+
+    Where completing the better one adds springs, bearings were not all that was missing: the other is then fitted with the same springs,
+    from there, before they are compared. The last is None for a robot without bearings, or where one with the others has no fit.
+    """
+    if not model.has_bearings:
+        return *complete(model, first), None
+    other = model.with_bearings("before" if model.bearings == "after" else "after")
+
+    def compared(own: ResponseFit, others: ResponseFit) -> ResponseBearings:
+        before, after = (own, others) if model.bearings == "before" else (others, own)
+        return ResponseBearings.compare(model.config.bearings, before, after, own)
+
+    try:
+        begun = {model.bearings: (model, first), other.bearings: (other, first_fit(other, data, first.x))}
+    except FlexcalError:
+        return *complete(model, first), None
+    found = compared(first, begun[other.bearings][1])
+    better = found.preferred or model.bearings
+    robot, fit = complete(*begun[better])
+    ended = {better: (robot, fit)}
+    if robot.braked != model.braked:
+        worse: Bearings = "before" if better == "after" else "after"
+        robot = robot.with_bearings(worse)
+        try:
+            ended[worse] = robot, fit_responses(robot, data, fit.x)
+        except FlexcalError:
+            return *ended[better], found
+        found = compared(ended[model.bearings][1], ended[other.bearings][1])
+    return *(ended.get(found.taken) or complete(*begun[found.taken])), found

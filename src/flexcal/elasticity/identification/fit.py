@@ -1,0 +1,153 @@
+"""One weighted fit of the linearised elastic robot to the frequency responses of all poses (Eqs. 26, 27)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan
+from flexcal.elasticity.response_model import (
+    CLUSTER_LINES,
+    CovarianceWeighting,
+    ExperimentEffect,
+    ModelError,
+    ResponseModel,
+    StageOneResidual,
+    Tolerances,
+    Weighting,
+    experiment_effects,
+    stage_one_parameters,
+)
+from flexcal.elasticity.time_periodic import ReferenceMotion
+from flexcal.estimation import Estimate, Parameters, Problem, solve
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+ROUNDS = 2
+"""Fits, each with model error and reference motion evaluated at the last optimum."""
+
+FINE, COARSE = 1e-6, 1e-3
+"""Tolerances of the last fit, and of those before it."""
+COARSE_ITERATIONS = 60
+"""Most iterations of the latter: a model that is wrong may go on for hundreds, to no end."""
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseData:
+    """Measured responses, and how they were measured and are weighed.
+
+    With the `plan`, the reference motion is part of the prediction. `tolerances` are the standard deviations of what the model leaves out.
+    `inertias_known` keeps link and payload inertias at the model's; with `hardening` that of the drives is estimated.
+    """
+
+    responses: tuple[FrequencyResponse, ...]
+    plan: MultisinePlan | None = None
+    weighting: Weighting = field(default_factory=CovarianceWeighting)
+    tolerances: Tolerances = field(default_factory=Tolerances)
+    inertias_known: bool = False
+    hardening: bool = False
+
+    @property
+    def effects(self) -> bool:
+        """Whether the fit depends on anything that is evaluated at its start: model error, or effects of the experiment."""
+        return self.tolerances.any or self.plan is not None
+
+    def parameters(self, model: RobotModel) -> tuple[Parameters, np.ndarray]:
+        """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` where responses do not fit the robot."""
+        return model.posterior.prior(
+            stage_one_parameters(
+                model,
+                self.responses,
+                inertias_known=self.inertias_known,
+                gaps=self.plan is not None,
+                hardening=self.hardening,
+            )
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseFit:
+    """The fit of one robot: `estimate` with the posterior covariance of `problem`.
+
+    `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest; `error` what the model leaves out.
+    """
+
+    residual: StageOneResidual
+    effects: tuple[ExperimentEffect, ...]
+    error: ModelError | None
+    problem: Problem
+    estimate: Estimate
+
+    @property
+    def x(self) -> np.ndarray:
+        """Estimation coordinates (p,) of the optimum."""
+        return self.estimate.parameters.coordinates()
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (m,) or (m, c) that the measurement's covariance has whitened, whitened by the model error too."""
+        return rows if self.error is None else self.error.whiten(rows)
+
+    def predicted(self) -> tuple[np.ndarray, ...]:
+        """Responses (L, E + S, E) of every pose at the optimum, effects of the experiment included."""
+        responses = self.residual.model.responses(self.x)
+        return tuple(g + effect.shift for g, effect in zip(responses, self.effects, strict=True))
+
+
+def fit_responses(
+    model: RobotModel, data: ResponseData, x: np.ndarray, progress: Progress = silent
+) -> ResponseFit:
+    """Fit from the coordinates `x` (p,), then once more with model error and experiment effects evaluated at the optimum."""
+    progress("fitting", 0.0)
+    first = first_fit(model, data, x)
+    progress("fitting", 1 / (ROUNDS + 1))
+    return final_fit(model, data, first)
+
+
+def first_fit(model: RobotModel, data: ResponseData, x: np.ndarray) -> ResponseFit:
+    """Fit from the coordinates `x` (p,), at which model error and experiment effects are evaluated."""
+    return _fit(model, data, x, COARSE if data.effects else FINE)
+
+
+def final_fit(model: RobotModel, data: ResponseData, first: ResponseFit) -> ResponseFit:
+    """Fit from the optimum of `first`, at which model error and experiment effects are evaluated, where there are any."""
+    return _fit(model, data, first.x, FINE) if data.effects else first
+
+
+def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float) -> ResponseFit:
+    """Levenberg–Marquardt from `x` (p,), at which model error and experiment effects are evaluated."""
+    parameters, prior = data.parameters(model)
+    plan, responses = data.plan, data.responses
+    predicting = ResponseModel.of(model, responses, parameters)
+    effects = [ExperimentEffect.none(response) for response in responses]
+    if plan is not None:
+        predicting = predicting.with_loaded_drives(x, plan)
+        if plan.reference_amplitude > 0:
+            effects = experiment_effects(predicting, x, ReferenceMotion.of(plan))
+    residual = StageOneResidual.of(predicting, responses, data.weighting)
+    residual = residual.shifted(predicting, [effect.shift for effect in effects])
+    error = ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
+    problem = _problem(residual, error, parameters, prior)
+    iterations = COARSE_ITERATIONS if tolerance == COARSE else 200
+    fitted = solve(problem, starts=x[None], tolerance=tolerance, max_iterations=iterations)
+    return ResponseFit(residual, tuple(effects), error, problem, fitted)
+
+
+def _problem(
+    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, prior: np.ndarray
+) -> Problem:
+    def whiten(rows: np.ndarray) -> np.ndarray:
+        return rows if error is None else error.whiten(rows)
+
+    def linearise(at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        rows, jacobian = residual.linearise(at)
+        return whiten(rows), whiten(jacobian)
+
+    return Problem(
+        parameters,
+        linearise,
+        lambda at: whiten(residual.residual(at)),
+        prior_covariance=prior,
+        groups=residual.clusters(CLUSTER_LINES),
+    )

@@ -1,0 +1,28 @@
+"""Whether frequency responses ask for drives that harden: their poses load the drives differently, and so does the reference motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
+from flexcal.elasticity.identification.score_test import asks_for
+from flexcal.elasticity.response_model import ResponseModel, StageOneResidual, hardening_name
+from flexcal.model.robot import RobotModel
+
+
+def with_hardening(model: RobotModel, data: ResponseData, fit: ResponseFit) -> ResponseData:
+    """`data` with the hardening of all drives to be estimated, where the residual of `fit`, without, asks for it; else as they are.
+
+    Without a plan the torque of the drives is not known, and nothing is asked.
+    """
+    if data.plan is None or data.hardening:
+        return data
+    wider = replace(data, hardening=True)
+    parameters = wider.parameters(model)[0]
+    x = parameters.coordinates(fit.estimate.values)
+    predicting = ResponseModel.of(model, data.responses, parameters).with_loaded_drives(x, data.plan)
+    residual = StageOneResidual.of(predicting, data.responses, data.weighting)
+    residual = residual.shifted(predicting, [effect.shift for effect in fit.effects])
+    numbers = [parameters.index(hardening_name(joint.name)) for joint in model.driven]
+    columns = residual.linearise(x)[1][:, numbers] * parameters.prior_std()[numbers]
+    return wider if asks_for(fit, data, fit.whiten(columns)) else data

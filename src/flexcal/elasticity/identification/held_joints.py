@@ -1,0 +1,112 @@
+"""Drive springs of held joints: score test and selection."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
+from flexcal.elasticity.identification.score_test import asks_for
+from flexcal.elasticity.response_model import Prediction, ResponseModel, held_inertia_name
+from flexcal.estimation import profile_rise
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import RobotModel
+from flexcal.model.vibration import linearise
+
+DAMPING_RATIO = 0.1
+"""Damping ratio at the highest line of a spring to start from."""
+
+NEARLY_RIGID = 1e3
+"""Stiffness, relative to that with a mode at the highest line, at which a joint counts as rigid."""
+
+INDIFFERENT = 2.0
+"""χ² that a spring must be worth to stay beside others that are needed: with less, data do not tell it from a rigid joint."""
+
+
+@dataclass(frozen=True)
+class HeldJoints:
+    """Rigid revolute joints that may give way, by index, each with a spring (N m/rad, N m s/rad) whose mode is at the highest line."""
+
+    springs: dict[int, tuple[float, float]]
+
+    @classmethod
+    def of(cls, model: RobotModel, responses: Sequence[FrequencyResponse]) -> HeldJoints:
+        """Every rigid revolute joint of `model`; the inertia about its axis is the median over the poses of `responses`."""
+        rigid = [
+            i
+            for i, joint in enumerate(model.joints)
+            if i not in model.bearing_frames and joint.kind == "revolute"
+        ]
+        if not rigid:
+            return cls({})
+        held = model.with_drive_springs(dict.fromkeys(rigid, (1e12, 0.0)))
+        axes = [(e.index, c) for e in held.elastic for c in e.components]
+        rows = [len(held.driven) + axes.index((i, 2)) for i in rigid]
+        inertia = np.median(
+            [np.diag(linearise(held, r.q_mean, r.payload).mass)[rows] for r in responses], axis=0
+        )
+        omega = 2 * np.pi * max(float(r.frequencies_hz[-1]) for r in responses)
+        return cls(
+            {
+                i: (omega**2 * float(size), 2 * DAMPING_RATIO * omega * float(size))
+                for i, size in zip(rigid, inertia, strict=True)
+                if size > 0
+            }
+        )
+
+    def only(self, joints: Sequence[int]) -> HeldJoints:
+        """Some of them."""
+        return HeldJoints({i: self.springs[i] for i in joints})
+
+    def asked_for(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> bool:
+        """Whether the residual of `fit`, with all these joints rigid, holds what their compliances would add to the responses.
+
+        Rao's score test by their compliances.
+        """
+        return bool(self.springs) and asks_for(fit, data, fit.whiten(self._shifts(model, fit)))
+
+    def _shifts(self, model: RobotModel, fit: ResponseFit) -> np.ndarray:
+        """Change (m, k) of the residual by each compliance, in units of that of `springs`, by a forward difference from rigid."""
+        residual, parameters = fit.residual, fit.estimate.parameters
+        base, columns = residual.model.responses(fit.x), []
+        for i, (stiffness, _) in self.springs.items():
+            yielding = model.with_drive_springs({i: (NEARLY_RIGID * stiffness, 0.0)})
+            moved = ResponseModel(yielding, parameters, residual.model.poses).responses(fit.x)
+            none = np.empty(0, dtype=int)
+            columns.append(
+                np.concatenate(
+                    [
+                        pose.jacobian(Prediction(still, NEARLY_RIGID * (g - still)[..., None], none))[:, 0]
+                        for pose, still, g in zip(residual.poses, base, moved, strict=True)
+                    ]
+                )
+            )
+        return np.stack(columns, axis=1)
+
+    def needless(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> int | None:
+        """The joint whose spring a `fit` of all of them misses least where it is rigid, if that hardly matters; None if all are needed."""
+        worth = {i: _worth(model, fit, i) for i in self.springs}
+        least = min(worth, key=lambda i: worth[i])
+        variance = max(1.0, fit.estimate.reduced_chi2) * data.tolerances.inflation(data.responses)
+        return least if worth[least] < INDIFFERENT * variance else None
+
+
+def _worth(model: RobotModel, fit: ResponseFit, joint: int) -> float:
+    """Rise of χ² where one joint becomes rigid and all other parameters are fitted again, priors of that joint's spring left out."""
+    name, parameters = model.joint_names[joint], fit.estimate.parameters
+    own = [f"{name}.drive.stiffness", f"{name}.drive.damping", held_inertia_name(name)]
+    numbers = [parameters.index(item) for item in own if item in parameters]
+    prior = fit.problem.prior_covariance
+    assert prior is not None
+    prior = prior.copy()
+    prior[numbers], prior[:, numbers] = 0.0, 0.0
+    prior[numbers, numbers] = np.inf
+    problem = replace(fit.problem, prior_covariance=prior)
+    start = fit.x
+    distance = (start - fit.problem.parameters.prior_mean())[numbers] / parameters.prior_std()[numbers]
+    rigid = start.copy()
+    rigid[numbers[0]] += np.log(NEARLY_RIGID)
+    own_prior = 0.5 * float(distance @ distance)
+    return 2 * (profile_rise(problem, fit.estimate, rigid, numbers) + own_prior)

@@ -1,0 +1,282 @@
+"""Stage 1 (METHODS; Neubauer et al. 2015, §4.2): from frequency responses to the stiffness and damping of drives and bearings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan
+from flexcal.elasticity.identification.bearing_axes import ResponseBearings, with_fitting_bearings
+from flexcal.elasticity.identification.fit import (
+    FINE,
+    ResponseData,
+    ResponseFit,
+    final_fit,
+    first_fit,
+    fit_responses,
+)
+from flexcal.elasticity.identification.hardening_drives import with_hardening
+from flexcal.elasticity.identification.held_joints import HeldJoints
+from flexcal.elasticity.identification.lack_of_fit import misfit_of_fit, misfit_std
+from flexcal.elasticity.identification.profile_std import profile_stretch
+from flexcal.elasticity.identification.search import MultiStart, Search
+from flexcal.elasticity.response_model import (
+    CovarianceWeighting,
+    Tolerances,
+    Weighting,
+    check_responses,
+    check_sensors,
+    held_inertia_name,
+)
+from flexcal.estimation import Estimate, known_to_a_factor_of_two, solve
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import INERTIALS, RobotModel, spring_names
+from flexcal.progress import Progress, silent
+
+SPRING_VALUES = (".stiffness", ".damping", ".hardening")
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessResult:
+    """Result of stage 1.
+
+    `estimate` holds springs and nuisances; `springs` their names in the order of the paper's Table 1, stiffness first. Per pose:
+    `predicted` (L, n, n) of the fitted model, the reference motion included; `errors` (L, n, n), the complex errors Δ of Eq. (27);
+    `misfit` (poses, n, n), mean |error|² over the measured variance: above 1 where the model does not explain an element.
+    `bearings` says with which bearing axes the robot was fitted, and why; None for one without bearings. `sensed` (L, S, n) per
+    pose is what sensors on the arm are predicted to read.
+    """
+
+    estimate: Estimate
+    responses: tuple[FrequencyResponse, ...]
+    predicted: tuple[np.ndarray, ...]
+    errors: tuple[np.ndarray, ...]
+    misfit: np.ndarray
+    springs: tuple[str, ...]
+    bearings: ResponseBearings | None
+    sensed: tuple[np.ndarray, ...]
+
+    @property
+    def sensors(self) -> tuple[str, ...]:
+        """Names of the sensors on the arm that recorded in any pose."""
+        return tuple(dict.fromkeys(name for response in self.responses for name in response.sensors))
+
+    def sensor_difference(self, name: str) -> float:
+        """Median over lines and poses of how far a sensor's readings are from those predicted, relative to their size."""
+        return _median_difference(
+            (response.sensor_response[:, [row := response.sensors.index(name)]], predicted[:, [row]])
+            for response, predicted in zip(self.responses, self.sensed, strict=True)
+            if response.sensor_response is not None and name in response.sensors
+        )
+
+    @property
+    def motor_difference(self) -> float:
+        """The same of the motors' accelerations."""
+        return _median_difference(
+            (response.response, predicted)
+            for response, predicted in zip(self.responses, self.predicted, strict=True)
+        )
+
+    def robot(self, model: RobotModel) -> RobotModel:
+        """`model` with what was found: its springs, and the bearing axes that they belong to."""
+        if self.bearings is not None:
+            model = model.with_bearings(self.bearings.taken)
+        return model.with_estimate(self.estimate)
+
+    def quantity(self, name: str, truth: float | None = None) -> dict[str, float | bool | None]:
+        """One estimated quantity as every results file has it."""
+        return self.estimate.quantity(name, truth)
+
+
+def _median_difference(pairs: Iterable[tuple[np.ndarray, np.ndarray]]) -> float:
+    """Of measured and predicted rows (L, k, n): the difference of a row over its size, the median over lines, rows and pairs."""
+    shares = [
+        np.linalg.norm(measured - predicted, axis=2) / np.linalg.norm(predicted, axis=2)
+        for measured, predicted in pairs
+    ]
+    return float(np.median(np.concatenate(shares, axis=None)))
+
+
+def identify_stiffness(
+    model: RobotModel,
+    responses: Sequence[FrequencyResponse],
+    *,
+    rng: np.random.Generator,
+    inertias_known: bool = False,
+    plan: MultisinePlan | None = None,
+    weighting: Weighting | None = None,
+    search: Search | None = None,
+    tolerances: Tolerances | None = None,
+    progress: Progress = silent,
+) -> StiffnessResult:
+    """Fit the linearised elastic robot to the measured responses of all poses, and say how well each spring is known.
+
+    The cost is Eq. (26) on the log of the ratio Ĝ/G (linear where Ĝ is poorly known), by default weighed with the covariance of the
+    measurement. A `search` (default: `MultiStart`) finds the basin; Levenberg-Marquardt with exact derivatives follows. With the
+    `plan`, what the reference motion does is part of the model: the arm's inertia changes along it, friction acts in pulses at its
+    reversals, gaps stand open while the torque of their drive passes zero, and drives harden under it where the responses ask for that.
+    `tolerances` are what the model leaves out, all of it in the covariance; `Tolerances.none()` for an exact linear plant.
+    `inertias_known` fixes link and payload inertias at the model's.
+
+    The covariance of the estimate is the larger, parameter by parameter, of the posterior and the sandwich over clusters of
+    neighbouring lines, the first inflated by the reduced χ² where it exceeds 1; a badly known stiffness has the width of its profile
+    likelihood. The damping of a spring whose stiffness is not identifiable is not either. Bearing axes that robot.yaml does not declare
+    are those that the responses prefer. Raises `FlexcalError` where responses do
+    not fit the robot.
+    """
+    data = ResponseData(
+        tuple(responses),
+        plan,
+        CovarianceWeighting() if weighting is None else weighting,
+        Tolerances() if tolerances is None else tolerances,
+        inertias_known,
+    )
+    check_responses(model, responses)
+    check_sensors(model, responses)
+    model = model.with_brakes(responses[0].joints)
+    search = MultiStart() if search is None else search
+    x = search.find(model, responses, *data.parameters(model), rng, progress)
+    progress("fitting", 0.0)
+    first = first_fit(model, data, x)
+    harder = with_hardening(model, data, first)
+    if harder is not data:
+        # linear drives may have led the fit astray; so both where it ended and where it began are starts
+        parameters, began = harder.parameters(model)[0], data.parameters(model)[0].with_coordinates(x)
+        starts = (first.estimate.values, {item.name: item.value for item in began})
+        fits = [first_fit(model, harder, parameters.coordinates(values)) for values in starts]
+        data, first = harder, min(fits, key=lambda fit: fit.estimate.reduced_chi2)
+    progress("fitting", 0.3)
+
+    def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
+        held = HeldJoints.of(robot, responses)
+        fit = None
+        if held.asked_for(robot, data, begun):
+            robot, fit = _with_held_joints(robot, held, data, search, rng, progress)
+        return robot, final_fit(robot, data, begun) if fit is None else fit
+
+    model, fit, bearings = with_fitting_bearings(model, data, first, completed)
+    progress("fitting", 0.8)
+    estimate = _widened(fit, data)
+    progress("fitting", 1.0)
+    stacked, axes = fit.predicted(), len(responses[0].joints)
+    pairs = zip(fit.residual.poses, stacked, strict=True)
+    errors = tuple(pose.errors(g)[:, :axes] for pose, g in pairs)
+    predicted = tuple(g[:, :axes] for g in stacked)
+    misfit = np.array(
+        [
+            np.mean(np.abs(r.response - g) ** 2 / r.std**2, axis=0)
+            for r, g in zip(responses, predicted, strict=True)
+        ]
+    )
+    return StiffnessResult(
+        estimate,
+        tuple(responses),
+        predicted,
+        errors,
+        misfit,
+        spring_names(model),
+        bearings,
+        tuple(g[:, axes:] for g in stacked),
+    )
+
+
+def _with_held_joints(
+    model: RobotModel,
+    held: HeldJoints,
+    data: ResponseData,
+    search: Search,
+    rng: np.random.Generator,
+    progress: Progress,
+) -> tuple[RobotModel, ResponseFit | None]:
+    """The robot with springs at those of the `held` joints for which the data ask, and its fit; the same robot and None for none."""
+    values: dict[str, float] = {}
+    while held.springs:
+        wider = model.with_drive_springs(held.springs)
+        parameters = data.parameters(wider)[0]
+        if values:
+            x = parameters.coordinates({name: values[name] for name in parameters.names})
+            fit = fit_responses(wider, data, x)
+        else:
+            fit = _searched_fit(wider, data, search, rng, progress)
+        needless = held.needless(wider, data, fit)
+        if needless is None:
+            return wider, fit
+        held = held.only([i for i in held.springs if i != needless])
+        values = fit.estimate.values
+    return model, None
+
+
+def _searched_fit(
+    model: RobotModel, data: ResponseData, search: Search, rng: np.random.Generator, progress: Progress
+) -> ResponseFit:
+    """The fit of a robot with braked elastic joints: with rotors that stand still at the start and, where that leaves a misfit, with rotors
+    that move with the arm because position loops hold them; the better of both."""
+    parameters, prior = data.parameters(model)
+    x = search.find(
+        model,
+        data.responses,
+        parameters,
+        prior,
+        rng,
+        lambda _, share: progress("fitting", 0.3 + 0.2 * share),
+    )
+    first = first_fit(model, data, x)
+    if misfit_of_fit(first, data.responses) is not None:
+        rotors = {held_inertia_name(e.name): float(model.rotor_inertia[e.index]) for e in model.elastic}
+        moving = [(item.name, rotors.get(item.name, item.value)) for item in parameters.with_coordinates(x)]
+        second = first_fit(model, data, parameters.coordinates(dict(moving)))
+        first = min(first, second, key=lambda fit: fit.estimate.reduced_chi2)
+    return final_fit(model, data, first)
+
+
+def _by_torque_constants(fit: ResponseFit) -> np.ndarray:
+    """Covariance (p, p) of the logarithms of stiffness and damping from the torque constants: one error for all springs of a joint."""
+    names = fit.estimate.parameters.names
+    joints = [name.split(".")[0] if name.endswith((".stiffness", ".damping")) else "" for name in names]
+    same = np.array([[own == other != "" for other in joints] for own in joints], dtype=float)
+    return fit.residual.model.robot.prior.torque_constant**2 * same
+
+
+def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
+    """The estimate with the covariance for measurements whose variance is `Tolerances.inflation` f times what weighs them.
+
+    That is H + (f - 1) (H - H P H), with H the posterior and P = LᵀL the prior's information by its rows L, times the reduced χ² where it
+    exceeds 1. What springs are known worse by after the sandwich, a misfit where there is one, and the profile likelihood is error of the
+    springs alone, independent of each other: masses and centres of mass, whose moments are known far better than each of them, stay as
+    they are correlated. Where these took up a part of the misfit they count as not identifiable. No spring is known better than the
+    torque constant of its joint: the responses are accelerations by the torques that a controller believes in.
+    """
+    problem, fitted = fit.problem, fit.estimate
+    posterior = fitted.covariance
+    from_prior = problem.prior_rows() @ posterior
+    from_data = posterior - from_prior.T @ from_prior
+    covariance = posterior + (data.tolerances.inflation(data.responses) - 1.0) * from_data
+    std = np.sqrt(np.diag(posterior))
+    excess = max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0)
+    misfit = misfit_of_fit(fit, data.responses)
+    wider = std
+    if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
+        robust = solve(problem, starts=fit.x[None], covariance="sandwich", tolerance=FINE)
+        wider = np.sqrt(np.diag(robust.covariance))
+    if misfit is not None:
+        wider = np.maximum(wider, misfit_std(fit, misfit))
+    factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)
+    factor = np.maximum(factor, np.sqrt(excess)) * profile_stretch(problem, fitted)
+    springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])
+    alone = np.where(springs, (factor**2 - excess) * np.diag(covariance), 0.0)
+    covariance = excess * covariance + np.diag(alone) + _by_torque_constants(fit)
+    sized = known_to_a_factor_of_two(fitted.parameters, covariance)
+    small = {
+        name: flag and size
+        for name, flag, size in zip(fitted.parameters.names, fitted.identifiable, sized, strict=True)
+    }
+    absorbing = misfit is not None and misfit.inertials > 0
+    known = tuple(
+        flag
+        and small.get(name.replace(".damping", ".stiffness"), True)
+        and not (absorbing and name.rpartition(".")[2] in INERTIALS)
+        for name, flag in small.items()
+    )
+    return replace(fitted, covariance=covariance, identifiable=known, misfit=misfit)

@@ -1,0 +1,28 @@
+from .experiment_effect import ExperimentEffect, experiment_effects
+from .model_error import ModelError, Tolerances
+from .parameter_names import hardening_name, held_inertia_name
+from .parameters import check_responses, check_sensors, stage_one_parameters
+from .prediction import Prediction, ResponseModel
+from .residual import CLUSTER_LINES, StageOneResidual, element_scale
+from .weighting import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
+
+__all__ = [
+    "CLUSTER_LINES",
+    "CovarianceWeighting",
+    "ExperimentEffect",
+    "ModelError",
+    "PaperWeighting",
+    "Prediction",
+    "ResponseModel",
+    "StageOneResidual",
+    "Tolerances",
+    "UniformWeighting",
+    "Weighting",
+    "check_responses",
+    "check_sensors",
+    "element_scale",
+    "experiment_effects",
+    "hardening_name",
+    "held_inertia_name",
+    "stage_one_parameters",
+]

@@ -1,0 +1,170 @@
+"""Covariance of the residual due to model errors: geometric errors, and friction that is not viscous."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.elasticity.response_model.experiment_effect import ExperimentEffect
+from flexcal.elasticity.response_model.parameter_names import pose_labels, viscous_name
+from flexcal.elasticity.response_model.prediction import Prediction, ResponseModel
+from flexcal.elasticity.response_model.residual import StageOneResidual
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import (
+    ANGLE_TOLERANCE,
+    FRICTION_TOLERANCE,
+    GEOMETRY,
+    LENGTH_TOLERANCE,
+    SHARED_DISTORTION,
+)
+from flexcal.model.vibration import KNOT_OCTAVES, flatness_shifts, friction_shifts, over_frequency
+
+
+@dataclass(frozen=True)
+class Tolerances:
+    """Standard deviations of effects that the model lacks.
+
+    `length` (m) and `angle` (rad) of every geometric error, unknown before stage 2; `strength` and `width` of the friction pulses of a
+    motor, relative, common to all poses and half as much in each; `friction`: other deviation of a motor's impedance from a viscous
+    coefficient, relative to that; `backlash`: deviation of a gap's effect from the softening of its drive, relative to that; these two
+    are complex random functions of frequency in every pose, with knots every `octave`. `distortion` is the share of the stochastic
+    nonlinear distortion that all realisations have in common, for reference motion and friction are the same in all: averaging over
+    realisations does not lower it. With `flatness`, sensors on the arm are not flat over frequency, each as its `flatness_std` says: in
+    common in all poses and half as much in each, where the reference motion turns them.
+    """
+
+    length: float = LENGTH_TOLERANCE
+    angle: float = ANGLE_TOLERANCE
+    strength: float = 0.2
+    width: float = 0.3
+    friction: float = FRICTION_TOLERANCE
+    backlash: float = 0.3
+    distortion: float = SHARED_DISTORTION
+    octave: float = KNOT_OCTAVES
+    flatness: bool = True
+
+    @classmethod
+    def none(cls) -> Tolerances:
+        """The model is exact."""
+        return cls(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, flatness=False)
+
+    @property
+    def any(self) -> bool:
+        """Whether anything is left out."""
+        return max(self.length, self.angle, self.strength, self.width, self.friction, self.backlash) > 0
+
+    def inflation(self, responses: Sequence[FrequencyResponse]) -> float:
+        """Variance of the responses over what it would be with independent realisations."""
+        shares = []
+        for response in responses:
+            distorted = np.mean(response.distortion_std**2) / np.mean(response.std**2)
+            shares.append(distorted * (len(response.realisations) - 1))
+        return 1.0 + self.distortion * float(np.mean(shares))
+
+
+@dataclass(frozen=True, eq=False)
+class LowRank:
+    """Whitening of 1 + B Bᵀ by its thin factor: `basis` (m, k) orthonormal, `shrink` (k,) = 1 - 1/√(1 + s²)."""
+
+    basis: np.ndarray
+    shrink: np.ndarray
+    log_determinant: float
+
+    @classmethod
+    def of(cls, columns: np.ndarray) -> LowRank:
+        """From B (m, k) in whitened rows."""
+        factor, triangle = np.linalg.qr(columns)
+        turn, size, _ = np.linalg.svd(triangle)
+        return cls(factor @ turn, 1 - 1 / np.sqrt(1 + size**2), float(np.log1p(size**2).sum()))
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """(1 + B Bᵀ)^(-1/2) times rows (m,) or (m, c)."""
+        inner = self.basis.T @ rows
+        shrink = self.shrink if rows.ndim == 1 else self.shrink[:, None]
+        return rows - self.basis @ (shrink * inner)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelError:
+    """Model errors of all poses: of each pose alone (friction), then common to all (geometry)."""
+
+    poses: tuple[LowRank, ...]
+    common: LowRank
+
+    @classmethod
+    def of(
+        cls,
+        residual: StageOneResidual,
+        responses: Sequence[FrequencyResponse],
+        x: np.ndarray,
+        effects: Sequence[ExperimentEffect],
+        tolerances: Tolerances,
+    ) -> ModelError:
+        """To first order about the coordinates x (p,)."""
+        model = residual.model
+        blocks, columns = [], []
+        predictions = model.predict(x)
+        shifts = geometric_shifts(model, x, tolerances)
+        natural = model.parameters.natural(x)
+        values = dict(zip(model.parameters.names, natural, strict=True))
+        labels = pose_labels(responses)
+        every = tuple(dict.fromkeys(sensor.name for pose in model.poses for sensor in pose.sensors))
+        grid = np.concatenate([response.frequencies_hz for response in responses])
+        for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
+            nominal = predictions[k].response
+            viscous = np.array([values[viscous_name(joint, label)] for joint in response.joints])
+            change = friction_shifts(
+                nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave
+            )
+            number = list(model.poses[k].gaps.values())
+            column = [list(predictions[k].columns).index(n) for n in number]
+            gap = tolerances.backlash * natural[number] * predictions[k].derivatives[..., column]
+            change = np.concatenate(
+                [change, over_frequency(gap, response.frequencies_hz, tolerances.octave)], axis=-1
+            )
+            none = np.empty(0, dtype=int)
+            half = effects[k].by_friction.shape[-1] // 2
+            form = effects[k].by_friction * np.repeat([tolerances.strength, tolerances.width], half)
+            uneven = np.zeros((*nominal.shape, 0))
+            if tolerances.flatness:
+                sensors = model.poses[k].sensors
+                uneven = flatness_shifts(
+                    nominal,
+                    response.frequencies_hz,
+                    sensors,
+                    every=every,
+                    grid=grid,
+                    octave=tolerances.octave,
+                )
+            change = np.concatenate([change, 0.5 * form, 0.5 * uneven], axis=-1)
+            blocks.append(LowRank.of(pose.jacobian(Prediction(nominal, change, none))))
+            shared = np.concatenate([shifts[k], uneven, form], axis=-1)
+            columns.append(blocks[-1].whiten(pose.jacobian(Prediction(nominal, shared, none))))
+        return cls(tuple(blocks), LowRank.of(np.concatenate(columns)))
+
+    def whiten(self, rows: np.ndarray) -> np.ndarray:
+        """Rows (m,) or (m, c) that were whitened by the measurement alone, whitened by both."""
+        parts, start = [], 0
+        for block in self.poses:
+            count = len(block.basis)
+            parts.append(block.whiten(rows[start : start + count]))
+            start += count
+        return self.common.whiten(np.concatenate(parts))
+
+
+def geometric_shifts(model: ResponseModel, x: np.ndarray, tolerances: Tolerances) -> list[np.ndarray]:
+    """∂G (lines, E + S, E, g) of every pose by one standard deviation of each geometric error, by forward differences."""
+    base = model.responses(x)
+    shifts: list[list[np.ndarray]] = [[] for _ in base]
+    for joint in model.robot.joints:
+        for key in GEOMETRY:
+            size = tolerances.length if key.startswith("length") else tolerances.angle
+            name = f"{joint.name}.{key}"
+            moved = ResponseModel(
+                model.robot.with_values({name: model.robot.value(name) + size}), model.parameters, model.poses
+            )
+            for k, response in enumerate(moved.responses(x)):
+                shifts[k].append(response - base[k])
+    return [np.stack(columns, axis=-1) for columns in shifts]

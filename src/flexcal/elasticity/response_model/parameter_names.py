@@ -1,0 +1,35 @@
+"""Names of the parameters of stage 1: those of FORMATS, and those that belong to one pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from flexcal.frequency.periodic import FrequencyResponse
+
+
+def pose_labels(responses: Sequence[FrequencyResponse]) -> tuple[str, ...]:
+    """A label for every response: its pose number in the plan, or its place where numbers repeat."""
+    numbers = [response.pose for response in responses]
+    if len(set(numbers)) < len(numbers):
+        numbers = range(len(responses))
+    return tuple(f"pose_{number + 1}" for number in numbers)
+
+
+def viscous_name(joint: str, pose: str) -> str:
+    """Name of a motor's viscous coefficient in one pose."""
+    return f"{joint}.viscous.{pose}"
+
+
+def half_gap_name(joint: str) -> str:
+    """Name of the half gap of a drive as its frequency response shows it."""
+    return f"{joint}.drive.half_gap"
+
+
+def hardening_name(joint: str) -> str:
+    """Name of the hardening of a drive."""
+    return f"{joint}.drive.hardening"
+
+
+def held_inertia_name(joint: str) -> str:
+    """Name of the inertia that moves with the arm of a joint whose motor is held."""
+    return f"{joint}.held_inertia"

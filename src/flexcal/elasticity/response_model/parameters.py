@@ -1,0 +1,200 @@
+"""Parameters of stage 1: stiffness and damping of every spring, and nuisance parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.elasticity.response_model.parameter_names import (
+    half_gap_name,
+    hardening_name,
+    held_inertia_name,
+    pose_labels,
+    viscous_name,
+)
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Parameter, Parameters
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import (
+    FRICTION_LOG_STD,
+    RobotModel,
+    elastic_inertials,
+    sensor_parameters,
+    springs_and_rotors,
+    unit_of,
+)
+from flexcal.model.vibration import linearise, transfer_matrix
+
+HALF_GAP_STD = 1e-4
+"""Prior of a drive's half gap, 1σ in rad about the model's own: wide, for the softening of the drive differs from pose to pose."""
+
+SENSOR_RANGE = 4.0
+"""Factor between readings of a sensor and those expected from which they are of another unit or place."""
+
+HARDENING_STD = 0.3
+"""Prior of a drive's hardening, 1σ."""
+
+
+def stage_one_parameters(
+    model: RobotModel,
+    responses: Sequence[FrequencyResponse],
+    *,
+    inertias_known: bool = False,
+    gaps: bool = False,
+    hardening: bool = False,
+) -> Parameters:
+    """Every parameter of stage 1 with its prior.
+
+    Springs, rotor inertias, viscous coefficients and masses are estimated as logarithms. The motor's viscous coefficient is free
+    in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
+    prior 0 ± the sample time; a sensor on the arm has its sensitivity, delay and errors of mounting. Rotor inertias have the prior
+    of robot.yaml; so have mass and centre of mass of every link that an elastic joint moves, and the payload's mass, unless
+    `inertias_known`. With `gaps`, a drive with backlash has its half gap: while it stands open, the drive appears softer. With
+    `hardening`, every drive may be stiffer where it carries more torque. Raises `FlexcalError` where responses do not fit the robot.
+    """
+    check_responses(model, responses)
+    loaded = any(r.payload != 0 for r in responses)
+    late = max(r.sample_time for r in responses)
+    items = [*springs_and_rotors(model)]
+    if not inertias_known:
+        items += elastic_inertials(model, loaded=loaded)
+    items += held_inertias(model)
+    for joint in model.driven:
+        name = f"{joint.name}.delay"
+        items.append(Parameter(name, "s", 0.0, prior_std=late))
+    for name in dict.fromkeys(name for response in responses for name in response.sensors):
+        items += sensor_parameters(model.sensors[name], late)
+    for response, label in zip(responses, pose_labels(responses), strict=True):
+        loss = apparent_viscous(response)
+        items += [
+            Parameter(
+                viscous_name(joint.name, label), "N m s/rad", value, prior_std=FRICTION_LOG_STD, scale="log"
+            )
+            for joint, value in zip(model.driven, loss, strict=True)
+        ]
+    if gaps:
+        items += [
+            Parameter(
+                half_gap_name(joint.name),
+                "rad",
+                float(model.backlash[joint.index]),
+                lower=0.0,
+                prior_std=HALF_GAP_STD,
+            )
+            for joint in model.driven
+            if joint.index in model.backlash_joints
+        ]
+    if hardening:
+        items += [
+            Parameter(
+                name := hardening_name(joint.name),
+                unit_of(name),
+                float(model.hardening[joint.index]),
+                lower=0.0,
+                prior_std=HARDENING_STD,
+            )
+            for joint in model.driven
+        ]
+    return Parameters(items)
+
+
+def held_inertias(model: RobotModel) -> list[Parameter]:
+    """Inertia, kg m², that moves with the arm of every braked joint beyond that of its links: none, or the rotor's where the position loop
+    holds the motor in place of a brake. Joints whose rotor inertia is not declared have none."""
+    items = []
+    for joint in model.elastic:
+        rotor = float(model.rotor_inertia[joint.index])
+        if joint.index in model.braked and rotor > 0:
+            items.append(Parameter(held_inertia_name(joint.name), "kg m²", 0.0, lower=0.0, prior_std=rotor))
+    return items
+
+
+def apparent_viscous(response: FrequencyResponse) -> np.ndarray:
+    """Motor loss (axes,) N m s/rad seen at the lowest tenth of the lines: the real part of the impedance jω Ĝ⁻¹."""
+    low = slice(0, max(3, len(response.frequencies_hz) // 10))
+    identity = np.broadcast_to(np.eye(response.response.shape[-1]), response.response[low].shape)
+    impedance = 1j * response.omega[low, None, None] * np.linalg.solve(response.response[low], identity)
+    diagonal = np.diagonal(impedance, axis1=1, axis2=2)
+    return np.maximum(np.median(diagonal.real, axis=0), 0.05 * np.median(np.abs(diagonal), axis=0))
+
+
+def check_responses(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
+    """Raises `FlexcalError` where there is nothing to fit or a response is of other joints than the elastic ones."""
+    elastic = [joint.name for joint in model.elastic]
+    if not elastic:
+        raise FlexcalError(
+            f"{model.path} declares no elastic joint; add `elastic:` with starting values of the stiffnesses."
+        )
+    if not responses:
+        raise FlexcalError("There is no frequency response to identify from; give at least one pose.")
+    for response in responses:
+        if list(response.joints) != [name for name in elastic if name in response.joints]:
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, but the elastic joints of "
+                f"{model.path} are {', '.join(elastic)}; excite these, or some of them with the motors of the others braked, in this order."
+            )
+        if response.joints != responses[0].joints:
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} is of {', '.join(response.joints)}, that of pose {responses[0].pose} of "
+                f"{', '.join(responses[0].joints)}; excite the same joints in all poses."
+            )
+        unknown = [name for name in response.sensors if name not in model.sensors]
+        if unknown:
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} has the sensor {unknown[0]}, which {model.path} does not declare; add it "
+                "under `sensors:` with its frame, xyz and direction."
+            )
+        if response.q_mean.shape != (model.n,):
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} has a mean position of {response.q_mean.size} joints, "
+                f"but the robot has {model.n}."
+            )
+        if not (np.isfinite(response.stacked).all() and np.isfinite(response.stacked_covariance).all()):
+            raise FlexcalError(
+                f"The frequency response of pose {response.pose} holds a NaN or an infinite number."
+            )
+
+
+def check_sensors(model: RobotModel, responses: Sequence[FrequencyResponse]) -> None:
+    """Raises `FlexcalError` where the readings of a sensor on the arm are of another size or sign than those of robot.yaml's robot.
+
+    That is told from the lowest third of the lines, where the springs matter least, by the median line: modes that are elsewhere than in
+    robot.yaml are no reason.
+    """
+    for name in dict.fromkeys(name for response in responses for name in response.sensors):
+        gains = [_line_gains(model, name, response) for response in responses if name in response.sensors]
+        found = np.concatenate(gains)
+        found = found[np.abs(found) > 0]
+        if not found.size:
+            raise FlexcalError(
+                f"the readings of the sensor {name} do not change with the torques; check its cable and its column, or leave that out."
+            )
+        _check_gain(
+            model, name, float(np.median(np.abs(found))), float(np.median(np.real(found) / np.abs(found)))
+        )
+
+
+def _line_gains(model: RobotModel, name: str, response: FrequencyResponse) -> np.ndarray:
+    """Complex factor (lines,) between the readings and those expected, at the lowest third of the lines of a pose."""
+    low = slice(0, max(3, len(response.frequencies_hz) // 3))
+    system = linearise(model, response.q_mean, response.payload, sensors=[model.sensors[name]])
+    expected = transfer_matrix(system, response.frequencies_hz[low]).response[:, -1]
+    measured = response.stacked[low, len(response.joints) + response.sensors.index(name)]
+    return np.sum(expected.conj() * measured, axis=1) / np.sum(np.abs(expected) ** 2, axis=1)
+
+
+def _check_gain(model: RobotModel, name: str, size: float, cosine: float) -> None:
+    where = f"the readings of the sensor {name}"
+    if not 1 / SENSOR_RANGE < size < SENSOR_RANGE:
+        ratio = f"{1 / size:.2g} times smaller" if size < 1 else f"{size:.2g} times larger"
+        unit = " (they seem to be in g)" if 6 < 1 / size < 16 and model.sensors[name].order == 2 else ""
+        raise FlexcalError(
+            f"{where} are {ratio} than those of the robot of {model.path}{unit}; give them in m/s², m/s or m, name their unit under "
+            f"`signals:`, or correct its quantity, frame, xyz or direction under `sensors:`."
+        )
+    if cosine < -0.5:
+        raise FlexcalError(
+            f"{where} are in the opposite direction to those of the robot of {model.path}; correct its direction or its frame under "
+            "`sensors:`."
+        )

@@ -1,0 +1,279 @@
+"""The frequency responses that the model predicts in every measured pose, and their derivatives by all parameters of stage 1."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan
+from flexcal.elasticity.response_model.parameter_names import (
+    half_gap_name,
+    hardening_name,
+    pose_labels,
+    viscous_name,
+)
+from flexcal.elasticity.time_periodic import DriveTorque, Hardened
+from flexcal.estimation import Parameters
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.model.robot import ArmSensor, RobotModel, mounting_names, sensitivity_name, sensor_delay_name
+from flexcal.model.vibration import linearise, transfer_matrix
+
+_MOUNTING_STEP = 1e-6
+"""m or rad, of the difference quotients by errors of mounting, in which readings are linear but for the length of the direction."""
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """G (lines, E + S, E) in one pose, and ∂G (lines, E + S, E, c) by the parameters numbered `columns` (c,), in estimation coordinates."""
+
+    response: np.ndarray
+    derivatives: np.ndarray
+    columns: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class PoseModel:
+    """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
+
+    `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
+    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` maps
+    the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,)
+    are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
+    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at
+    `mounting` (S, 5), -1 where there is none.
+    """
+
+    frequencies_hz: np.ndarray
+    q: np.ndarray
+    payload: float | None
+    robot_names: dict[str, int]
+    gaps: dict[int, int]
+    gap_compliance: np.ndarray
+    hardening: dict[int, tuple[int, int]]
+    torque: DriveTorque | None
+    delays: np.ndarray
+    sensors: tuple[ArmSensor, ...]
+    sensitivities: np.ndarray
+    late: np.ndarray
+    mounting: np.ndarray
+
+    def placed(self, natural: np.ndarray) -> tuple[ArmSensor, ...]:
+        """The sensors on the arm as they are mounted."""
+        errors = self.mounting_errors(natural)
+        return tuple(sensor.misplaced(e) for sensor, e in zip(self.sensors, errors, strict=True))
+
+    def mounting_errors(self, natural: np.ndarray) -> np.ndarray:
+        """Errors of mounting (S, 5) in m and rad."""
+        return np.where(self.mounting >= 0, natural[self.mounting], 0.0)
+
+    def measured(self, natural: np.ndarray) -> np.ndarray:
+        """What G is multiplied by (L, E + S, E): the delays of torques and readings, the sensitivities of sensors."""
+        s = 2j * np.pi * self.frequencies_hz[:, None]
+        torque = np.array([natural[number] if number >= 0 else 0.0 for number in self.delays])
+        ones = np.ones((len(s), len(torque)))
+        rows = np.concatenate([ones, natural[self.sensitivities] * np.exp(-s * natural[self.late])], axis=1)
+        return rows[:, :, None] * np.exp(-s * torque)[:, None, :]
+
+    def values(self, robot: RobotModel, natural: np.ndarray) -> tuple[dict[str, float], float | None]:
+        """The robot's own values and the payload (kg) in this pose for the parameters' natural values (p,)."""
+        known = {name: float(natural[number]) for name, number in self.robot_names.items()}
+        kept = self.stiffness_ratio(natural).mean(axis=0)
+        for axis in self.changing:
+            for name in _drive(robot, axis):
+                known[name] = known.get(name, robot.value(name)) * float(kept[axis])
+        payload = self.payload
+        if payload is not None and payload > 0 and "payload.mass" in known:
+            payload *= known["payload.mass"] / float(robot.payload_mass[0])
+            known["payload.mass"] = payload
+        return known, payload
+
+    @property
+    def changing(self) -> tuple[int, ...]:
+        """The axes whose drive changes its stiffness along the reference motion."""
+        return tuple(sorted({*self.gaps, *self.hardening}))
+
+    def stiffness_ratio(self, natural: np.ndarray) -> np.ndarray:
+        """Stiffness and damping (phases, E) of every drive along the reference motion over those at no load with its gap closed."""
+        return self._hardened(natural).ratio / self._softer(natural)
+
+    def slopes(self, natural: np.ndarray) -> list[tuple[int, int, float]]:
+        """Axis, parameter number, and derivative of the logarithm of the drive's mean stiffness and damping by it or, for the
+        stiffness at no load, by its logarithm beyond its own: gaps, hardening."""
+        hardened, softer = self._hardened(natural), self._softer(natural)
+        mean = np.mean(hardened.ratio / softer, axis=0)
+        by_gap = -np.mean(hardened.ratio * self.gap_compliance / softer**2, axis=0) / mean
+        by_hardening, by_stiffness = (
+            np.mean(slope / softer, axis=0) / mean for slope in (hardened.by_hardening, hardened.by_stiffness)
+        )
+        slopes = [(axis, number, float(by_gap[axis])) for axis, number in self.gaps.items()]
+        for axis, (hardening, stiffness) in self.hardening.items():
+            slopes.append((axis, hardening, float(by_hardening[axis])))
+            slopes.append((axis, stiffness, float(by_stiffness[axis])))
+        return slopes
+
+    def _softer(self, natural: np.ndarray) -> np.ndarray:
+        half_gap = np.zeros(self.gap_compliance.shape[1])
+        half_gap[list(self.gaps)] = natural[list(self.gaps.values())]
+        return 1.0 + self.gap_compliance * half_gap
+
+    def _hardened(self, natural: np.ndarray) -> Hardened:
+        """All drives harden, or none."""
+        if self.torque is None or not self.hardening:
+            none = np.zeros_like(self.gap_compliance)
+            return Hardened(none + 1.0, none, none)
+        numbers = np.array([self.hardening[axis] for axis in sorted(self.hardening)])
+        return self.torque.hardened(natural[numbers[:, 1]], natural[numbers[:, 0]])
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseModel:
+    """Predicts every pose at estimation coordinates x (p,); what `parameters` do not hold stays at the value of `robot`.
+
+    The linearisation point is the measured mean motor position; the rest position of the arm follows the parameters. The delay of
+    an axis acts on its torque: column j of G is multiplied by exp(-jω τ_j). Gaps count as closed and drives as linear until
+    `with_loaded_drives`.
+    """
+
+    robot: RobotModel
+    parameters: Parameters
+    poses: tuple[PoseModel, ...]
+
+    @classmethod
+    def of(
+        cls, robot: RobotModel, responses: Sequence[FrequencyResponse], parameters: Parameters
+    ) -> ResponseModel:
+        """For the poses and lines of measured responses; hardening is a parameter's or none."""
+        robot = replace(robot, hardening=np.zeros(robot.n))
+        labels = pose_labels(responses)
+        own = {
+            viscous_name(joint.name, label): (f"{joint.name}.viscous", label)
+            for joint in robot.driven
+            for label in labels
+        }
+        gaps = {
+            axis: parameters.index(half_gap_name(joint.name))
+            for axis, joint in enumerate(robot.driven)
+            if half_gap_name(joint.name) in parameters
+        }
+        hardening = {
+            axis: (
+                parameters.index(hardening_name(joint.name)),
+                parameters.index(f"{joint.name}.drive.stiffness"),
+            )
+            for axis, joint in enumerate(robot.driven)
+            if hardening_name(joint.name) in parameters
+        }
+
+        def number(name: str) -> int:
+            return parameters.index(name) if name in parameters else -1
+
+        poses = []
+        for response, label in zip(responses, labels, strict=True):
+            names: dict[str, int] = {}
+            for k, name in enumerate(parameters.names):
+                target, only = own.get(name, (name, label))
+                if only == label and target in robot.values and not name.endswith((".delay", ".hardening")):
+                    names[target] = k
+            if response.payload == 0:
+                names.pop("payload.mass", None)
+            delays = [f"{joint.name}.delay" for joint in robot.driven]
+            at = np.array([number(name) for name in delays])
+            sensors = tuple(robot.sensors[name] for name in response.sensors)
+            poses.append(
+                PoseModel(
+                    response.frequencies_hz,
+                    response.q_mean,
+                    response.payload,
+                    names,
+                    gaps,
+                    np.zeros((1, len(robot.driven))),
+                    hardening,
+                    None,
+                    at,
+                    sensors,
+                    np.array([parameters.index(sensitivity_name(s.name)) for s in sensors], dtype=int),
+                    np.array([parameters.index(sensor_delay_name(s.name)) for s in sensors], dtype=int),
+                    np.array(
+                        [[number(name) for name in mounting_names(s.name)] for s in sensors], dtype=int
+                    ).reshape(-1, 5),
+                )
+            )
+        return cls(robot, parameters, tuple(poses))
+
+    def with_loaded_drives(self, x: np.ndarray, plan: MultisinePlan) -> ResponseModel:
+        """Gaps stand open and drives harden as the plan's torques have it at the coordinates x (p,)."""
+        natural = self.parameters.natural(x)
+        poses = []
+        for pose in self.poses:
+            known, payload = pose.values(self.robot, natural)
+            loaded = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan)
+            mean = pose.stiffness_ratio(natural).mean(axis=0)
+            loaded = replace(loaded, stiffness=loaded.stiffness / mean)  # at no load
+            poses.append(replace(pose, gap_compliance=loaded.gap_compliance(), torque=loaded))
+        return replace(self, poses=tuple(poses))
+
+    def predict(self, x: np.ndarray) -> list[Prediction]:
+        """Responses and derivatives of every pose."""
+        values, slopes = self.parameters.natural(x), self.parameters.natural_slope(x)
+        return [self._pose(pose, values, slopes, derivatives=True) for pose in self.poses]
+
+    def responses(self, x: np.ndarray) -> list[np.ndarray]:
+        """Responses (lines, E + S, E) of every pose, without derivatives."""
+        values, slopes = self.parameters.natural(x), self.parameters.natural_slope(x)
+        return [self._pose(pose, values, slopes, derivatives=False).response for pose in self.poses]
+
+    def _pose(
+        self, pose: PoseModel, values: np.ndarray, slopes: np.ndarray, *, derivatives: bool
+    ) -> Prediction:
+        known, payload = pose.values(self.robot, values)
+        robot = self.robot.with_values(known)
+        softened = {name: axis for axis in pose.changing for name in _drive(robot, axis)}
+        names = tuple(dict.fromkeys((*pose.robot_names, *softened))) if derivatives else ()
+        sensors = pose.placed(values)
+        system = linearise(robot, pose.q, payload, derivatives=names, sensors=sensors)
+        s = 2j * np.pi * pose.frequencies_hz
+        moved = transfer_matrix(system, pose.frequencies_hz)
+        response, change = moved.response, moved.derivatives
+        factor = pose.measured(values)
+        response = response * factor
+        if not derivatives:
+            return Prediction(response, np.empty((*response.shape, 0)), np.empty(0, dtype=int))
+        change = change * factor[..., None]
+        drive_changes = {axis: np.zeros_like(response) for axis in pose.changing}
+        blocks: dict[int, np.ndarray] = {}
+        for k, name in enumerate(names):
+            slope = known[name]  # ∂/∂ log of it
+            if name in pose.robot_names:
+                number = pose.robot_names[name]
+                log = self.parameters[number].scale == "log"
+                blocks[number] = change[..., k] * (slope if log else 1.0)
+            if name in softened:
+                drive_changes[softened[name]] += change[..., k] * slope
+        for axis, number, by_parameter in pose.slopes(values):
+            blocks[number] = blocks.get(number, 0.0) + drive_changes[axis] * by_parameter
+        for axis in np.flatnonzero(pose.delays >= 0):
+            number = int(pose.delays[axis])
+            blocks[number] = np.zeros_like(response)
+            blocks[number][:, :, axis] = -s[:, None] * response[:, :, axis] * slopes[number]
+        for row, (sensitivity, late) in enumerate(
+            zip(pose.sensitivities, pose.late, strict=True), response.shape[2]
+        ):
+            blocks[int(sensitivity)], blocks[int(late)] = np.zeros_like(response), np.zeros_like(response)
+            blocks[int(sensitivity)][:, row] = response[:, row] * slopes[sensitivity] / values[sensitivity]
+            blocks[int(late)][:, row] = -s[:, None] * response[:, row] * slopes[late]
+        for row, way in np.argwhere(pose.mounting >= 0):
+            errors = pose.mounting_errors(values)[row] + _MOUNTING_STEP * np.eye(5)[way]
+            moved = pose.sensors[row].misplaced(errors)
+            nearby = transfer_matrix(linearise(robot, pose.q, payload, sensors=[moved]), pose.frequencies_hz)
+            number, at = int(pose.mounting[row, way]), response.shape[2] + row
+            blocks[number] = np.zeros_like(response)
+            change = nearby.response[:, -1] * factor[:, at] - response[:, at]
+            blocks[number][:, at] = change / _MOUNTING_STEP * slopes[number]
+        return Prediction(response, np.stack(list(blocks.values()), axis=-1), np.array(list(blocks)))
+
+
+def _drive(robot: RobotModel, axis: int) -> tuple[str, str]:
+    drive = f"{robot.driven[axis].name}.drive"
+    return f"{drive}.stiffness", f"{drive}.damping"

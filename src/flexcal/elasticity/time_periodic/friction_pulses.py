@@ -1,0 +1,118 @@
+"""Effect of Coulomb friction at the reversals of the reference motion on the frequency response.
+
+Friction acts on the small motion only around the reversals of the slow one, as a pulse of strong damping twice a cycle. The mean of the
+pulses is part of the motor's viscous coefficient in that pose; their change over the cycle couples the excited line with sidebands at
+even multiples of the reference frequency, where the robot answers with its own resonances.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from flexcal.elasticity.time_periodic.reference_motion import ReferenceMotion
+from flexcal.elasticity.time_periodic.sidebands import Sidebands
+from flexcal.model.vibration import Linearisation
+
+SIDEBANDS = 16
+"""Even multiples of the reference frequency that are balanced on either side of the excited line."""
+
+WIDTH_PASSES = 3
+"""Passes in which the width of the pulses follows the motion that they damp."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionPulses:
+    """Pulsed friction in one pose: the Gaussian equivalent of Coulomb's law.
+
+    `strength` (E,) N m s/rad is the part of each motor's viscous coefficient that friction makes. The derivative of friction by the
+    velocity is a delta function at rest; under a multisine of the velocity v (standard deviation at the reversals) on top of
+    A Ω cos Ωt it becomes two Gaussian pulses a cycle, of the width σ = v / (A Ω²) in s, `width` (E,), and the Fourier coefficients
+    (-1)^(m/2) exp(-(m Ω σ)²/2) for even orders m. `mobility` (L, k, E, E) rad/s per N m is that of the motors, `sensed` (L, S, E) what
+    sensors on the arm read at the line per N m, in the closed loop.
+    """
+
+    sidebands: Sidebands
+    omega: float
+    mobility: np.ndarray
+    sensed: np.ndarray
+    strength: np.ndarray
+    width: np.ndarray
+
+    @classmethod
+    def of(
+        cls, system: Linearisation, frequencies_hz: np.ndarray, motion: ReferenceMotion, strength: np.ndarray
+    ) -> FrictionPulses:
+        """For lines (L,) Hz of a system whose viscous coefficients include `strength`."""
+        count = system.inputs
+        omega = 2 * np.pi * motion.frequency_hz
+        orders = 2 * np.arange(-SIDEBANDS, SIDEBANDS + 1)
+        bands = Sidebands.of(system, frequencies_hz, motion, orders)
+        moved = bands.response(np.eye(len(system.mass), count))
+        mobility = bands.s[:, :, None, None] * moved[:, :, :count]
+        sensed = np.zeros((len(mobility), 0, count))
+        if system.sensed is not None:
+            sensed = system.sensed.at(bands.s[:, bands.middle]) @ moved[:, bands.middle]
+        pulses = cls(bands, omega, mobility, sensed, strength, np.zeros(count))
+        velocity = np.where((orders == 0)[:, None, None], mobility, 0.0)
+        for _ in range(WIDTH_PASSES):
+            speed = _reversal_velocity(velocity, orders, motion.excitation)
+            pulses = replace(pulses, width=speed / (motion.amplitude * omega**2))
+            velocity = pulses.velocity()
+        return pulses
+
+    def coefficients(self) -> np.ndarray:
+        """N m s/rad (k, l, E) by which the velocity at order l makes torque at order k, the mean left out."""
+        orders = self.sidebands.orders
+        apart = orders[:, None] - orders[None, :]
+        decay = np.exp(-0.5 * (apart[:, :, None] * self.omega * self.width) ** 2)
+        sign = np.where(apart == 0, 0.0, np.where(apart % 4 == 0, 1.0, -1.0))
+        return sign[:, :, None] * decay * self.strength
+
+    def velocity(self) -> np.ndarray:
+        """Motor velocities (L, k, E, E) of all orders per N m at the line: v = Y (τ - F v)."""
+        lines, orders, count, _ = self.mobility.shape
+        coupled = np.einsum("Lkij,klj->Lkilj", self.mobility, self.coefficients())
+        coupled = coupled.reshape(lines, orders * count, orders * count)
+        driven = np.zeros_like(self.mobility)
+        driven[:, orders // 2] = self.mobility[:, orders // 2]
+        moved = np.linalg.solve(np.eye(orders * count) + coupled, driven.reshape(lines, -1, count))
+        return moved.reshape(self.mobility.shape)
+
+    @cached_property
+    def shift(self) -> np.ndarray:
+        """G with pulsed friction less G with its mean, (L, E + S, E): rad/s² per N m, then the sensors' readings.
+
+        The readings follow the forces at the line: the torque less friction, over the measured torque, of which the controller's is part.
+        """
+        bands = self.sidebands
+        velocity, middle = self.velocity(), bands.middle
+        pulsed, mean = (v[:, middle] for v in (velocity, self.mobility))
+        change = bands.acceleration(pulsed) - bands.acceleration(mean)
+        if not self.sensed.shape[1]:
+            return change
+        friction = np.einsum("li,Llij->Lij", self.coefficients()[middle], velocity)
+        still = self.sensed @ np.linalg.inv(np.eye(mean.shape[1]) - bands.loop @ mean)
+        moving = (
+            self.sensed
+            @ (np.eye(mean.shape[1]) - friction)
+            @ np.linalg.inv(np.eye(mean.shape[1]) - bands.loop @ pulsed)
+        )
+        return np.concatenate([change, moving - still], axis=1)
+
+    def shift_by_form(self) -> np.ndarray:
+        """∂ `shift` (L, E + S, E, 2 E) by the logarithm of every strength, then of every width, by forward differences."""
+        base, step = self.shift, 0.05
+        growth = np.exp(step * np.eye(len(self.width)))
+        changed = [replace(self, strength=g * self.strength) for g in growth]
+        changed += [replace(self, width=g * self.width) for g in growth]
+        return np.stack([(other.shift - base) / step for other in changed], axis=-1)
+
+
+def _reversal_velocity(moved: np.ndarray, orders: np.ndarray, excitation: np.ndarray) -> np.ndarray:
+    """Standard deviation (E,) rad/s of the motors' fast motion at Ωt = ±π/2, from velocities (L, k, E, E) per N m."""
+    turn = np.where(orders % 4 == 0, 1.0, -1.0)
+    power = np.abs(np.einsum("k,Lkij->Lij", turn, moved)) ** 2
+    return np.sqrt(0.5 * np.einsum("Lij,jL->i", power, excitation**2))

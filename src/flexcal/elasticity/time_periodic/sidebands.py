@@ -1,0 +1,52 @@
+"""The linearised robot at an excited line and at multiples of the reference frequency beside it, for harmonic balance (Wereley 1990)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.elasticity.time_periodic.reference_motion import ReferenceMotion
+from flexcal.model.vibration import Linearisation
+
+
+@dataclass(frozen=True, eq=False)
+class Sidebands:
+    """Lines (L,) at the orders (k,) of the reference frequency Ω about each, position loop closed.
+
+    `s` (L, k) is the Laplace variable, `dynamics` (L, k, d, d) is M s² + D s + K with the controller, whose impedance at the line itself is
+    `loop` (L, E, E) N m s/rad.
+    """
+
+    orders: np.ndarray
+    s: np.ndarray
+    dynamics: np.ndarray
+    loop: np.ndarray
+
+    @classmethod
+    def of(
+        cls, system: Linearisation, frequencies_hz: np.ndarray, motion: ReferenceMotion, orders: np.ndarray
+    ) -> Sidebands:
+        """`orders` (k,) are symmetric about 0."""
+        motors = range(system.inputs)
+        s = 2j * np.pi * (frequencies_hz[:, None] + orders * motion.frequency_hz)
+        at = s[:, :, None, None]
+        dynamics = at**2 * system.mass + at * system.damping + system.stiffness
+        dynamics[:, :, motors, motors] += motion.kp + s[:, :, None] * motion.kd
+        loop = np.zeros((len(s), system.inputs, system.inputs), dtype=complex)
+        loop[:, motors, motors] = motion.kd + motion.kp / s[:, len(orders) // 2, None]
+        return cls(orders, s, dynamics, loop)
+
+    @property
+    def middle(self) -> int:
+        """Index of order 0."""
+        return len(self.orders) // 2
+
+    def response(self, forces: np.ndarray) -> np.ndarray:
+        """Displacements (L, k, d, c) by `forces` (d, c) at every order."""
+        return np.linalg.solve(self.dynamics, np.broadcast_to(forces, (*self.s.shape, *forces.shape)))
+
+    def acceleration(self, velocity: np.ndarray) -> np.ndarray:
+        """G (L, E, E) from the motors' velocities (L, E, E) at the lines: the controller's torque is part of the measured one."""
+        impedance = np.linalg.inv(velocity) - self.loop
+        return self.s[:, self.middle, None, None] * np.linalg.inv(impedance)

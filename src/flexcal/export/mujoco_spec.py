@@ -1,0 +1,117 @@
+"""Conversion of `RobotModel` to MuJoCo: rotors, drive springs and bearings as joints of one kinematic tree.
+
+A joint with springs is up to four hinges on the link's body, outermost first: the motor about the joint axis with the rotor's
+`armature`, the twist of the drive spring about the same axis, the tilts about the bearing's y and x; bearings that are fixed to the
+parent link (`bearings: before`) come first, tilts about y and x, motor, twist. So the rotor carries the
+kinetic energy of its own spin only, the spring is an ordinary joint spring (no tendon between two trees, whose damping
+`implicitfast` would get wrong) and the geometry is the chain of `flexcal.model`: misalignments and offset lie in the body's
+placement, the length errors in the placement of the next body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import bearing_placement, link_placement, point_placement
+from flexcal.model.parts import rotation_wxyz
+from flexcal.model.robot import SPRINGS, RobotModel, carried_inertias
+from flexcal.mujoco_library import log_mujoco_warnings
+
+if TYPE_CHECKING:
+    import mujoco
+
+
+def mjcf_spec(
+    model: RobotModel,
+    *,
+    q: np.ndarray | None = None,
+    free: Collection[int] | None = None,
+    payload: float | None = None,
+) -> mujoco.MjSpec:
+    """The robot as an `MjSpec`, with every identified value in it.
+
+    `q` (n,) rad or m: where the joints that are not in `free` are locked (default: all joints are free); `payload` kg at the declared
+    payload's centre of mass (default: the declared mass). MuJoCo joints are named `<joint>` (motor side), `<joint>.drive` (twist
+    of the arm beyond the motor), `<joint>.bearing_y`, `<joint>.bearing_x`; sites have the points' names. Backlash has no form in
+    MJCF and is left out; Coulomb friction becomes `frictionloss`, which is not a tanh. Raises `FlexcalError` where a joint is
+    locked without `q`, or a payload is given but none declared.
+    """
+    import mujoco
+
+    log_mujoco_warnings()
+    motors = set(range(model.n)) if free is None else set(free)
+    if len(motors) < model.n and q is None:
+        raise FlexcalError("joints are to be locked but no pose is given; pass q, one value per joint.")
+    at = np.zeros(model.n) if q is None else np.asarray(q, dtype=float)
+    spec = mujoco.MjSpec()
+    spec.modelname = model.name
+    spec.compiler.degree = False
+    spec.compiler.autolimits = True
+    spec.option.gravity = model.gravity
+    bodies: list[mujoco.MjsBody] = []
+    for i, inertia in enumerate(carried_inertias(model, payload)):
+        joint = model.joints[i]
+        parent = spec.worldbody if joint.parent < 0 else bodies[joint.parent]
+        position, rotation = link_placement(model, i, 0.0 if i in motors else at[i])
+        body = parent.add_body(name=joint.link, pos=position, quat=rotation_wxyz(rotation))
+        body.mass = inertia.mass
+        body.ipos = inertia.com
+        body.fullinertia = inertia.inertia[[0, 1, 2, 0, 0, 1], [0, 1, 2, 1, 2, 2]]
+        body.explicitinertial = True
+        _add_joints(spec, body, model, i, None if i in motors else at[i])
+        bodies.append(body)
+    for name in model.points:
+        joint, position, rotation = point_placement(model, name)
+        bodies[joint].add_site(name=name, pos=position, quat=rotation_wxyz(rotation))
+    return spec
+
+
+def _add_joints(
+    spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int, locked: float | None
+) -> None:
+    """Motor and springs of a joint, outermost first; the motor is left out where it is locked, at that angle (rad or m)."""
+    import mujoco
+
+    spring = next((e for e in model.elastic if e.index == i), None)
+    for component in spring.components if spring else (2,):
+        if component == 2 and locked is None:
+            _add_motor(spec, body, model, i)
+        if spring:
+            name = f"{spring.name}.{SPRINGS[component]}"
+            axis = bearing_placement(model, spring, locked or 0.0)[:, component]
+            joint = body.add_joint(name=name, type=mujoco.mjtJoint.mjJNT_HINGE, axis=axis)
+            joint.stiffness = _linear(joint.stiffness, float(spring.stiffness[component]))
+            joint.damping = _linear(joint.damping, float(spring.damping[component]))
+
+
+def _add_motor(spec: mujoco.MjSpec, body: mujoco.MjsBody, model: RobotModel, i: int) -> None:
+    import mujoco
+
+    joint = model.joints[i]
+    kind = mujoco.mjtJoint.mjJNT_SLIDE if joint.kind == "prismatic" else mujoco.mjtJoint.mjJNT_HINGE
+    motor = body.add_joint(name=joint.name, type=kind, axis=joint.axis)
+    motor.armature = _known(model.rotor_inertia[i])
+    motor.damping = _linear(motor.damping, _known(model.viscous[i]))
+    motor.frictionloss = _known(model.coulomb[i])
+    if np.isfinite([joint.lower, joint.upper]).all():
+        motor.range = [joint.lower, joint.upper]
+    drive = spec.add_actuator(name=joint.name, target=joint.name, trntype=mujoco.mjtTrn.mjTRN_JOINT)
+    if np.isfinite(joint.effort) and joint.effort > 0:
+        drive.ctrlrange = [-joint.effort, joint.effort]
+
+
+def _linear(default: float | np.ndarray, value: float) -> float | np.ndarray:
+    """`value` in the form of a joint's coefficient: a number up to MuJoCo 3, a polynomial with the linear one first from 4 on."""
+    if np.ndim(default) == 0:
+        return value
+    coefficients = np.zeros(np.shape(default))
+    coefficients.flat[0] = value
+    return coefficients
+
+
+def _known(value: float) -> float:
+    return float(value) if np.isfinite(value) else 0.0

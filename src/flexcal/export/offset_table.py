@@ -1,0 +1,162 @@
+"""The table of joint offsets, and its reader."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Collection
+from io import StringIO
+
+import numpy as np
+
+from flexcal.export.chain import chain_to
+from flexcal.export.offset_fit import OffsetFit, fit_offsets, offset_tool, what_offsets_leave
+from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
+from flexcal.export.transforms import SIX, from_six, six_numbers, transform
+from flexcal.export.written_file import Rendered
+from flexcal.model.parts import rotation_vector, vector_rotation
+from flexcal.model.robot import RobotModel
+from flexcal.units import DEGREE, MILLIMETRE
+
+COLUMNS = ("joint", "parameter", "unit", "value", "std", "value_deg", "motor_deg", "determined")
+_LARGE = 5 * DEGREE
+"""An offset from which on it is rather another zero in the URDF than an error."""
+
+
+def render_offsets(
+    model: RobotModel,
+    nominal: RobotModel,
+    *,
+    point: str | None = None,
+    keep_frames: bool = False,
+    undetermined: Collection[int] = (),
+) -> Rendered:
+    """The best joint offsets as a CSV table, with base and tool that go with them unless `keep_frames`; zero for the joints `undetermined`.
+
+    Raises `FlexcalError` for a robot without points, or an unknown point.
+    """
+    target, chain = chain_to(model, point, "Joint offsets")
+    fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined)
+    text = _csv(model, fit, chain, keep_frames=keep_frames)
+    placed = "as it is" if keep_frames else "with base and tool placed by best fit"
+    remarks = [
+        f"Without offsets, {placed}, the nominal robot is off by {fit.before.mean / MILLIMETRE:.3f} mm on average, "
+        f"{fit.before.max / MILLIMETRE:.3f} mm at most."
+    ]
+    open_ = [model.joint_names[i] for i in chain if not fit.determined[i]]
+    if open_:
+        remarks.append(
+            f"Not determined, and zero here: {', '.join(open_)}. What was measured cannot tell their zeros from another place of the "
+            "base or of the measured point on the tool; leave these zeros as they are."
+        )
+    large = [
+        model.joint_names[i]
+        for i in chain
+        if abs(fit.offsets[i]) > _LARGE and model.joints[i].kind != "prismatic"
+    ]
+    if large:
+        remarks.append(
+            f"Larger than any error of manufacture: {', '.join(large)}. Look whether URDF and controller have the same zeros before "
+            "entering any."
+        )
+    left = [name for i, name in enumerate(model.joint_names) if i not in chain]
+    if left:
+        remarks.append(
+            f"Without an offset here, for they do not move the point '{target}': {', '.join(left)}."
+        )
+    if model.config.drives.coupling:
+        remarks.append(
+            "Values at the motor are by its own ratio alone: couplings between motors are not in them."
+        )
+    frames = (
+        ()
+        if keep_frames
+        else (
+            "base: Trans(x, y, z) Rz(yaw) Ry(pitch) Rx(roll) of the controller's base frame in that of the calibrated robot; "
+            f"tool: what to add to the point '{target}' in its frame.",
+        )
+    )
+    document = {
+        model.joints[i].name: {
+            "offset": float(fit.offsets[i]),
+            "unit": "m" if model.joints[i].kind == "prismatic" else "rad",
+            "std": float(fit.std[i]) if fit.determined[i] and fit.std[i] > 0 else None,
+            "determined": bool(fit.determined[i]),
+            "motor_offset": float(fit.offsets[i] * model.ratio[i]) if np.isfinite(model.ratio[i]) else None,
+        }
+        for i in chain
+    }
+    return Rendered(
+        text,
+        _tool_map(text, nominal, target),
+        (GEOMETRY, *AT_REST),
+        "#",
+        about=(
+            "Joint offsets: with the joints at q, the nominal robot at q + offset is nearest to the real one. "
+            "Least squares over random poses; no other geometry is changed.",
+            *frames,
+            "determined: no for an offset that the measured points do not determine, which is left at zero.",
+            "std: what the uncertainty of the calibrated parameters leaves. motor_deg: at the motor, by drives: ratio of robot.yaml.",
+        ),
+        remarks=tuple(remarks),
+        table={
+            "joints": document,
+            "safe": not large,
+            "without_offsets": fit.before.in_millimetres(),
+            "base": None if keep_frames else _base_numbers(fit.base),
+            "tool": None if keep_frames else dict(zip("xyz", fit.tool.tolist(), strict=True)),
+        },
+        point=target,
+        absorb=lambda q, moved: what_offsets_leave(nominal, q, moved, target, keep_frames=keep_frames),
+    )
+
+
+def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
+    """Parameters (n + 9,) of `offset_tool` that a table's `text` holds; raises `FlexcalError` for a joint that the robot does not have."""
+    found = np.zeros(nominal.n + 9)
+    pose: dict[str, float] = dict.fromkeys(SIX, 0.0)
+    lines = (line for line in text.splitlines() if not line.startswith("#"))
+    for row in csv.DictReader(lines):
+        value = float(row["value"])
+        if row["parameter"] == "offset":
+            found[nominal.joint_index(row["joint"])] = value
+        elif row["joint"] == "tool":
+            found[nominal.n + 6 + "xyz".index(row["parameter"])] = value
+        else:
+            pose[row["parameter"]] = value
+    base = from_six(pose)
+    found[nominal.n : nominal.n + 3] = base[:3, 3]
+    found[nominal.n + 3 : nominal.n + 6] = rotation_vector(base[:3, :3])
+    return found
+
+
+def _tool_map(text: str, nominal: RobotModel, point: str) -> ToolMap:
+    parameters = offsets_of(text, nominal)
+    return lambda q: offset_tool(nominal, q, parameters, point)
+
+
+def _base_numbers(base: np.ndarray) -> dict[str, float]:
+    return six_numbers(transform(base[:3], vector_rotation(base[3:])))
+
+
+def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_frames: bool) -> str:
+    stream = StringIO()
+    writer = csv.writer(stream, lineterminator="\n")
+    writer.writerow(COLUMNS)
+    for i in chain:
+        joint, value = model.joints[i], float(fit.offsets[i])
+        std = repr(float(fit.std[i])) if fit.determined[i] and fit.std[i] > 0 else ""
+        told = "yes" if fit.determined[i] else "no"
+        if joint.kind == "prismatic":
+            writer.writerow([joint.name, "offset", "m", repr(value), std, "", "", told])
+            continue
+        at_motor = value * model.ratio[i] / DEGREE
+        motor = f"{at_motor:.6f}" if np.isfinite(at_motor) else ""
+        writer.writerow([joint.name, "offset", "rad", repr(value), std, f"{value / DEGREE:.6f}", motor, told])
+    if not keep_frames:
+        for key, value in _base_numbers(fit.base).items():
+            angle = key in SIX[3:]
+            degrees = f"{value / DEGREE:.6f}" if angle else ""
+            writer.writerow(["base", key, "rad" if angle else "m", repr(value), "", degrees, "", ""])
+        for key, value in zip("xyz", fit.tool.tolist(), strict=True):
+            writer.writerow(["tool", key, "m", repr(value), "", "", "", ""])
+    return stream.getvalue()

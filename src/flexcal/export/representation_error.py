@@ -1,0 +1,197 @@
+"""Tool error due to terms that a file format cannot represent."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from types import MappingProxyType
+
+import numpy as np
+
+from flexcal.model.kinematics import joint_limits, point_kinematics, reach_points
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import static_equilibrium
+from flexcal.units import MILLIMETRE
+
+DEFLECTION = "elastic deflection"
+BACKLASH = "backlash"
+GRAVITY_COMPLIANCE = "gravity compliance"
+LATERAL_COMPLIANCE = "lateral gravity compliance"
+TRANSMISSION = "transmission error"
+HARDENING = "hardening of drives"
+GEOMETRY = "axis misalignments and lengths"
+AT_REST = (DEFLECTION, BACKLASH, GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
+"""The terms beyond rigid geometry, which hardly any format has a place for."""
+_CALIBRATED = (GRAVITY_COMPLIANCE, LATERAL_COMPLIANCE, TRANSMISSION)
+"""Those that a calibration fits beside the geometry, which makes up for them where it is fitted alone."""
+
+SAMPLES = 2000
+_AGREED = 1e-9
+"""mm: agreement better than this is not told."""
+_TRIES = 4
+_LEAST_REACHED = 50
+_STROKE = 1.0
+"""m either way, of a prismatic joint without limits."""
+_TURNS = 4 * np.pi
+"""rad: a revolute joint with a longer range counts as one without limits."""
+
+ToolMap = Callable[[np.ndarray], np.ndarray]
+"""Joint positions (N, n), rad or m, to positions (N, 3), m."""
+
+
+@dataclass(frozen=True)
+class Distances:
+    """Mean, 95th percentile and maximum of the tool error, m."""
+
+    mean: float
+    p95: float
+    max: float
+
+    @classmethod
+    def of(cls, errors: np.ndarray) -> Distances:
+        """Of differences of positions (N, 3), m."""
+        distance = np.linalg.norm(errors, axis=1)
+        return cls(float(distance.mean()), float(np.percentile(distance, 95)), float(distance.max()))
+
+    def in_millimetres(self) -> dict[str, float]:
+        """As documents have them."""
+        return {
+            "mean_mm": self.mean / MILLIMETRE,
+            "p95_mm": self.p95 / MILLIMETRE,
+            "max_mm": self.max / MILLIMETRE,
+        }
+
+
+@dataclass(frozen=True)
+class LostTerm:
+    """A term that a format cannot represent, and the tool error where it alone is left out (None: there is no tool)."""
+
+    name: str
+    error: Distances | None
+
+
+@dataclass(frozen=True)
+class Loss:
+    """What is lost: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
+
+    `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg.
+    """
+
+    terms: tuple[LostTerm, ...]
+    error: Distances | None
+    poses: int
+    within: str
+    payload: float
+
+    @property
+    def sentences(self) -> tuple[str, ...]:
+        """As people read it."""
+        if not self.terms:
+            if self.error is None:
+                return ("Nothing is lost.",)
+            return (
+                f"Nothing is lost: the file agrees with the calibrated robot to {max(self.error.max / MILLIMETRE, _AGREED):.0e} mm "
+                f"over {self.poses} random poses of the {self.within}.",
+            )
+        named = ", ".join(f"{term.name}{_alone(term.error)}" for term in self.terms)
+        if self.error is None:
+            return (
+                f"This format cannot carry {named}. What that costs is not known: robot.yaml declares no point.",
+            )
+        off = self.error.in_millimetres()
+        carrying = f", carrying {self.payload:.3g} kg" if self.payload > 0 else ""
+        alone = any(term.name in _CALIBRATED for term in self.terms)
+        instead = ("A calibration with --terms kinematic makes up for a part of that by the geometry.",)
+        return (
+            f"This format cannot carry {named}.",
+            *(instead if alone else ()),
+            f"The tool is off by {off['mean_mm']:.3f} mm on average, {off['p95_mm']:.3f} mm in 95 % of poses and "
+            f"{off['max_mm']:.3f} mm at most, over {self.poses} random poses of the {self.within}{carrying}.",
+        )
+
+
+def measure_loss(
+    model: RobotModel,
+    tool: ToolMap,
+    terms: Sequence[str],
+    *,
+    point: str | None = None,
+    absorb: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
+) -> Loss:
+    """Loss of a file that puts the target where `tool` says and has no place for `terms`; only those that `model` has count.
+
+    The robot carries its declared payload. `absorb` takes joint positions (N, n) and what a term moves the tool by (N, 3), and returns
+    what the file's own freedom leaves of it; by default all of it.
+    """
+    present = [term for term in terms if _leave_out(model, term) is not model]
+    payload = float(model.payload_mass[0])
+    if not model.points:
+        return Loss(tuple(LostTerm(term, None) for term in present), None, 0, "joint range", payload)
+    q, within = random_poses(model, point, np.random.default_rng(0))
+    full, flank = tool_positions(model, q, point=point)
+    lost = []
+    for term in present:
+        moved = full - tool_positions(_leave_out(model, term), q, point=point, flank=flank)[0]
+        lost.append(LostTerm(term, Distances.of(moved if absorb is None else absorb(q, moved))))
+    return Loss(tuple(lost), Distances.of(full - tool(q)), len(q), within, payload)
+
+
+def tool_positions(
+    model: RobotModel, q: np.ndarray, *, point: str | None = None, flank: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Where a target of the robot at rest is (N, 3), m, with everything that is known, and the flanks (N, n) of its backlash."""
+    rest = static_equilibrium(model, q, flank=flank)
+    return point_kinematics(model, q, rest.deflection, point=point, jacobians=False).position, rest.flank
+
+
+def random_poses(model: RobotModel, point: str | None, rng: np.random.Generator) -> tuple[np.ndarray, str]:
+    """Random joint positions (N, n) that put the target into the declared working volume, or all over the joint range without one.
+
+    The second value says which. Where fewer than 50 of the tries reach the volume, it is the joint range, too.
+    """
+    lower, upper = joint_limits(model)
+    slides = np.array([joint.kind == "prismatic" for joint in model.joints])
+    free = ~(upper - lower <= np.where(slides, np.finfo(float).max, _TURNS))
+    reach = np.where(slides, _STROKE, np.pi)
+    lower, upper = np.where(free, -reach, lower), np.where(free, reach, upper)
+    box = model.config.working_volume
+    if box is not None:
+        wanted = rng.uniform(box.lower, box.upper, (SAMPLES // _TRIES, 3))
+        starts = rng.uniform(lower, upper, (_TRIES, len(wanted), model.n))
+        tried = [reach_points(model, wanted, start, lower, upper, point=point) for start in starts]
+        found = np.concatenate([q[reached] for q, reached in tried])
+        if len(found) >= _LEAST_REACHED:
+            return found, "working volume"
+    return rng.uniform(lower, upper, (SAMPLES, model.n)), "joint range"
+
+
+def _leave_out(model: RobotModel, term: str) -> RobotModel:
+    """The robot without a term; the robot itself where it has none of it."""
+    if term == GEOMETRY:
+        errors = model.geometry[:, 1:], model.tool, model.point_error
+        if not any(part.any() for part in errors):
+            return model
+        offsets = model.geometry * (np.arange(6) == 0)
+        return replace(
+            model, geometry=offsets, tool=np.zeros(6), point_error=np.zeros_like(model.point_error)
+        )
+    if term == DEFLECTION and model.elastic:
+        return replace(model, bearing_frames=MappingProxyType({}))
+    if term == BACKLASH and model.backlash.any():
+        return replace(model, backlash=np.zeros_like(model.backlash))
+    if term == GRAVITY_COMPLIANCE and model.gravity_compliance.any():
+        return replace(model, gravity_compliance=np.zeros_like(model.gravity_compliance))
+    if term == LATERAL_COMPLIANCE and model.lateral_compliance.any():
+        return replace(model, lateral_compliance=np.zeros_like(model.lateral_compliance))
+    if term == HARDENING and model.hardening.any():
+        return replace(model, hardening=np.zeros_like(model.hardening))
+    if term == TRANSMISSION and model.transmission.any():
+        return replace(model, transmission=np.zeros_like(model.transmission))
+    return model
+
+
+def _alone(error: Distances | None) -> str:
+    if error is None:
+        return ""
+    found = error.in_millimetres()
+    return f" (alone {found['mean_mm']:.3f} mm on average, {found['max_mm']:.3f} mm at most)"

@@ -1,0 +1,47 @@
+"""Placements as matrices (..., 4, 4) and as the six numbers that files have: x, y, z, roll, pitch, yaw."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.model.parts import rotation_rpy, rpy_rotation
+
+SIX: tuple[str, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+X, Y, Z = np.eye(3)
+
+
+def transform(position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
+    """Position (3,) and rotation (3, 3) as one matrix (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = rotation, position
+    return matrix
+
+
+def six_numbers(placement: np.ndarray) -> dict[str, float]:
+    """x, y, z (m), roll, pitch, yaw (rad) of a placement (4, 4) = Trans Rz(yaw) Ry(pitch) Rx(roll)."""
+    values = [*placement[:3, 3], *rotation_rpy(placement[:3, :3])]
+    return {key: float(value) + 0.0 for key, value in zip(SIX, values, strict=True)}
+
+
+def from_six(numbers: dict[str, float]) -> np.ndarray:
+    """The placement (4, 4) that six numbers say."""
+    values = np.array([numbers[key] for key in SIX], dtype=float)
+    return transform(values[:3], rpy_rotation(values[3:]))
+
+
+def turned(axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
+    """Rotations (..., 4, 4) by angles (...,), rad, about a unit vector (3,): Rodrigues."""
+    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    angle = np.asarray(angle, dtype=float)[..., None, None]
+    result = np.zeros((*angle.shape[:-2], 4, 4))
+    result[..., :3, :3] = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
+    result[..., 3, 3] = 1.0
+    return result
+
+
+def shifted(axis: np.ndarray, length: np.ndarray | float) -> np.ndarray:
+    """Translations (..., 4, 4) by lengths (...,), m, along a unit vector (3,)."""
+    length = np.asarray(length, dtype=float)
+    result = np.broadcast_to(np.eye(4), (*length.shape, 4, 4)).copy()
+    result[..., :3, 3] = length[..., None] * axis
+    return result

@@ -1,0 +1,71 @@
+"""Exported file of a robot, with the error due to terms that the format lacks."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.export.representation_error import Loss, ToolMap, measure_loss
+from flexcal.files.transaction import write_text
+from flexcal.model.robot import RobotModel
+
+
+@dataclass(frozen=True, eq=False)
+class Rendered:
+    """A robot as `text`, and `tool`: where that text, read back, puts the target.
+
+    `cannot_carry` are the terms that the format has no place for; `absorb` as `measure_loss` takes it; `about` says in sentences what
+    stands in the file, for its header; `remarks` what a reader of it must know besides; `table` is what to show of it.
+    """
+
+    text: str
+    tool: ToolMap
+    cannot_carry: tuple[str, ...]
+    comments: Literal["<!--", "#"] | None
+    about: tuple[str, ...] = ()
+    remarks: tuple[str, ...] = ()
+    table: dict[str, Any] = field(default_factory=dict)
+    point: str | None = None
+    absorb: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Exported:
+    """The written file, its loss, and remarks; `table` are its rows."""
+
+    path: Path
+    loss: Loss
+    remarks: tuple[str, ...]
+    table: dict[str, Any]
+
+    def __str__(self) -> str:
+        return " ".join([f"{self.path}:", *self.loss.sentences, *self.remarks])
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of the terms that the file does not carry."""
+        return tuple(term.name for term in self.loss.terms)
+
+
+def write_rendered(model: RobotModel, path: str | Path, rendered: Rendered) -> Exported:
+    """Measure what `rendered` lost of `model`, and write it with that in its header; raises `InputError` where it cannot be written."""
+    loss = measure_loss(
+        model, rendered.tool, rendered.cannot_carry, point=rendered.point, absorb=rendered.absorb
+    )
+    lines = [f"{model.name}, written by flexcal.", *rendered.about, *loss.sentences, *rendered.remarks]
+    write_text(path, _with_header(rendered.text, lines, rendered.comments))
+    return Exported(Path(path), loss, rendered.remarks, rendered.table)
+
+
+def _with_header(text: str, lines: list[str], comments: str | None) -> str:
+    if comments is None:
+        return text
+    if comments == "#":
+        return "".join(f"# {line}\n" for line in lines) + text
+    body = "\n".join(f"  {line.replace('--', '- -')}" for line in lines)
+    declaration, text = text.split("\n", 1) if text.startswith("<?xml") else ('<?xml version="1.0"?>', text)
+    return f"{declaration}\n<!--\n{body}\n-->\n{text}"

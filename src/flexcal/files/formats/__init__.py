@@ -1,0 +1,5 @@
+"""Checked reading and writing of YAML, NPZ and estimates files."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,356 @@
+"""Reading and writing of `estimates.yaml` and `estimates.npz`, one block per identification.
+
+The YAML has for every block the named values with unit, standard deviation and 95 % interval, what could not be told
+apart, the fit and the provenance; the npz has `<block>.names` (p,) and `<block>.covariance` (p, p), in estimation
+coordinates (of a value whose scale is `log`: its natural logarithm).
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Literal, get_args
+
+import numpy as np
+
+from flexcal.errors import FlexcalError, InputError
+from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
+from flexcal.files.formats.npz_reader import ArrayForm, NpzFile, refuse_foreign
+from flexcal.files.formats.yaml_reader import YamlFile, read_yaml_file
+from flexcal.files.formats.yaml_writer import to_plain, yaml_text
+from flexcal.files.transaction import atomic_paths, current, refuse_irregular, settle
+
+Block = Literal["dynamics", "stiffness", "calibration", "payload"]
+BLOCKS: tuple[Block, ...] = get_args(Block)
+"""The blocks of the file, in the order in which a robot takes them in."""
+
+
+@dataclass(frozen=True)
+class StoredValue:
+    """One value as it stands in the file; std, low and high are absent where it is not identifiable."""
+
+    estimate: float
+    unit: str = ""
+    std: float | None = None
+    low: float | None = None
+    high: float | None = None
+    identifiable: bool | None = None
+    scale: Literal["linear", "log"] = "linear"
+    lower: float | None = None
+    upper: float | None = None
+    prior_std: float | None = None
+    prior_mean: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.std is not None and self.std < 0:
+            raise FlexcalError(f"a standard deviation must not be negative, not {self.std:g}.")
+        if self.low is not None and self.high is not None and not self.low <= self.high:
+            raise FlexcalError(f"the interval from {self.low:g} to {self.high:g} has its ends exchanged.")
+
+
+@dataclass(frozen=True)
+class StoredDropped:
+    """A parameter that was held, with the kept ones that absorb it and their coefficients."""
+
+    name: str
+    absorbed_by: dict[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StoredFit:
+    """How the fit ended."""
+
+    rank: int
+    cost: float
+    chi2: float
+    degrees_of_freedom: int
+    status: str
+    message: str
+    iterations: int
+    outliers: tuple[int, ...] = ()
+    covariance_freedom: float | None = None
+    misfit: Misfit | None = None
+
+    def __post_init__(self) -> None:
+        if min(self.rank, self.chi2, self.degrees_of_freedom, self.iterations) < 0:
+            raise FlexcalError("rank, chi2, degrees_of_freedom and iterations must not be negative.")
+
+
+@dataclass(frozen=True)
+class StoredBlock:
+    """What one identification left in the file."""
+
+    values: dict[str, StoredValue]
+    dropped: tuple[StoredDropped, ...] = ()
+    fit: StoredFit | None = None
+    covariance_sha256: str | None = None
+    ranges: dict[str, tuple[float, float]] = field(default_factory=dict)
+    measurements: str | None = None
+    provenance: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class StoredEstimates:
+    """The whole file."""
+
+    dynamics: StoredBlock | None = None
+    stiffness: StoredBlock | None = None
+    calibration: StoredBlock | None = None
+    payload: StoredBlock | None = None
+
+    def block(self, name: Block) -> StoredBlock | None:
+        """One block, where it is there."""
+        return getattr(self, name)
+
+
+def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Block, Estimate]:
+    """The estimates of a file by block, in the order of `BLOCKS`, leaving out `without` (the block to be made anew).
+
+    Raises `InputError` with file and line where the YAML does not fit, and where the npz is missing, has other names
+    or shapes, or belongs to another YAML.
+    """
+    settle(Path(path).parent)
+    file = read_yaml_file(path)
+    stored = file.structure(StoredEstimates)
+    found: dict[Block, Estimate] = {}
+    for name in BLOCKS:
+        block = stored.block(name)
+        if block is not None and name != without:
+            found[name] = _estimate(file, name, block, _covariance(file, name, block))
+    return found
+
+
+def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
+    """Put an estimate into its block of the file, made where it is not there; the other blocks stay as they are.
+
+    The two files appear whole and together; the YAML carries the SHA-256 of its covariance.
+    Raises `InputError` where another block of the file cannot be read, and where the npz is of another program, and `FlexcalError` where
+    the estimate holds a number that is not finite.
+    """
+    path = Path(path)
+    if block not in BLOCKS:
+        raise FlexcalError(
+            f"there is no block '{block}' in an estimates file; there are {', '.join(BLOCKS)}."
+        )
+    stored, arrays = _kept(path, block)
+    covariance = np.asarray(estimate.covariance, dtype=np.float64)
+    size = len(estimate.parameters)
+    if covariance.shape != (size, size) or not np.isfinite(covariance).all():
+        raise FlexcalError(
+            f"the covariance of the {block} must be finite and ({size}, {size}), not {covariance.shape}."
+        )
+    arrays[block] = (estimate.parameters.names, covariance)
+    stored = replace(stored, **{block: _stored(estimate, covariance)})
+    text = yaml_text(stored)
+    named: dict[str, np.ndarray] = {}
+    for name in BLOCKS:
+        if name in arrays:
+            named[f"{name}.names"] = np.array(arrays[name][0], dtype=str)
+            named[f"{name}.covariance"] = arrays[name][1]
+    with atomic_paths(path.with_suffix(".npz"), path) as (binary, plain):
+        with binary.open("wb") as stream:
+            np.savez(stream, allow_pickle=False, **named)
+        plain.write_text(text, encoding="utf-8", newline="")
+
+
+def require_place(path: str | Path, block: Block) -> None:
+    """Raise `InputError` where `write_estimates` would not put a block into this file: so that it is known before the work begins."""
+    settle(Path(path).parent)
+    for file in (Path(path), Path(path).with_suffix(".npz")):
+        refuse_irregular(file)
+    _kept(Path(path), block)
+
+
+def provenance(
+    inputs: Iterable[str | Path] = (),
+    options: Mapping[str, object] | None = None,
+    estimates: str | Path | None = None,
+    blocks: Iterable[Block] = (),
+) -> dict[str, str]:
+    """Where an estimate comes from: program version, SHA-256 of input files and folders by name (with the path where a name
+    repeats), options, and the SHA-256 of the `blocks` of the file `estimates` that were used."""
+    from importlib.metadata import version
+
+    found = {"program": f"flexcal {version('flexcal')}"}
+    paths = [Path(path) for path in inputs]
+    names = [path.name for path in paths]
+    found |= {f"input.{p.name if names.count(p.name) == 1 else p.as_posix()}": sha256_of(p) for p in paths}
+    found |= {f"option.{name}": str(value) for name, value in (options or {}).items()}
+    if estimates is not None:
+        found |= {f"block.{block}": block_sha256(estimates, block) for block in blocks}
+    return found
+
+
+def sha256_of(path: str | Path) -> str:
+    """SHA-256 of a file; of a folder: of the names and SHA-256 of all files in it, in the order of their names."""
+    path = Path(path)
+    digest = hashlib.sha256()
+    try:
+        if path.is_dir():
+            for file in sorted(file for file in path.rglob("*") if file.is_file()):
+                digest.update(f"{file.relative_to(path).as_posix()}\0{sha256_of(file)}\n".encode())
+        else:
+            with current(path).open("rb") as stream:
+                while content := stream.read(2**20):
+                    digest.update(content)
+    except OSError as problem:
+        reason = problem.strerror or str(problem)
+        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+    return digest.hexdigest()
+
+
+def block_sha256(path: str | Path, block: Block) -> str:
+    """SHA-256 of a block's values and covariance, whatever its provenance; raises `InputError` where it is not there."""
+    file = read_yaml_file(path)
+    stored = file.structure(StoredEstimates).block(block)
+    if stored is None:
+        raise file.error((), f"there is no block '{block}'; run the identification that makes it.")
+    content = to_plain({"values": stored.values, "dropped": stored.dropped})
+    content["covariance"] = stored.covariance_sha256
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()
+
+
+def _kept(
+    path: Path, block: Block
+) -> tuple[StoredEstimates, dict[Block, tuple[tuple[str, ...], np.ndarray]]]:
+    """What stays in a file when `block` is written: its content, and names and covariance of the other blocks."""
+    if path.suffix not in (".yaml", ".yml"):
+        raise InputError(
+            f"{path}: estimates are written to a .yaml file (with an .npz beside it); give such a name."
+        )
+    stored, arrays = StoredEstimates(), {}
+    ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
+    refuse_foreign(path.with_suffix(".npz"), ours)
+    if current(path).exists():
+        file = read_yaml_file(path)
+        stored = file.structure(StoredEstimates)
+        for name in BLOCKS:
+            other = stored.block(name)
+            if other is not None and name != block and other.covariance_sha256 is not None:
+                arrays[name] = (tuple(other.values), _covariance(file, name, other))
+    return stored, arrays
+
+
+def _covariance(file: YamlFile, name: Block, block: StoredBlock) -> np.ndarray:
+    """The covariance (p, p) of a block, checked against the YAML."""
+    path = file.path.with_suffix(".npz")
+    again = "run the identification again"
+    if block.covariance_sha256 is None or block.fit is None:
+        raise file.error((name,), f"the block '{name}' has values only, so it is no estimate; {again}.")
+    forms = {
+        f"{name}.names": ArrayForm("text", ("names",)),
+        f"{name}.covariance": ArrayForm("real", ("names", "names")),
+    }
+    stored = NpzFile(path, f"it belongs to {file.path.name}: {again}")
+    if f"{name}.names" not in stored or f"{name}.covariance" not in stored:
+        raise InputError(f"{path}: the names and covariance of the block '{name}' are missing; {again}.")
+    names, covariance = stored.read(forms).values()
+    size = len(block.values)
+    if covariance.shape != (size, size):
+        raise InputError(
+            f"{path}: {name}.covariance has the shape {covariance.shape}, not ({size}, {size}); {again}."
+        )
+    if names.tolist() != list(block.values):
+        raise InputError(f"{path}: {name}.names are not the values of {file.path.name}; {again}.")
+    if covariance.dtype != np.float64 or _sha256(covariance) != block.covariance_sha256:
+        raise InputError(f"{path}: {name}.covariance does not belong to {file.path.name}; {again}.")
+    return covariance
+
+
+def _estimate(file: YamlFile, name: Block, block: StoredBlock, covariance: np.ndarray) -> Estimate:
+    fit = block.fit
+    assert fit is not None
+    try:
+        parameters = Parameters(_parameter(key, value) for key, value in block.values.items())
+    except FlexcalError as problem:
+        raise file.error((name, "values"), str(problem)) from problem
+    for i, entry in enumerate(block.dropped):
+        for unknown in {entry.name, *entry.absorbed_by} - set(parameters.names):
+            raise file.error(
+                (name, "dropped", i), f"'{unknown}' is not among the values of this block; correct the name."
+            )
+    return Estimate(
+        parameters=parameters,
+        covariance=covariance,
+        rank=fit.rank,
+        dropped=tuple(Dropped(entry.name, tuple(entry.absorbed_by.items())) for entry in block.dropped),
+        identifiable=tuple(value.identifiable is not False for value in block.values.values()),
+        cost=fit.cost,
+        chi2=fit.chi2,
+        degrees_of_freedom=fit.degrees_of_freedom,
+        status=fit.status,
+        message=fit.message,
+        iterations=fit.iterations,
+        outliers=fit.outliers,
+        covariance_freedom=fit.covariance_freedom,
+        misfit=fit.misfit,
+        provenance=dict(block.provenance),
+        ranges=dict(block.ranges),
+        measurements=tuple((block.measurements or "").split()),
+    )
+
+
+def _parameter(name: str, value: StoredValue) -> Parameter:
+    return Parameter(
+        name=name,
+        unit=value.unit,
+        value=value.estimate,
+        lower=-math.inf if value.lower is None else value.lower,
+        upper=math.inf if value.upper is None else value.upper,
+        prior_std=math.inf if value.prior_std is None else value.prior_std,
+        prior_mean=value.prior_mean,
+        scale=value.scale,
+    )
+
+
+def _stored(estimate: Estimate, covariance: np.ndarray) -> StoredBlock:
+    return StoredBlock(
+        values={item.name: _stored_value(estimate, item) for item in estimate.parameters},
+        dropped=tuple(StoredDropped(entry.name, dict(entry.absorbed_by)) for entry in estimate.dropped),
+        fit=StoredFit(
+            rank=int(estimate.rank),
+            cost=float(estimate.cost),
+            chi2=float(estimate.chi2),
+            degrees_of_freedom=int(estimate.degrees_of_freedom),
+            status=estimate.status,
+            message=estimate.message,
+            iterations=int(estimate.iterations),
+            outliers=tuple(int(number) for number in estimate.outliers),
+            covariance_freedom=estimate.covariance_freedom,
+            misfit=estimate.misfit,
+        ),
+        covariance_sha256=_sha256(covariance),
+        ranges={str(key): (float(low), float(high)) for key, (low, high) in estimate.ranges.items()},
+        measurements=" ".join(estimate.measurements) or None,
+        provenance={str(key): str(value) for key, value in estimate.provenance.items()},
+    )
+
+
+def _stored_value(estimate: Estimate, item: Parameter) -> StoredValue:
+    quantity = estimate.quantity(item.name)
+    low, high, std = (quantity[key] for key in ("low", "high", "std"))
+    return StoredValue(
+        estimate=float(item.value),
+        unit=item.unit,
+        std=None if std is None else float(std),
+        low=None if low is None else float(low),
+        high=None if high is None else float(high),
+        identifiable=bool(quantity["identifiable"]),
+        scale=item.scale,
+        lower=_finite(item.lower),
+        upper=_finite(item.upper),
+        prior_std=_finite(item.prior_std),
+        prior_mean=None if item.prior_mean is None else float(item.prior_mean),
+    )
+
+
+def _finite(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None
+
+
+def _sha256(array: np.ndarray) -> str:
+    return hashlib.sha256(np.ascontiguousarray(array, dtype="<f8").tobytes()).hexdigest()

@@ -1,0 +1,146 @@
+"""Checked reading of `.npz` files: every array is there, of the kind and shape that is expected, and finite."""
+
+from __future__ import annotations
+
+import zipfile
+import zlib
+from collections.abc import Iterator, Mapping, Set
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.lib.npyio import NpzFile as NpzArrays
+
+from flexcal.errors import InputError
+from flexcal.files.transaction import current
+from flexcal.units import LARGEST
+
+Kind = Literal["real", "complex", "whole", "truth", "text"]
+_KINDS: dict[Kind, tuple[str, str]] = {
+    "real": ("fiu", "numbers"),
+    "complex": ("cfiu", "complex numbers"),
+    "whole": ("iu", "whole numbers"),
+    "truth": ("b", "truth values"),
+    "text": ("U", "texts"),
+}
+
+_UNREADABLE = (
+    OSError, ValueError, EOFError, KeyError, RuntimeError, MemoryError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
+"""What NumPy and zipfile raise of a file that is none, cut short, encrypted or changed."""
+
+
+@dataclass(frozen=True)
+class ArrayForm:
+    """What an array has to be: its kind, and per axis an extent or a name; axes of one name are as long in every array of a file.
+
+    Numbers that are not finite are refused, NaN not where `finite` is False; so are numbers beyond `units.LARGEST`.
+    """
+
+    kind: Kind
+    axes: tuple[str | int, ...] = ()
+    finite: bool = True
+
+
+class NpzFile:
+    """The arrays of an .npz file, read and checked one by one; `remedy` ends the sentences of its errors, as in 'run … again'.
+
+    Opening and reading raise `InputError` that names the file and the array, for whatever is not as expected. Nothing is unpickled.
+    """
+
+    def __init__(self, path: Path, remedy: str):
+        self.path, self.remedy = path, remedy
+        self._lengths: dict[str, int] = {}
+        self._names: frozenset[str] = frozenset()
+        with self._opened() as stored:
+            self._names = frozenset(stored.files)
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._names
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The names of the arrays."""
+        return self._names
+
+    def error(self, sentence: str) -> InputError:
+        """An `InputError` about this file."""
+        return InputError(f"{self.path} {sentence}; {self.remedy}.")
+
+    def read(self, forms: Mapping[str, ArrayForm]) -> dict[str, np.ndarray]:
+        """The arrays of these names and forms."""
+        with self._opened() as stored:
+            return {
+                name: self._checked(name, self._array(stored, name), form) for name, form in forms.items()
+            }
+
+    @contextmanager
+    def _opened(self) -> Iterator[NpzArrays]:
+        try:
+            stored = np.load(current(self.path), allow_pickle=False)
+            if not isinstance(stored, NpzArrays):
+                raise self.error("is no .npz file")
+            with stored:
+                yield stored
+        except _UNREADABLE as problem:
+            told = isinstance(problem, OSError) and problem.strerror
+            raise self.error(f"cannot be read ({told or type(problem).__name__})") from problem
+
+    def _array(self, stored: NpzArrays, name: str) -> np.ndarray:
+        if name not in stored.files:
+            raise self.error(f"lacks the array '{name}'")
+        archive = stored.zip
+        assert archive is not None  # it is open
+        member = archive.getinfo(f"{name}.npy" if f"{name}.npy" in archive.namelist() else name)
+        with archive.open(member) as stream:
+            version = np.lib.format.read_magic(stream)
+            read = (
+                np.lib.format.read_array_header_1_0
+                if version == (1, 0)
+                else np.lib.format.read_array_header_2_0
+            )
+            shape, _, dtype = read(stream)
+            count = 1
+            for extent in shape:
+                count *= extent
+            if dtype.hasobject or min(shape, default=0) < 0 or count * dtype.itemsize > member.file_size:
+                raise self.error(f"holds no array of numbers or texts as '{name}'")
+        return stored[name]
+
+    def _checked(self, name: str, array: np.ndarray, form: ArrayForm) -> np.ndarray:
+        kinds, what = _KINDS[form.kind]
+        if array.dtype.kind not in kinds:
+            raise self.error(f"holds {array.dtype} as '{name}', not {what}")
+        extents = [self._lengths.get(axis) if isinstance(axis, str) else axis for axis in form.axes]
+        fits = array.ndim == len(extents) and all(
+            extent in (None, length) for extent, length in zip(extents, array.shape, strict=True)
+        )
+        if not fits:
+            raise self.error(f"holds '{name}' with the shape {array.shape}, which does not fit the rest")
+        for axis, length in zip(form.axes, array.shape, strict=True):
+            if isinstance(axis, str):
+                self._lengths[axis] = length
+        if form.kind in ("real", "complex"):
+            with np.errstate(over="ignore"):
+                size = np.abs(array)
+            if form.finite and not np.isfinite(size).all():
+                raise self.error(f"holds numbers in '{name}' that are not finite")
+            if float(np.max(size, initial=0.0, where=~np.isnan(size))) > LARGEST:
+                raise self.error(f"holds numbers beyond {LARGEST:g} in '{name}'")
+        return array
+
+
+def refuse_foreign(path: Path, ours: Set[str]) -> None:
+    """Raise `InputError` where a file is there that holds something else than arrays of the names `ours`: no flexcal wrote it."""
+    if not current(path).exists():
+        return
+    try:
+        foreign = NpzFile(path, "").names - ours
+    except InputError:
+        foreign = {"no arrays"}
+    if foreign:
+        raise InputError(
+            f"{path} was not written by flexcal (it holds {min(foreign)}), and such a file is never changed; move it away."
+        )

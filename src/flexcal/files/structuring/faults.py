@@ -1,0 +1,87 @@
+"""What does not fit: a fault of one value, and all faults of a document as sentences with their places."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import cast
+
+from flexcal.errors import FlexcalError
+from flexcal.files.structuring.keys import Keys, dotted, file_key, known_keys
+from flexcal.files.structuring.wording import suggestion
+
+
+class MisfitError(FlexcalError):
+    """Data that does not fit a class; `failures` pairs the keys leading to a fault with a sentence."""
+
+    def __init__(self, failures: list[tuple[Keys, str]]):
+        super().__init__(failures[0][1])
+        self.failures = failures
+
+
+class Unfit(ValueError):
+    """A value that does not fit its field; the message is a sentence without place."""
+
+
+class Nested(Exception):
+    """A failure inside an item of a mapping or a tuple of fixed length."""
+
+    def __init__(self, key: str | int, cause: BaseException):
+        super().__init__(str(cause))
+        self.key = key
+        self.cause = cause
+
+
+def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None]:
+    """All failures in an exception of cattrs as (keys, sentence); None for one not the data's fault."""
+    from cattrs.errors import (
+        AttributeValidationNote,
+        ClassValidationError,
+        ForbiddenExtraKeysError,
+        IterableValidationNote,
+    )
+
+    if isinstance(problem, Nested):
+        return failures(problem.cause, (*keys, problem.key))
+    if isinstance(problem, ForbiddenExtraKeysError):
+        known = known_keys(problem.cl)
+        return [((*keys, key), _unknown_key(key, keys, known)) for key in problem.extra_fields]
+    if isinstance(problem, BaseExceptionGroup):
+        found: list[tuple[Keys, str] | None] = []
+        misspelt = any(isinstance(inner, ForbiddenExtraKeysError) for inner in problem.exceptions)
+        for inner in problem.exceptions:
+            place = keys
+            for note in getattr(inner, "__notes__", ()):
+                if isinstance(note, AttributeValidationNote):
+                    place = (*keys, _key_of(problem, note.name))
+                elif isinstance(note, IterableValidationNote):
+                    place = (*keys, cast("str | int", note.index))
+            if isinstance(inner, KeyError) and isinstance(problem, ClassValidationError) and place != keys:
+                name = str(place[-1])
+                if misspelt:  # the unknown key, named by its own failure, is probably this one
+                    continue
+                found.append((keys, f"the key '{name}'{_inside(keys)} is missing; add '{name}: …'."))
+            else:
+                found.extend(failures(inner, place))
+        return found
+    if isinstance(problem, (Unfit, FlexcalError, ValueError, TypeError)):
+        subject = f"{dotted(keys)}: " if keys else ""
+        sentence = str(problem)
+        return [(keys, subject + sentence + ("" if sentence.endswith((".", "?")) else "."))]
+    return [None]
+
+
+def _key_of(problem: BaseExceptionGroup, name: str) -> str:
+    """The key in the file of the attribute `name` of the class that `problem` is about."""
+    cls = getattr(problem, "cl", None)
+    fields = dataclasses.fields(cls) if cls is not None and dataclasses.is_dataclass(cls) else ()
+    return next((file_key(field) for field in fields if field.name == name), name)
+
+
+def _unknown_key(key: str, keys: Keys, known: list[str]) -> str:
+    near = suggestion(key, known)
+    hint = near or f"; known are {', '.join(known)}."
+    return f"unknown key '{key}'{_inside(keys)}{hint}"
+
+
+def _inside(keys: Keys) -> str:
+    return f" in {dotted(keys)}" if keys else ""

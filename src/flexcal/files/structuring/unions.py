@@ -1,0 +1,78 @@
+"""Choice among the members of a union by the form of a value."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import NoneType
+from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
+
+import numpy as np
+
+from flexcal.files.structuring.faults import Unfit
+from flexcal.files.structuring.keys import known_keys
+from flexcal.files.structuring.wording import describe
+
+if TYPE_CHECKING:
+    from cattrs import Converter
+
+
+def union_hook(cls: Any, converter: Converter) -> Any:
+    """Conversion to the first member of a union that a value fits; its fault is that of the nearest one."""
+    members = get_args(cls)
+
+    def structure(value: Any, _: Any) -> Any:
+        if value is None and NoneType in members:
+            return None
+        fitting = sorted(
+            (member for member in members if _takes(member, value)), key=lambda m: _known(m, value)
+        )
+        if not fitting:
+            expected = " or ".join(_expected(member) for member in members if member is not NoneType)
+            raise Unfit(f"{expected} is expected, not {describe(value)}")
+        for member in fitting[:-1]:
+            try:
+                return converter.structure(value, member)
+            except Exception:
+                continue
+        return converter.structure(value, fitting[-1])
+
+    return structure
+
+
+def _known(cls: Any, value: Any) -> int:
+    """How many of a value's keys a dataclass has: of two, the fault of the nearer one is told."""
+    return len(value.keys() & set(known_keys(cls))) if dataclasses.is_dataclass(cls) else 0
+
+
+def _kind(cls: Any) -> type:
+    """How a value of this type stands in YAML: dict, list or scalar (object)."""
+    origin = get_origin(cls) or cls
+    if dataclasses.is_dataclass(cls) or origin in (dict, Mapping):
+        return dict
+    if origin in (list, tuple, Sequence, np.ndarray):
+        return list
+    return object
+
+
+def _takes(cls: Any, value: Any) -> bool:
+    kind = _kind(cls)
+    if kind is not object:
+        return isinstance(value, kind)
+    if isinstance(value, (dict, list)) or value is None:
+        return False
+    if get_origin(cls) is Literal:
+        return value in get_args(cls)
+    if cls is float:
+        return isinstance(value, (int, float)) and not isinstance(value, bool)
+    return cls is Any or (cls is Path and isinstance(value, str)) or type(value) is cls
+
+
+def _expected(cls: Any) -> str:
+    kind = _kind(cls)
+    if kind is not object:
+        return "a mapping (key: value)" if kind is dict else "a list"
+    if get_origin(cls) is Literal:
+        return " or ".join(f"'{choice}'" for choice in get_args(cls))
+    return {float: "a number", int: "a whole number", bool: "true or false"}.get(cls, "a text")

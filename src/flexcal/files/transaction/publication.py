@@ -1,0 +1,225 @@
+"""The files of one run, which take their places together."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
+from pathlib import Path
+from types import TracebackType
+
+from flexcal.errors import InputError
+from flexcal.files.transaction.file_kinds import refuse_irregular, refuse_stream
+from flexcal.files.transaction.journal import Change, Journal, Seen, seen, sync_folder
+from flexcal.files.transaction.locks import locked
+from flexcal.files.transaction.recovery import settle
+from flexcal.files.transaction.staging_folder import Stage
+
+_POSTPONED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+
+
+@contextmanager
+def undisturbed() -> Iterator[None]:
+    """Within the block, exceptions that handlers of Ctrl-C and other signals would raise wait until its end."""
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    came: list[int] = []
+    handlers = {number: signal.getsignal(number) for number in _POSTPONED}
+    postponed = [number for number, handler in handlers.items() if callable(handler)]
+    for number in postponed:
+        signal.signal(number, lambda which, _frame: came.append(which))
+    try:
+        yield
+    finally:
+        for number in postponed:
+            signal.signal(number, handlers[number])
+        if came:
+            signal.raise_signal(came[0])
+
+
+_open: list[Publication] = []
+"""The one whose block is being carried out, last; of the whole process, as files are."""
+
+
+class Publication:
+    """Files written within its block wait in stages, hidden folders beside their places, and take these together when the block ends.
+
+    When it raises, nothing has changed. When the process is killed, the places hold the files of before or, once the journal is on the
+    disk, the next flexcal that opens the folder puts all of the new ones there. `current` leads to a file that waits.
+    """
+
+    def __init__(self) -> None:
+        self._stages: dict[Path, Stage] = {}
+        self._made: list[Path] = []
+        self._waiting: dict[Path, Path] = {}
+        self._before: dict[Path, Seen] = {}
+        self._removed: dict[Path, Seen] = {}
+        self._done = False
+
+    def __enter__(self) -> Publication:
+        _open.append(self)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, problem: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        try:
+            if kind is None and not self._done:
+                self.publish()
+        finally:
+            _open.remove(self)
+            self.discard()
+
+    @staticmethod
+    def running() -> Publication | None:
+        """The one whose block is being carried out."""
+        return _open[-1] if _open else None
+
+    @property
+    def files(self) -> dict[Path, Path]:
+        """Where the files wait, by their places."""
+        return dict(self._waiting)
+
+    def stage(self, folder: Path, verb: str = "", names: Sequence[str] = ()) -> Stage:
+        """The stage in a folder, which is made where it is not there; for a `verb` that writes these names (glob patterns).
+
+        Raises `OSError` where the folder cannot be made or written to, and `InputError` as `settle` does.
+        """
+        folder = Path(os.path.realpath(folder))
+        if folder not in self._stages:
+            settle(folder)
+            with undisturbed():
+                self._made += [path for path in (folder, *folder.parents) if not path.exists()]
+                folder.mkdir(parents=True, exist_ok=True)
+                self._stages[folder] = Stage.open(folder, verb, names)
+        return self._stages[folder]
+
+    def temporary(self, path: Path) -> Path:
+        """An empty file to be written for `path`, bit by bit if need be; `put` takes it when it is whole.
+
+        Raises `InputError` where something stands in its place that is no regular file, and `OSError`.
+        """
+        place = _place(path)
+        refuse_irregular(path)
+        stage = self.stage(place.parent)
+        self._before.setdefault(place, seen(place))
+        return stage.file(place.suffix)
+
+    def put(self, path: Path, temporary: Path) -> None:
+        """Let a whole file wait for its place; one that waits for it already is dropped. Raises `OSError`."""
+        place = _place(path)
+        temporary.chmod(_mode_of(place))
+        with temporary.open("rb") as stream:
+            os.fsync(stream.fileno())
+        earlier = self._waiting.pop(place, None)
+        self._waiting[place] = temporary
+        if earlier is not None:
+            earlier.unlink()
+
+    def drop(self, temporaries: Iterable[Path]) -> None:
+        """Remove those of these files that `put` has not taken."""
+        taken = set(self._waiting.values())
+        for temporary in temporaries:
+            if temporary not in taken:
+                temporary.unlink(missing_ok=True)
+
+    def remove(self, path: Path) -> None:
+        """Remove a file together with the changes."""
+        place = _place(path)
+        self._removed[place] = seen(place)
+
+    def waiting(self, path: Path) -> Path | None:
+        """Where the file of this place waits, None where none does."""
+        return self._waiting.get(_place(path)) if self._waiting else None
+
+    def publish(self, prepare: Callable[[], None] = lambda: None) -> None:
+        """Put every file in its place; `prepare` comes just before, while no other run can change these folders.
+
+        Files that `prepare` adds are put in place first. Raises `InputError` where a place was changed since its file was written, and
+        where the files cannot be put there.
+        """
+        whole = False
+        try:
+            with undisturbed():
+                with ExitStack() as locks:
+                    for folder in sorted(self._stages):
+                        locks.enter_context(locked(folder))
+                    waiting = list(self._waiting)
+                    prepare()
+                    order = [place for place in self._waiting if place not in waiting] + waiting
+                    self._refuse_changed()
+                    changes = [Change(self._waiting[place], place, self._before[place]) for place in order]
+                    changes += [Change(None, place, was) for place, was in self._removed.items()]
+                    for stage in self._stages.values():
+                        sync_folder(stage.path)
+                    if len(changes) > 1:
+                        journal = Journal(
+                            tuple(changes), tuple(stage.path for stage in self._stages.values())
+                        )
+                        journal.write()
+                        whole = self._done = True
+                        journal.carry_out()
+                    elif changes:
+                        Journal(tuple(changes), ()).carry_out()
+                    self._done = True
+                for stage in self._stages.values():
+                    stage.remove()
+        except OSError as problem:
+            reason = problem.strerror or str(problem)
+            folders = " and ".join(str(folder) for folder in self._stages)
+            if whole:
+                for stage in self._stages.values():
+                    stage.release()
+                raise InputError(
+                    f"all files of this run are written, but could not be put in place in {folders} ({reason}); the next flexcal that "
+                    "opens the folder does it."
+                ) from problem
+            raise InputError(
+                f"{folders} could not be written to ({reason}); nothing there was changed."
+            ) from problem
+
+    def _refuse_changed(self) -> None:
+        for place, was in self._before.items():
+            if place in self._waiting and seen(place) != was:
+                raise InputError(
+                    f"{place} was changed by another program while this run was at work; nothing there was changed by this run; run it "
+                    "again."
+                )
+
+    def discard(self) -> None:
+        """Drop the files that wait, unless they have been published."""
+        if self._done:
+            return
+        with undisturbed():
+            for stage in self._stages.values():
+                stage.remove()
+            for folder in self._made:
+                with suppress(OSError):
+                    folder.rmdir()
+
+
+def current(path: str | Path) -> Path:
+    """Where to read `path`: the file that waits for this place in the publication being carried out, else the path itself.
+
+    Raises `InputError` where this is a pipe, socket or device.
+    """
+    running = Publication.running()
+    place = (running.waiting(Path(path)) if running else None) or Path(path)
+    refuse_stream(place)
+    return place
+
+
+def _place(path: Path) -> Path:
+    return Path(os.path.realpath(path.parent)) / path.name
+
+
+def _mode_of(place: Path) -> int:
+    """The permissions of the file being replaced, else those that a new file would get."""
+    if place.exists():
+        return place.stat().st_mode & 0o777
+    mask = os.umask(0)
+    os.umask(mask)
+    return 0o666 & ~mask

@@ -1,0 +1,63 @@
+"""Lines of an excitation that consists of few frequencies."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.frequency.arbitrary.excitation_record import ExcitationRecord
+
+_ALL, _NEARLY_ALL = 0.999, 0.95
+"""Shares of the power in the lines from which there is nothing else to speak of, and little."""
+_MOST = 6
+_LOBE = 3
+"""Bins on either side of a line over which a Hann window spreads it, and what is between the bins."""
+_FIRST = 2
+
+
+@dataclass(frozen=True)
+class Tones:
+    """Frequencies (Hz), ascending, of the few lines that hold the inputs' power; `alone` tells whether there is nothing else."""
+
+    frequencies_hz: tuple[float, ...]
+    alone: bool
+
+    @property
+    def sentence(self) -> str:
+        """What the input is, and what is needed instead."""
+        nearly = "" if self.alone else "nearly "
+        listed = ", ".join(f"{frequency:.4g}" for frequency in self.frequencies_hz)
+        said = f"{len(self.frequencies_hz)} sines, of {listed} Hz"
+        if len(self.frequencies_hz) == 1:
+            said = f"a sine of one frequency, {listed} Hz"
+        return (
+            f"the input is {nearly}{said}, and a frequency response needs a band; excite with a swept sine, noise or a multisine from "
+            "below the lowest resonance to above the highest."
+        )
+
+
+def tones(pieces: Sequence[ExcitationRecord]) -> Tones | None:
+    """Of records of equal length; None where 95 % of the power are not in six lines."""
+    size = len(pieces[0])
+    window = np.hanning(size)[:, None]
+    power = np.zeros(size // 2 + 1)
+    for piece in pieces:
+        moved = piece.inputs - piece.inputs.mean(0)
+        power += (np.abs(np.fft.rfft(window * moved, axis=0)) ** 2).sum(1)
+    power[:_FIRST] = 0.0
+    whole, found = power.sum(), []
+    if not whole > 0:
+        return None
+    left, few = power.copy(), 0
+    while len(found) < _MOST and left.sum() > (1.0 - _ALL) * whole:
+        at = int(left.argmax())
+        lobe = slice(max(at - _LOBE, 0), at + _LOBE + 1)
+        centre = np.average(np.arange(size // 2 + 1)[lobe], weights=left[lobe])
+        found.append(float(centre / (size * pieces[0].time_step)))
+        left[lobe] = 0.0
+        if not few and left.sum() <= (1.0 - _NEARLY_ALL) * whole:
+            few = len(found)
+    alone = bool(left.sum() <= (1.0 - _ALL) * whole)
+    return Tones(tuple(sorted(found if alone else found[:few])), alone) if few else None

@@ -1,0 +1,5 @@
+"""Frequency response matrices from multisine experiments in periodic steady state."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,50 @@
+from .averages import Average
+from .covariance import kronecker, pool_noise
+from .line_spectra import hold_factor, noise_lines, spectrum, torque_hold
+from .local_polynomial import local_polynomial_responses
+from .local_windows import ORDER, LocalWindows, projected
+from .multisine import (
+    crest_factor,
+    excitation_torque,
+    half_integer_frequency,
+    leave_out_detection_lines,
+    multisine_spectra,
+    odd_lines,
+    optimise_crest,
+    orthogonal_matrix,
+    reference_trajectory,
+    samples_per_period,
+    synthesise,
+)
+from .response import FrequencyResponse, frequency_response, frequency_responses
+from .symmetry import Reciprocity, reciprocity
+
+__all__ = [
+    "ORDER",
+    "Average",
+    "FrequencyResponse",
+    "LocalWindows",
+    "Reciprocity",
+    "crest_factor",
+    "excitation_torque",
+    "frequency_response",
+    "frequency_responses",
+    "half_integer_frequency",
+    "hold_factor",
+    "kronecker",
+    "leave_out_detection_lines",
+    "local_polynomial_responses",
+    "multisine_spectra",
+    "noise_lines",
+    "odd_lines",
+    "optimise_crest",
+    "orthogonal_matrix",
+    "pool_noise",
+    "projected",
+    "reciprocity",
+    "reference_trajectory",
+    "samples_per_period",
+    "spectrum",
+    "synthesise",
+    "torque_hold",
+]

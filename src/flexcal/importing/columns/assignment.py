@@ -1,0 +1,78 @@
+"""A quantity of flexcal and the columns of a foreign file that hold it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexcal.data.tables import UNITS, Signal, Table, standard_columns
+
+NUMBERED = ("pose",)
+"""Quantities that `signals:` does not map: files have them under their own names."""
+
+
+@dataclass(frozen=True)
+class PlacedColumns:
+    """SI = (gain · column + offset) · unit, one entry a column; `why` says how the columns and their units were recognised."""
+
+    quantity: str
+    columns: tuple[str, ...]
+    units: tuple[str | None, ...]
+    why: str
+    gains: tuple[float, ...]
+    offsets: tuple[float, ...]
+
+    @classmethod
+    def plain(
+        cls, quantity: str, columns: tuple[str, ...], units: tuple[str | None, ...], why: str
+    ) -> PlacedColumns:
+        """Columns that only have another name and unit."""
+        n = len(columns)
+        return cls(quantity, columns, units, why, (1.0,) * n, (0.0,) * n)
+
+    @property
+    def unit(self) -> str | None:
+        """The unit that all columns share."""
+        return self.units[0] if len(set(self.units)) == 1 else None
+
+    def signal(self) -> Signal:
+        """How SI values come from the columns."""
+        factors = np.array([_factor(self.quantity, unit) for unit in self.units])
+        return Signal(
+            self.quantity,
+            self.columns,
+            np.array(self.gains) * factors,
+            None,
+            np.array(self.offsets) * factors,
+        )
+
+    def values(self, table: Table) -> np.ndarray:
+        """The quantity (N, m) in SI units."""
+        return self.signal().values(table)
+
+    def standard(self) -> bool:
+        """Whether a file with these columns needs no `signals:` for them."""
+        signal = self.signal()
+        same = signal.columns == standard_columns(self.quantity, len(self.columns))
+        return same and bool((signal.factor == 1).all()) and not signal.offset.any()
+
+    def config(self) -> dict[str, Any]:
+        """The entry of this quantity under `signals:`."""
+        shared = len(set(self.units)) == 1
+        signal = self.signal()
+        gains = np.array(self.gains) if shared else signal.factor
+        offsets = np.array(self.offsets) if shared else signal.offset
+        entry: dict[str, Any] = {"columns": list(self.columns)}
+        if shared and self.units[0] is not None:
+            entry["unit"] = self.units[0]
+        if (gains != 1).any() or self.units[0] in ("A", "mA"):
+            entry["gain"] = gains.tolist()
+        if offsets.any():
+            entry["offset"] = offsets.tolist()
+        return entry
+
+
+def _factor(quantity: str, unit: str | None) -> float:
+    return 1.0 if unit is None else UNITS.get(quantity, {}).get(unit, 1.0)

@@ -1,0 +1,172 @@
+"""Records of an excited axis from files of other programs, on a uniform time base, divided at gaps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.recordings import LATE, TimeSummary, uniform_blocks
+from flexcal.errors import InputError
+from flexcal.frequency.arbitrary import SHORTEST, Channel, ExcitationRecord
+from flexcal.importing.columns.excitation_columns import ResponseColumns, response_columns
+from flexcal.importing.columns.unit_inference import time_unit
+from flexcal.importing.readers import read_foreign
+from flexcal.importing.tables import ForeignTable, parse_name
+from flexcal.units import LARGEST
+
+_SECONDS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+
+
+@dataclass(frozen=True, eq=False)
+class ResponseRecords:
+    """Records with the channels of their columns, and what was done to read them, a sentence each.
+
+    `guessed` tells that the references were recognised, not named.
+    """
+
+    records: tuple[ExcitationRecord, ...]
+    inputs: tuple[Channel, ...]
+    outputs: tuple[Channel, ...]
+    references: tuple[Channel, ...]
+    remarks: tuple[str, ...]
+    guessed: bool = False
+
+    def without_references(self, remark: str = "") -> ResponseRecords:
+        """The same of inputs and outputs alone, and why."""
+        records = tuple(replace(record, references=record.references[:, :0]) for record in self.records)
+        remarks = (*self.remarks, remark) if remark else self.remarks
+        return replace(self, records=records, references=(), remarks=remarks, guessed=False)
+
+
+def read_response_records(
+    files: Sequence[Path],
+    *,
+    inputs: Sequence[str] = (),
+    outputs: Sequence[str] = (),
+    references: Sequence[str] = (),
+    rate_hz: float | None = None,
+) -> ResponseRecords:
+    """Read files of one experiment; the columns are those of the first file.
+
+    `rate_hz` is the sampling rate of files without a column of time. Raises `InputError` where a file lacks a column, holds a cell that is
+    no number, or a time that does not grow.
+    """
+    tables = [read_foreign(file, ()) for file in files]
+    columns = response_columns(tables[0], inputs=inputs, outputs=outputs, references=references)
+    if columns.guessed and not all(_is_whole(table, columns) for table in tables):
+        columns = replace(columns, references=(), guessed=False)
+    records: list[ExcitationRecord] = []
+    remarks = list(columns.remarks)
+    for file, table in zip(files, tables, strict=True):
+        found, notes = _records(file, table, columns, rate_hz)
+        records += found
+        remarks += notes
+    step = float(np.median([record.time_step for record in records]))
+    near = [abs(record.time_step / step - 1) < 1e-3 for record in records]
+    if all(near):
+        records = [replace(record, time_step=step) for record in records]
+    return ResponseRecords(
+        tuple(records),
+        tuple(c.channel for c in columns.inputs),
+        tuple(c.channel for c in columns.outputs),
+        tuple(c.channel for c in columns.references),
+        _merged(remarks, len(files)),
+        columns.guessed,
+    )
+
+
+def _is_whole(table: ForeignTable, columns: ResponseColumns) -> bool:
+    """Whether a file has all references, without a hole."""
+    names = [column.channel.name for column in columns.references]
+    return all(name in table.numbers and bool(np.isfinite(table.numbers[name]).all()) for name in names)
+
+
+def _merged(remarks: Sequence[str], files: int) -> tuple[str, ...]:
+    """Each once, however many files it is said of."""
+    counted: dict[str, int] = {}
+    for remark in remarks:
+        counted[remark] = counted.get(remark, 0) + 1
+    return tuple(
+        f"{text} (in {n} of {files} files)" if n > 1 and n != files else text for text, n in counted.items()
+    )
+
+
+def _records(
+    file: Path, table: ForeignTable, columns: ResponseColumns, rate_hz: float | None
+) -> tuple[list[ExcitationRecord], list[str]]:
+    notes: list[str] = []
+    of = (*columns.inputs, *columns.outputs, *columns.references)
+    for column in of:
+        _check(file, table, column.channel.name)
+    values = np.stack([column.values(table) for column in of], -1)
+    t, note = _times(file, table, columns.time, rate_hz)
+    notes += [note] if note else []
+    number = np.arange(len(of)) - len(columns.inputs)
+    is_position = np.array(
+        [0 <= k < len(columns.outputs) and columns.outputs[k].channel.derivative == 0 for k in number]
+    )
+    order = np.argsort(~is_position, kind="stable")
+    summary, found = TimeSummary(), []
+    for base, ordered in uniform_blocks([(t, values[:, order])], positions=int(is_position.sum())):
+        if len(ordered) < SHORTEST:
+            summary.short += len(ordered) * base.time_step
+            continue
+        summary.add(base)
+        found.append(_record(file.name, base.time_step, ordered[:, np.argsort(order)], columns))
+    if not found:
+        raise InputError(f"{file}: no stretch without a gap has {SHORTEST} samples; record longer.")
+    if summary.sentence:
+        notes.append(f"{summary.sentence} ({file.name})")
+    return found, notes
+
+
+def _record(name: str, step: float, values: np.ndarray, columns: ResponseColumns) -> ExcitationRecord:
+    n_u, n_y = len(columns.inputs), len(columns.outputs)
+    return ExcitationRecord(name, step, values[:, :n_u], values[:, n_u : n_u + n_y], values[:, n_u + n_y :])
+
+
+def _check(file: Path, table: ForeignTable, column: str) -> None:
+    if column not in table.numbers:
+        raise InputError(
+            f"{file}: there is no column of numbers '{column}', which the first file has; give files of one experiment."
+        )
+    numbers = table.numbers[column]
+    wrong = np.flatnonzero(~(np.abs(numbers) <= LARGEST))
+    if wrong.size:
+        row = int(wrong[0])
+        what = f"the value is {numbers[row]:g}, which is no measurement"
+        if np.isnan(numbers[row]):
+            what = "there is no number"
+        raise table.table.error(row, column, f"{what}; complete the cell or remove the row.")
+
+
+def _times(
+    file: Path, table: ForeignTable, column: str | None, rate_hz: float | None
+) -> tuple[np.ndarray, str]:
+    if column is None or rate_hz is not None:
+        if rate_hz is None:
+            raise InputError(
+                f"{file}: no column of time was recognised; name it 't', or give the sampling rate with --rate HZ."
+            )
+        return np.arange(len(table)) / rate_hz, ""
+    _check(file, table, column)
+    raw = table.numbers[column]
+    unit = parse_name(column, table.units.get(column)).unit
+    known = column in table.times or unit in _SECONDS
+    unit = "s" if column in table.times else unit if unit in _SECONDS else time_unit(raw)
+    seconds = (raw - raw[0]) * _SECONDS[unit]
+    back = np.flatnonzero(np.diff(seconds) < -LATE)
+    if back.size:
+        raise table.table.error(
+            int(back[0]) + 1,
+            column,
+            "the time runs backwards; remove the row, or give the rate of uniform samples with --rate HZ.",
+        )
+    if not seconds[-1] > 0:
+        raise table.table.error(
+            0, column, "the time stands still; give the rate of uniform samples with --rate HZ."
+        )
+    return seconds, "" if known or unit == "s" else f"{column} is taken to be in {unit}"

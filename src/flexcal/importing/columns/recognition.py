@@ -1,0 +1,250 @@
+"""Recognition of the columns of a foreign table by joint names, usual words and numbers, or their order."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.data.tables import TIMESTAMP, UNITS, VECTORS
+from flexcal.importing.columns.assignment import PlacedColumns
+from flexcal.importing.columns.joints import joint_quantities
+from flexcal.importing.columns.rtde_names import rtde_columns
+from flexcal.importing.columns.unit_inference import joint_units, point_unit, pose_time_unit, time_unit
+from flexcal.importing.tables import (
+    NEUTRAL,
+    NO_POINT,
+    POINT,
+    SIGMA,
+    SINGLE,
+    TURN,
+    ColumnName,
+    ForeignTable,
+    parse_name,
+    rank,
+)
+
+if TYPE_CHECKING:
+    from flexcal.model.robot import RobotModel
+
+
+@dataclass(frozen=True)
+class LeftOut:
+    """A column that is not imported, and why."""
+
+    column: str
+    why: str
+
+
+@dataclass(frozen=True)
+class Guess:
+    """Recognised columns by quantity, texts such as `target` by their name, and all other columns."""
+
+    placed: Mapping[str, PlacedColumns]
+    texts: Mapping[str, str]
+    left_out: tuple[LeftOut, ...]
+
+
+def reasons_of(left_out: Sequence[LeftOut]) -> list[str]:
+    """Columns that were left out, grouped by reason."""
+    by_reason: dict[str, list[str]] = {}
+    for left in left_out:
+        by_reason.setdefault(left.why, []).append(left.column)
+    return [f"{', '.join(_shortened(columns))}: {why}" for why, columns in by_reason.items()]
+
+
+def _shortened(columns: Sequence[str]) -> list[str]:
+    """Names that count up, three or more, as the first … the last."""
+    parts = [re.match(r"(.*?)(\d+)(\D*)$", column, re.DOTALL) for column in columns]
+    listed, at = [], 0
+    while at < len(columns):
+        end, first = at + 1, parts[at]
+        while first and end < len(columns) and (p := parts[end]) and p.group(1, 3) == first.group(1, 3):
+            if int(p[2]) != int(first[2]) + end - at:
+                break
+            end += 1
+        if end - at > 2:
+            listed.append(f"{columns[at]} … {columns[end - 1]}")
+        else:
+            listed += columns[at:end]
+        at = end
+    return listed
+
+
+def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
+    """Recognise the columns of a foreign table; no column is two things, and what could be two is left out and named."""
+    if not foreign.named:
+        return _by_order(foreign, model)
+    names = [parse_name(column, foreign.units.get(column)) for column in foreign.numbers]
+    reasons: dict[str, str] = {}
+    placed = rtde_columns(foreign, model, reasons)
+    for quantity, columns in joint_quantities(_left(names, placed, reasons), model, reasons).items():
+        if quantity in placed:
+            reasons |= dict.fromkeys(columns, f"{placed[quantity].columns[0]} … are taken as {quantity}")
+        else:
+            placed[quantity] = place(foreign, model, quantity, columns, "their names")
+    rest = _left(names, placed, reasons)
+    vectors, singles = _vectors(rest, reasons), _singles(rest, foreign, reasons)
+    for quantity, columns in (vectors | singles).items():
+        other = placed.get(quantity)
+        if other is not None and quantity != "xyz":
+            reasons |= dict.fromkeys(columns, f"{other.columns[0]} is taken as {quantity}")
+        else:
+            if other is not None:  # what a controller computes gives way to what was measured
+                reasons |= dict.fromkeys(other.columns, f"{columns[0]} … are taken as {quantity}")
+            placed[quantity] = place(
+                foreign, model, quantity, columns, "their names", points="xyz" in vectors
+            )
+    if "sigma" in placed and "sigma_xyz" in placed:
+        reasons[placed.pop("sigma").columns[0]] = "there are sigma_x, sigma_y and sigma_z"
+    texts = {
+        name.lower(): name
+        for name, values in foreign.texts.items()
+        if name.lower() == "station"
+        or (name.lower() in ("target", "point") and set(values.tolist()) <= set(model.points))
+    }
+    for name in foreign.texts.keys() - set(texts.values()):
+        if name.lower() == "target":
+            reasons[name] = "its names are not all under `points:` of robot.yaml"
+    texts = {"target" if key == "point" else key: name for key, name in texts.items()}
+    return _guess(foreign, placed, texts, reasons)
+
+
+def _left(
+    names: Sequence[ColumnName], placed: Mapping[str, PlacedColumns], reasons: Mapping[str, str]
+) -> list[ColumnName]:
+    """The columns that are nothing yet."""
+    taken = {column for found in placed.values() for column in found.columns}
+    return [name for name in names if name.column not in taken and name.column not in reasons]
+
+
+def _guess(
+    foreign: ForeignTable,
+    placed: Mapping[str, PlacedColumns],
+    texts: Mapping[str, str],
+    reasons: Mapping[str, str],
+) -> Guess:
+    taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
+    left = tuple(
+        LeftOut(column, reasons.get(column, "not recognised"))
+        for column in foreign.table.columns
+        if column not in taken
+    )
+    return Guess(placed, texts, left)
+
+
+def _by_order(foreign: ForeignTable, model: RobotModel) -> Guess:
+    """Without names: a whole number that counts up or none, the joints, then a point or none."""
+    names, n = list(foreign.numbers), model.n
+    placed: dict[str, PlacedColumns] = {}
+    rest = names
+    if names and (np.diff(foreign.numbers[names[0]]) == 1).all():
+        placed["pose"] = place(foreign, model, "pose", (names[0],), "their order")
+        rest = names[1:]
+    if len(rest) in (n, n + 3):
+        placed["q"] = place(foreign, model, "q", tuple(rest[:n]), "their order")
+        if len(rest) > n:
+            placed["xyz"] = place(foreign, model, "xyz", tuple(rest[n:]), "their order")
+    if "q" not in placed:
+        placed.clear()
+    reasons = dict.fromkeys(names, "the file has no header, and their number is ambiguous")
+    return _guess(foreign, placed, {}, reasons)
+
+
+def _vectors(names: Sequence[ColumnName], reasons: dict[str, str]) -> dict[str, tuple[str, ...]]:
+    """Columns of points, their standard deviations and quaternions."""
+    groups: dict[str, dict[tuple[str, ...], dict[str, str]]] = {"xyz": {}, "sigma_xyz": {}, "quaternion": {}}
+    for name in names:
+        words = set(name.words)
+        parts = [POINT.get(word, word) for word in name.words if word in POINT or word == "w"]
+        fused = [word for word in name.words if word in VECTORS["quaternion"]]
+        rest = tuple(word for word in name.words if word not in (*parts, *fused, *POINT))
+        rest += () if name.number is None else (str(name.number),)
+        if fused or (words & (TURN | {"q"}) and parts):
+            axis = fused[0] if fused else f"q{parts[-1]}"
+            groups["quaternion"].setdefault(rest, {})[axis] = name.column
+        elif parts and parts[-1] != "w" and words & SIGMA:
+            groups["sigma_xyz"].setdefault(rest, {})[f"sigma_{parts[-1]}"] = name.column
+        elif parts and parts[-1] != "w" and not words & NO_POINT:
+            groups["xyz"].setdefault(rest, {})[parts[-1]] = name.column
+    found: dict[str, tuple[str, ...]] = {}
+    for quantity, of_it in groups.items():
+        wanted = VECTORS[quantity]
+        whole = sorted((rest for rest, axes in of_it.items() if set(axes) == set(wanted)), key=rank)
+        if len(whole) > 1 and rank(whole[0]) == rank(whole[1]):
+            tied = [of_it[rest][wanted[0]] for rest in whole]
+            why = f"{' and '.join(tied)} could both begin {quantity}: say which with --map"
+            reasons |= {column: why for rest in whole for column in of_it[rest].values()}
+        elif whole:
+            found[quantity] = tuple(of_it[whole[0]][axis] for axis in wanted)
+            for rest in whole[1:]:
+                reasons |= dict.fromkeys(
+                    of_it[rest].values(), f"{found[quantity][0]} … are taken as {quantity}"
+                )
+        else:
+            for axes in of_it.values():
+                if len(axes) > 1:
+                    missing = " and ".join(axis for axis in wanted if axis not in axes)
+                    reasons |= dict.fromkeys(axes.values(), f"no {missing} was recognised beside them")
+    return found
+
+
+def _singles(
+    names: Sequence[ColumnName], foreign: ForeignTable, reasons: dict[str, str]
+) -> dict[str, tuple[str, ...]]:
+    """Columns of quantities that have one: all of whose words are of that quantity, or neutral."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name in names:
+        words = set(name.words)
+        for quantity, spoken in SINGLE.items():
+            others = words - spoken - NEUTRAL
+            if not words & spoken or others or name.number is not None:
+                continue
+            values = foreign.numbers[name.column]
+            if quantity == "pose" and not (values == np.rint(values)).all():
+                continue
+            if quantity in found:
+                reasons[name.column] = f"{found[quantity][0]} is taken as {quantity}"
+            else:
+                found[quantity] = (name.column,)
+    others = [name.column for name in names if name.column in foreign.times and name.column not in reasons]
+    if others and "t" not in found:
+        found["t"] = (others[0],)
+    return found
+
+
+def place(
+    foreign: ForeignTable,
+    model: RobotModel,
+    quantity: str,
+    columns: tuple[str, ...],
+    why: str,
+    *,
+    points: bool = False,
+) -> PlacedColumns:
+    """`columns` as a quantity, with the units that the file says, else those that their magnitude or their kind tells.
+
+    With `points` a time is that of a measured pose, else of a sample.
+    """
+    if quantity == "t" and columns[0] in foreign.times:
+        return PlacedColumns.plain(quantity, columns, (TIMESTAMP,), "timestamps, as seconds from the first")
+    said = [parse_name(column, foreign.units.get(column)).unit for column in columns]
+    known = UNITS.get(quantity, {})
+    if all(unit in known for unit in said):
+        return PlacedColumns.plain(quantity, columns, tuple(said), f"{why}; the unit stands there")
+    values = np.stack([foreign.numbers[column] for column in columns], axis=1)
+    if quantity in ("q", "qa"):
+        units = joint_units(model, values)
+        return PlacedColumns.plain(quantity, columns, units, f"{why}; the unit by the joints' limits")
+    if quantity == "xyz":
+        units = (point_unit(model, values),) * 3
+        return PlacedColumns.plain(quantity, columns, units, f"{why}; the unit by the robot's reach")
+    if quantity == "t":
+        unit = (pose_time_unit if points else time_unit)(values[:, 0])
+        return PlacedColumns.plain(quantity, columns, (unit,), f"{why}; the unit by the rate")
+    default = next(iter(known), None)
+    taken = f"; taken to be in {default}" if default else ""
+    return PlacedColumns.plain(quantity, columns, (default,) * len(columns), f"{why}{taken}")

@@ -1,0 +1,103 @@
+"""Refit of the instrument's placement or the measured point in a verification: proposal, remarks and block of results.json."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.verification import Refit, Refitted, Verification, refitted
+from flexcal.data.poses import PoseSet
+from flexcal.errors import FlexcalError
+from flexcal.model.robot import RobotModel
+from flexcal.units import MILLIMETRE
+
+_WORTH = 0.5
+"""A refit is proposed where it reduces the root mean square error to less than this fraction."""
+_TENTH = 0.1
+_MUCH = 1e-4
+"""m: mean error below which no refit is proposed."""
+_CHANGED = {
+    ("station",): (
+        "after a refit of the station",
+        "the instrument, or the robot's base, was moved since the calibration",
+    ),
+    ("point",): (
+        "after a refit of the point",
+        "the reflector was moved or replaced since the calibration",
+    ),
+    ("station", "point"): (
+        "after a refit of station and point",
+        "both instrument and reflector were moved since the calibration",
+    ),
+}
+
+
+def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Refitted | None:
+    """The refit that reduces the leave-one-out errors to less than half; None where there is none.
+
+    The remaining errors have to be about as large as predicted, or a tenth of those before, because a refit also reduces errors of a
+    model that is wrong far from its calibration poses.
+    """
+    rms = _rms(found)
+    if found.all.mean < _MUCH:
+        return None
+    best: Refitted | None = None
+    tried: Sequence[tuple[Refit, ...]] = (("station",), ("point",), ("station", "point"))
+    for what in tried:
+        try:
+            again = refitted(model, poses, what)
+        except FlexcalError:
+            continue
+        # both only where they halve the error of the better single refit
+        least = rms if best is None else _rms(best.result)
+        if _rms(again.result) < (_WORTH if best is None or len(what) > len(best.what) else 1.0) * least:
+            best = again
+    return best if best is not None and _explains(best, rms) else None
+
+
+def _explains(best: Refitted, rms: float) -> bool:
+    left = _rms(best.result)
+    predicted = float(np.sqrt(np.mean(best.result.expected_rms**2)))
+    return left < _TENTH * rms or (best.covariance.independent is not None and left < 2 * predicted)
+
+
+def refit_remarks(
+    found: Verification, poses: PoseSet, refit: Refitted | None, better: Refitted | None
+) -> tuple[str, ...]:
+    """One sentence on a refit that was made or is proposed."""
+    if refit is not None:
+        return (
+            f"{' and '.join(refit.what)} refitted to these poses, geometry as calibrated: {refit.parameters} parameters of "
+            f"{3 * len(poses)} coordinates, as many as {_poses(refit)} poses have; errors are leave-one-out errors",
+        )
+    if better is None:
+        return ()
+    after, cause = _CHANGED[better.what]
+    return (
+        f"mean error {found.all.mean / MILLIMETRE:.3g} mm; {after} {better.result.all.mean / MILLIMETRE:.2g} mm: {cause}. "
+        f"--refit {' '.join(better.what)} verifies the geometry alone, and costs {_poses(better)} poses",
+    )
+
+
+def refit_document(refit: Refitted | None, poses: int) -> dict[str, Any] | None:
+    """For results.json."""
+    if refit is None:
+        return None
+    return {
+        "what": list(refit.what),
+        "parameters": refit.parameters,
+        "coordinates": 3 * poses,
+        "costs_poses": _poses(refit),
+        "statistics": "leave_one_out",
+        **refit.result.all.in_millimetres(),
+    }
+
+
+def _poses(refit: Refitted) -> int:
+    return -(-refit.parameters // 3)
+
+
+def _rms(found: Verification) -> float:
+    return float(np.sqrt((found.errors**2).sum(axis=1).mean()))

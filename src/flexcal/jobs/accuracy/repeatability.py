@@ -1,0 +1,206 @@
+"""Pose accuracy and repeatability of a robot from repeated visits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.accuracy import (
+    CYCLES,
+    VISITS_A_SET,
+    PoseDrift,
+    PoseRepeatability,
+    common_way,
+    drift_of_poses,
+    noise_repeatability,
+    repeatability,
+)
+from flexcal.calibration.measurement import predicted_positions
+from flexcal.calibration.verification import robot_before
+from flexcal.data.poses import PoseSet, read_poses
+from flexcal.files.formats import provenance
+from flexcal.jobs.calibration import unused_columns
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    calibrated_robot,
+    found_station,
+    require_distinct,
+    stored_estimates,
+)
+from flexcal.jobs.result_files import write_results
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.report.pages import RepeatabilityStudy, write_repeatability_report
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRepeatability:
+    """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
+
+    "nominal": the nominal robot's own, with instrument and measured point registered by best fit; "calibrated": the calibrated one's.
+    `drifts` are those of the poses that were visited often enough while a clock ran. `provenance` has all files with their hashes,
+    `command` the command line, where there was one.
+    """
+
+    poses: PoseSet
+    visited: list[PoseRepeatability]
+    errors: Mapping[str, np.ndarray]
+    drifts: list[PoseDrift]
+    provenance: Mapping[str, str]
+    command: str = ""
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence each."""
+        timed = self.poses.time is not None
+        remarks = list(unused_columns(replace(self.poses, time=None)))
+        if timed and not self.drifts:
+            remarks.append(
+                f"drift is evaluated at poses with {2 * VISITS_A_SET} visits or more, with times that increase from row to row "
+                "and file to file"
+            )
+        fewest = min(len(pose.rows) for pose in self.visited)
+        if fewest < CYCLES:
+            remarks.append(
+                f"ISO 9283 asks for {CYCLES} visits to each pose; there are {fewest} at the pose with the fewest, so RP is less certain"
+            )
+        once = len(self.poses) - sum(len(pose.rows) for pose in self.visited)
+        if once:
+            remarks.append(f"{once} rows are of poses that were visited once; they are not used")
+        if "nominal" not in self.errors:
+            remarks.append(
+                "too few poses for a registration of the nominal robot, so its pose accuracy is not known: visit four or more"
+            )
+        if "calibrated" not in self.errors:
+            remarks.append(
+                "there is no calibration, or not from this station, so the calibrated robot's pose accuracy is not known"
+            )
+        return tuple(remarks)
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json: over all poses, and each of them."""
+        rows = [self._pose(pose) for pose in self.visited]
+        keys = ["rp_mm", "vap_mm", *(f"ap_{kind}_mm" for kind in self.errors)]
+        return {
+            "poses": len(rows),
+            "visits": {
+                "fewest": min(row["visits"] for row in rows),
+                "total": sum(row["visits"] for row in rows),
+            },
+            **{key: _spread([row[key] for row in rows if row[key] is not None]) for key in keys},
+            "instrument_rp_mm": noise_repeatability(self.poses.sigma) / MILLIMETRE
+            if self.poses.sigma_given
+            else None,
+            "drift": self._drift(),
+            "each": rows,
+            "remarks": list(self.remarks),
+            "provenance": dict(self.provenance),
+            "command": self.command,
+        }
+
+    def _drift(self) -> dict[str, Any] | None:
+        """dRP, dAP and the way of the barycentres over all poses, and the course of each; None where none is known."""
+        if not self.drifts:
+            return None
+        each = []
+        for drift in self.drifts:
+            first = int(drift.sets[0][0])
+            courses = {
+                f"ap_{kind}_mm": drift.accuracy(errors) / MILLIMETRE for kind, errors in self.errors.items()
+            }
+            each.append(
+                {
+                    "pose": int(self.poses.pose[first]),
+                    "target": str(self.poses.target[first]),
+                    "t_s": drift.time.tolist(),
+                    "rp_mm": (drift.repeatability / MILLIMETRE).tolist(),
+                    "way_mm": (np.linalg.norm(drift.way, axis=1) / MILLIMETRE).tolist(),
+                    **{key: course.tolist() for key, course in courses.items()},
+                    "drp_mm": drift.repeatability_drift / MILLIMETRE,
+                    **{
+                        f"dap_{kind}_mm": drift.accuracy_drift(errors) / MILLIMETRE
+                        for kind, errors in self.errors.items()
+                    },
+                    "certain": drift.certain,
+                }
+            )
+        together, apart = common_way(self.drifts)
+        keys = ["drp_mm", *(f"dap_{kind}_mm" for kind in self.errors)]
+        return {
+            **{key: _spread([item[key] for item in each]) for key in keys},
+            "way_mm": _spread([item["way_mm"][-1] for item in each]),
+            "together_mm": together / MILLIMETRE,
+            "apart_mm": apart / MILLIMETRE,
+            "each": each,
+        }
+
+    def _pose(self, pose: PoseRepeatability) -> dict[str, Any]:
+        first = int(pose.rows[0])
+        return {
+            "pose": int(self.poses.pose[first]),
+            "target": str(self.poses.target[first]),
+            "visits": len(pose.rows),
+            "rp_mm": pose.repeatability / MILLIMETRE,
+            "rp_rotation_rad": pose.rotation,
+            "vap_mm": None if pose.direction_variation is None else pose.direction_variation / MILLIMETRE,
+            **{f"ap_{kind}_mm": pose.accuracy(e) / MILLIMETRE for kind, e in self.errors.items()},
+        }
+
+
+def repeat_robot(
+    robot: Path,
+    files: Sequence[Path],
+    *,
+    estimates: Path | None = None,
+    out: Path | None = None,
+    command: str = "",
+    progress: Progress = silent,
+) -> RobotRepeatability:
+    """Pose accuracy and repeatability from the repeated visits in `files`; with `out`, results.json and report.html are left there.
+
+    `estimates` is an estimates.yaml, or a folder with one; without, that beside robot.yaml is used where it holds a calibration. Raises
+    `FlexcalError` where no pose was visited twice, or a file does not fit.
+    """
+    require_distinct(files)
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    progress("reading", 0.0)
+    poses = read_poses(list(files), nominal, require_motion=False)
+    progress("reading", 1.0)
+    progress("visits", 0.0)
+    visited = repeatability(poses)
+    progress("visits", 0.5)
+    calibrated = _calibrated(robot, estimates, nominal)
+    errors: dict[str, np.ndarray] = {}
+    before = robot_before(nominal, poses).errors(poses).robots_own
+    if before is not None:
+        errors["nominal"] = before
+    if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
+        errors["calibrated"] = poses.position - predicted_positions(calibrated.model, poses)
+    progress("visits", 1.0)
+    stored = None if calibrated is None else calibrated.stored
+    blocks = () if calibrated is None else tuple(calibrated.blocks)
+    origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
+    result = RobotRepeatability(poses, visited, errors, drift_of_poses(poses, visited), origin, command)
+    if out is not None:
+        document = result.document()
+        write_results(out, document)
+        study = RepeatabilityStudy(nominal.name, poses, visited, document)
+        write_repeatability_report(out / "report.html", study)
+    return result
+
+
+def _calibrated(robot: Path, estimates: Path | None, nominal: RobotModel) -> CalibratedRobot | None:
+    """The calibrated robot; None where none was named and there is none beside robot.yaml."""
+    if estimates is None and not stored_estimates(nominal, None).exists():
+        return None
+    return calibrated_robot(robot, estimates, "compare with")
+
+
+def _spread(values: Sequence[float]) -> dict[str, float] | None:
+    """Mean and largest over the poses; None where there are none."""
+    return {"mean": float(np.mean(values)), "max": float(np.max(values))} if values else None

@@ -1,0 +1,38 @@
+"""Comparison of measured points with those that a calibration was fitted to."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.data.poses import PoseSet
+from flexcal.files.formats import sha256_of
+from flexcal.jobs.inputs import CalibratedRobot
+
+_RESOLUTION = 1e-7
+"""rad or m: measurements that differ by less are one, in whatever file and unit they are."""
+
+
+def measurement_digests(poses: PoseSet) -> tuple[str, ...]:
+    """Eight hexadecimal digits for every measurement, of its joint positions and its point."""
+    return tuple(_digests(poses))
+
+
+def _digests(poses: PoseSet) -> Iterator[str]:
+    rows = np.round(np.hstack([poses.q, poses.position]) / _RESOLUTION).astype("<i8")
+    return (f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
+
+
+def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
+    """Those of the `files`, or how many of the `poses` in them, that the calibration was fitted to, in words."""
+    estimate = calibrated.blocks["calibration"]
+    known = estimate.provenance.values()
+    named = tuple(file.name for file in files if sha256_of(file) in known)
+    if named:
+        return named
+    fitted = set(estimate.measurements)
+    again = sum(digest in fitted for digest in _digests(poses))
+    return (f"{again} of these {len(poses)} points",) if again else ()

@@ -1,0 +1,19 @@
+"""Remarks on columns of pose files that are not used."""
+
+from __future__ import annotations
+
+from flexcal.data.poses import PoseSet
+
+
+def unused_columns(poses: PoseSet) -> tuple[str, ...]:
+    """One sentence a quantity that is there and has no effect."""
+    remarks = []
+    if poses.torque is not None:
+        remarks.append(
+            "the torques tau1… in the files are not used: they contain friction, so the flank of a backlash is computed from the model"
+        )
+    if poses.temperature is not None:
+        remarks.append("the temperature in the files is not used: no term of the model depends on it")
+    if poses.time is not None:
+        remarks.append("the times in the files are not used: no term of the model depends on them")
+    return tuple(remarks)

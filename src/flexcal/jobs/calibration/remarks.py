@@ -1,0 +1,125 @@
+"""Remarks on a calibration: assumptions, outliers, drift, noise, and signs of faulty data."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.calibration.diagnostics import Drift, hardly_fits, moved_far, scattered
+from flexcal.calibration.fit import Calibration
+from flexcal.jobs.calibration.ignored_columns import unused_columns
+from flexcal.units import MILLIMETRE
+
+_LOOK = (
+    "these data do not fit this robot: look for a column with wrong sign, unit or order, for points of another "
+    "target or robot, for a wrong xyz under `points:`, and for points seen by an instrument on the hand (eye-in-hand, "
+    "not supported); flexcal import looks for these"
+)
+
+_OVERSTATED, _UNDERSTATED = 0.5, 2.0
+"""Estimated noise over the stated sigma, below and above which a remark is made."""
+
+_SHOWN = 3
+_LISTED = 20
+
+
+@dataclass(frozen=True)
+class Outlier:
+    """A measurement with a small weight in the robust loss: number of its pose, point, distance from the fit (m)."""
+
+    pose: int
+    target: str
+    error: float
+
+
+def outliers_of(fit: Calibration) -> tuple[Outlier, ...]:
+    """The outliers of a fit, the farthest first."""
+    distance = np.linalg.norm(fit.residuals, axis=1)
+    rows = sorted(fit.estimate.outliers, key=lambda row: -distance[row])
+    return tuple(Outlier(int(fit.poses.pose[i]), str(fit.poses.target[i]), float(distance[i])) for i in rows)
+
+
+def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[str, ...]:
+    """One sentence each, the most important last; a known `cause` of a bad fit precedes its consequences."""
+    remarks = [*unused_columns(fit.poses), *_nominal_springs(fit)]
+    if fit.ambiguous.any():
+        remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
+    outliers = outliers_of(fit)
+    if outliers:
+        listed = ", ".join(f"pose {o.pose} ({o.error / MILLIMETRE:.2f} mm)" for o in outliers[:_LISTED])
+        more = f" and {len(outliers) - _LISTED} more" if len(outliers) > _LISTED else ""
+        remarks.append(f"{len(outliers)} outliers: {listed}{more}")
+    remarks += [*_undetermined(fit), *_noise(fit)]
+    drift = Drift.of(fit)
+    if drift.certain:
+        remarks.append(
+            f"residuals drift with time (p = {drift.probability:.1g}), by {drift.distance / MILLIMETRE:.3f} mm from first to last pose: "
+            "robot or instrument warmed up, or position and measuring order are correlated"
+        )
+    remarks += cause
+    far = moved_far(fit)
+    if far:
+        named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
+        more = f" and {len(far) - _SHOWN} others" if len(far) > _SHOWN else ""
+        remarks.append(f"implausibly far from the nominal value: {', '.join(named)}{more}")
+    if hardly_fits(fit) and not cause:
+        remarks.append(_LOOK)
+    if not fit.estimate.converged:
+        remarks.append(
+            f"the fit has not converged ({fit.estimate.status}), so its values and intervals mean nothing: check the columns with 'flexcal "
+            "import' and the nominal geometry in the URDF, take fewer terms under `geometry:`, or measure more poses, farther apart"
+        )
+    return tuple(remarks)
+
+
+def _nominal_springs(fit: Calibration) -> Sequence[str]:
+    """Springs that stage 1 did not identify have a declared prior of their own in place of its posterior."""
+    springs = [p for p in fit.prior.parameters if p.name.endswith(".stiffness")]
+    nominal = [p.name.removesuffix(".stiffness") for p in springs if np.isfinite(p.prior_std)]
+    if not nominal:
+        return ()
+    which = "" if len(nominal) == len(springs) else f" of {', '.join(nominal)}"
+    return (
+        f"the stiffness{which} was not identified: the nominal one of robot.yaml is used with a standard deviation of "
+        f"{fit.model.prior.stiffness:.0%}; run 'flexcal identify stiffness' first to identify it",
+    )
+
+
+def _undetermined(fit: Calibration) -> Sequence[str]:
+    """Parameters that the poses do not determine, one sentence per cause."""
+    causes: dict[str, list[str]] = {}
+    for item in fit.undetermined:
+        causes.setdefault(item.cause, []).append(item.name)
+    return [
+        f"not determined by these poses, held at the nominal value: {', '.join(names)} ({cause})"
+        for cause, names in causes.items()
+    ]
+
+
+def _noise(fit: Calibration) -> Sequence[str]:
+    budget = fit.variances
+    instrument, stated, robot, model = (
+        budget[key] for key in ("instrument_mm", "stated_mm", "robot_mm", "model_mm")
+    )
+    assert robot is not None and model is not None
+    remarks = []
+    if instrument is None or stated is None:
+        text = f"no sigma in the files: scatter of instrument and robot together about the fit is {robot:.3f} mm per coordinate (1σ)"
+        remarks.append(f"{text}, which is too large for noise" if scattered(fit) else text)
+    elif instrument < _OVERSTATED * stated:
+        remarks.append(
+            f"the stated sigma of {stated:.3g} mm is {stated / np.hypot(instrument, robot):.3g} times the scatter of the points; the "
+            "estimated scatter is used"
+        )
+    elif robot > _UNDERSTATED * stated:
+        remarks.append(
+            f"in addition to the stated sigma of {stated:.3g} mm the points scatter by {robot:.3f} mm per coordinate: repeatability of the "
+            "robot, or a sigma that is too small; weights and intervals include both"
+        )
+    if model > 0:
+        remarks.append(
+            f"systematic model errors of {model:.3f} mm per coordinate (1σ) remain; intervals include them"
+        )
+    return remarks

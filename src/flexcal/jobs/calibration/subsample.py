@@ -1,0 +1,40 @@
+"""What there is to say of a measurement of which a part stands for all."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.fit import EvenSample
+from flexcal.units import MILLIMETRE
+
+
+def sample_document(sample: EvenSample | None, everywhere: ErrorStatistics | None) -> dict[str, Any] | None:
+    """The block `sample` of results.json; null where every point was taken."""
+    if sample is None or everywhere is None:
+        return None
+    return {"points": sample.total, "taken": len(sample.rows), "all": everywhere.in_millimetres()}
+
+
+def fitted_sample(sample: EvenSample | None, everywhere: ErrorStatistics | None) -> list[str]:
+    """One sentence of a calibration."""
+    if sample is None or everywhere is None:
+        return []
+    return [
+        f"of {sample.total} points {len(sample.rows)} were fitted, drawn evenly over positions and stations; errors of the calibrated "
+        f"robot at all points: {_words(everywhere)}"
+    ]
+
+
+def verified_sample(sample: EvenSample | None, everywhere: ErrorStatistics | None) -> list[str]:
+    """One sentence of a verification."""
+    if sample is None or everywhere is None:
+        return []
+    return [
+        f"the errors are those of all {sample.total} points; figures, checks and intervals are of {len(sample.rows)} of them, drawn evenly "
+        "over positions and stations"
+    ]
+
+
+def _words(errors: ErrorStatistics) -> str:
+    return f"mean {errors.mean / MILLIMETRE:.3f}, p90 {errors.p90 / MILLIMETRE:.3f}, max {errors.max / MILLIMETRE:.3f} mm"

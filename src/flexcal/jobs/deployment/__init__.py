@@ -1,0 +1,5 @@
+"""Use of the calibrated robot: compensated commands, predicted poses, and export to other programs."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,166 @@
+"""Export of the calibrated robot to file formats of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.calibration.fit import probable_robots
+from flexcal.errors import InputError
+from flexcal.export import (
+    Convention,
+    Exported,
+    Rendered,
+    render_dh,
+    render_json,
+    render_kinematics,
+    render_mjcf,
+    render_offsets,
+    render_sdf,
+    render_urdf,
+    undetermined_offsets,
+    write_rendered,
+)
+from flexcal.files.formats import read_estimates
+from flexcal.jobs.inputs import measured_points, stored_estimates
+from flexcal.model.robot import RobotModel, with_blocks
+
+
+@dataclass(frozen=True, eq=False)
+class Exportable:
+    """The `nominal` robot and the calibrated `model`; `unseen` has only that in its posterior which the `measured` points leave open."""
+
+    nominal: RobotModel
+    model: RobotModel
+    unseen: RobotModel | None
+    measured: tuple[str, ...]
+
+    @property
+    def undetermined(self) -> tuple[int, ...]:
+        """Joints whose zeros the measured points do not tell; before an instrument with a frame of its own the base is anywhere."""
+        if not self.measured:
+            return ()
+        registered = bool(self.model.station[:, 3:].any())
+        return undetermined_offsets(self.nominal, self.measured, base=registered)
+
+
+Render = Callable[[Exportable], Rendered]
+"""A robot to the text of a file."""
+
+
+@dataclass(frozen=True)
+class ExportedRobot:
+    """What was written; `calibrated` is False where there is no calibration: where the joints are is as in the nominal robot."""
+
+    export: Exported
+    calibrated: bool
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        loss = self.export.loss
+        return {
+            "file": self.export.path,
+            "calibrated": self.calibrated,
+            "lost": [
+                {"term": term.name} | (term.error.in_millimetres() if term.error else {})
+                for term in loss.terms
+            ],
+            "tool_error": loss.error.in_millimetres() | {"poses": loss.poses, "within": loss.within}
+            if loss.error
+            else None,
+            "remarks": list(self.export.remarks),
+            **self.export.table,
+        }
+
+
+def export_urdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the robot with its estimates as URDF; `estimates` is a file or folder in place of that beside robot.yaml.
+
+    Raises `FlexcalError`, as every export here, as reading and the format's rendering do, and where `out` is one of the robot's own files.
+    """
+    return _export(robot, out, estimates, lambda robot_: render_urdf(robot_.model))
+
+
+def export_mjcf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the robot as MJCF with elastic joints."""
+    return _export(robot, out, estimates, lambda robot_: render_mjcf(robot_.model))
+
+
+def export_sdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the robot as SDFormat."""
+    return _export(robot, out, estimates, lambda robot_: render_sdf(robot_.model, robot_.nominal))
+
+
+def export_json(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write everything of the robot as one JSON document."""
+    return _export(robot, out, estimates, lambda robot_: render_json(robot_.model, robot_.nominal))
+
+
+def export_kinematics(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the placements of six joints as the `kinematics` YAML of Universal Robots' ROS description."""
+    return _export(robot, out, estimates, lambda robot_: render_kinematics(robot_.model, robot_.nominal))
+
+
+def export_dh(
+    robot: Path,
+    out: Path,
+    convention: Convention,
+    *,
+    point: str | None = None,
+    four_parameters: bool = False,
+    estimates: Path | None = None,
+) -> ExportedRobot:
+    """Write the Denavit-Hartenberg table of the chain to a point; see `render_dh`."""
+
+    def render(robot_: Exportable) -> Rendered:
+        return render_dh(
+            robot_.model,
+            robot_.nominal,
+            convention,
+            point=point,
+            four_parameters=four_parameters,
+            unseen=robot_.unseen,
+        )
+
+    return _export(robot, out, estimates, render)
+
+
+def export_offsets(
+    robot: Path,
+    out: Path,
+    *,
+    point: str | None = None,
+    keep_frames: bool = False,
+    estimates: Path | None = None,
+) -> ExportedRobot:
+    """Write the best joint offsets of the chain to a point; see `render_offsets`."""
+
+    def render(robot_: Exportable) -> Rendered:
+        return render_offsets(
+            robot_.model,
+            robot_.nominal,
+            point=point,
+            keep_frames=keep_frames,
+            undetermined=robot_.undetermined,
+        )
+
+    return _export(robot, out, estimates, render)
+
+
+def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> ExportedRobot:
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    path = stored_estimates(nominal, estimates)
+    for own, what in ((nominal.urdf, "nominal URDF"), (robot, "robot.yaml"), (path, "estimates file")):
+        if out.exists() and own.exists() and out.samefile(own):
+            raise InputError(f"{out} is the {what} of {robot}, which is never changed; give another --out.")
+    if estimates is not None and not path.exists():
+        raise InputError(f"{path} does not exist; run 'flexcal calibrate' first, or leave --estimates out.")
+    stored = path.exists()
+    blocks = read_estimates(path) if stored else {}
+    model = with_blocks(nominal, blocks, path) if stored else nominal
+    measured = measured_points(nominal, blocks)
+    probable, unseen = probable_robots(model, measured) if measured else (model, None)
+    exportable = Exportable(nominal, probable, unseen, measured)
+    return ExportedRobot(write_rendered(probable, out, render(exportable)), "calibration" in blocks)

@@ -1,0 +1,100 @@
+"""Learned residual torque of identified dynamics: reduction of the error, block of results.json, and file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.dynamics.estimators import RecordedRows
+from flexcal.dynamics.regression import ExperimentSystem
+from flexcal.dynamics.residual import (
+    LEARNED,
+    BlockErrors,
+    LearnedResidual,
+    ResidualErrors,
+    learn_residual,
+    require_learned_place,
+    residual_errors,
+    write_learned_residual,
+)
+from flexcal.estimation import Estimate
+from flexcal.progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class LearnedDynamics:
+    """What was learned, and the torques missed with and without it: in left-out blocks of the fit, in all of the fit, and held out."""
+
+    learned: LearnedResidual
+    blocks: BlockErrors
+    train: ResidualErrors
+    held_out: ResidualErrors | None
+
+    @classmethod
+    def of(
+        cls,
+        recorded: RecordedRows,
+        systems: list[ExperimentSystem],
+        unseen: RecordedRows | None,
+        estimate: Estimate,
+        progress: Progress,
+    ) -> LearnedDynamics:
+        """Learned from `recorded` alone, of which `systems` are the equations; raises `FlexcalError` as `learn_residual` does."""
+        learned, blocks = learn_residual(recorded, systems, estimate, progress)
+        values = estimate.parameters.coordinates()
+        held_out = None if unseen is None else residual_errors(learned, unseen, values)
+        return cls(learned, blocks, residual_errors(learned, recorded, values), held_out)
+
+    @staticmethod
+    def require_place(estimates: Path) -> None:
+        """Raise `InputError` where another program's file stands where it would be written, beside the file `estimates`."""
+        require_learned_place(estimates.with_name(LEARNED))
+
+    def file(self, estimates: Path) -> Path | None:
+        """Where it is written: beside the file `estimates`, and nowhere where nothing was learned."""
+        return estimates.with_name(LEARNED) if self.learned.learned else None
+
+    def store(self, estimates: Path) -> None:
+        """Write it, for the block `dynamics` of the file `estimates`."""
+        if file := self.file(estimates):
+            write_learned_residual(file, self.learned, estimates)
+
+    def document(self, estimates: Path) -> dict[str, Any]:
+        """Its part of results.json."""
+        errors = self.blocks
+        motors = zip(self.learned.motors, errors.measured, errors.physical, errors.together, strict=True)
+        return {
+            "motors": [
+                {
+                    "motor": motor.name,
+                    "learned": motor.learned,
+                    "cross_validation_percent": _percent(np.array([physical, together]) / measured),
+                }
+                for motor, measured, physical, together in motors
+            ],
+            "error_percent": {
+                "cross_validation": _percent(self.blocks.overall),
+                "train": _percent(self.train.overall),
+                "held_out": None if self.held_out is None else _percent(self.held_out.overall),
+            },
+            "per_joint": self._per_joint(),
+            "file": self.file(estimates),
+        }
+
+    def _per_joint(self) -> dict[str, dict[str, Any]]:
+        """Of the held-out part where there is one."""
+        shown = self.train if self.held_out is None else self.held_out
+        rows = zip(shown.measured, shown.physical, shown.together, shown.inside, strict=True)
+        return {
+            motor.name: _percent(np.array([physical, together]) / measured)
+            | {"inside_interval_percent": 100 * float(inside)}
+            for motor, (measured, physical, together, inside) in zip(self.learned.motors, rows, strict=True)
+        }
+
+
+def _percent(errors: tuple[float, float] | np.ndarray) -> dict[str, float]:
+    without, together = (100 * float(error) for error in errors)
+    return {"without": without, "with": together}

@@ -1,0 +1,113 @@
+"""Remarks on identified dynamics: parameters of declared terms that the recordings do not determine."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from flexcal.dynamics.drives import attenuation
+from flexcal.dynamics.friction import FrictionSelection
+from flexcal.dynamics.regression import RegressionData
+from flexcal.estimation import Estimate
+from flexcal.jobs.dynamics.estimators import EstimatorName
+from flexcal.model.parts import INERTIAL
+
+_CLEAR = 5.0
+"""Standard deviations from zero, at least, of a stiffness that is worth a sentence."""
+
+
+def undeclared_springs(data: RegressionData, estimate: Estimate) -> Iterator[str]:
+    """A sentence for every joint whose identified `cable_stiffness` is clearly not zero: stiffness, rest and what to declare."""
+    model = data.observation.model
+    known = {entry.joint: entry.stiffness for entry in model.config.dynamics.joint_springs}
+    for joint in model.joints:
+        name = f"{joint.name}.cable_stiffness"
+        std = estimate.std(name) if name in estimate.values else None
+        if std is None or abs(estimate.values[name]) <= _CLEAR * std:
+            continue
+        stiffness, unit = estimate.values[name], "N/m" if joint.kind == "prismatic" else "N m/rad"
+        offset = estimate.values.get(f"{joint.name}.torque_offset")
+        rest = (
+            ""
+            if offset is None
+            else f", at rest near {-offset / stiffness:.3g} {'m' if joint.kind == 'prismatic' else 'rad'}"
+        )
+        what = f"the torques of {joint.name} show a spring parallel to it of {stiffness:.4g} {unit} ± {std:.2g}{rest}"
+        if (declared := known.get(joint.name)) is not None:
+            yield f"{what}, beside the {declared:g} {unit} that robot.yaml declares: correct `stiffness:` under `dynamics: joint_springs:`"
+        else:
+            yield (
+                f"{what}, which robot.yaml does not declare: cables and hoses, or a spring that balances the arm, which "
+                f"`dynamics: {{joint_springs: [{{joint: {joint.name}}}]}}` declares"
+            )
+
+
+_SHOWN = 3
+_REGROUPED = ("rotor_inertia", "arm_inertia", "spring_torque", "cable_torque", "torque_offset")
+_REGROUPED += tuple(f"{name}_offset" for name in ("fx", "fy", "fz", "mx", "my", "mz"))
+"""Parameters that are always absorbed, by the inertias of links and by torque offsets."""
+_LARGEST_ATTENUATION = 0.5
+"""Bias of a stiffness, in its standard deviations, up to which no remark is made."""
+
+
+def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...]:
+    """One sentence each; every parameter of a drive that a declared term brings and the data do not determine is named."""
+    base = data.base.found
+    structural = {base.names[i] for i in base.kept}
+    absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
+    silent = set(data.silent)
+    drives = [name for name in data.names[len(INERTIAL) * data.observation.model.n :] if name not in silent]
+    remarks = [
+        f"{joint}: {', '.join(keys)} keep their values: these recordings do not excite them"
+        for joint, keys in _by_joint(data.silent).items()
+    ]
+    for name in drives:
+        if name in absorbed and (name in structural or not name.endswith(_REGROUPED)):
+            largest = sorted(absorbed[name], key=lambda heir: -abs(heir[1]))
+            heirs = ", ".join(heir for heir, _ in largest[:_SHOWN]) or "nothing"
+            where = "in any recording" if name not in structural else "in these recordings"
+            remarks.append(f"{name} is not identifiable beside {heirs} {where}")
+    return tuple(remarks)
+
+
+def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: EstimatorName) -> tuple[str, ...]:
+    """One sentence each: an assumed controller, springs that robot.yaml does not declare, a stiffness that noise may have reduced."""
+    notes = []
+    if estimator in ("iv", "didim") and data.observation.model.controller is None:
+        notes.append(
+            f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, gains proportional to inertia"
+        )
+    return (*notes, *undeclared_springs(data, estimate), *_attenuated(data, estimate))
+
+
+def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:
+    """What other friction terms that predict as well do to the standard deviations; None without such."""
+    if friction.spread is None:
+        return None
+    growth = friction.spread.growth(estimate)
+    name, factor = max(growth.items(), key=lambda item: item[1])
+    others = len(friction.spread.deviations) - 1
+    others = len(friction.spread.deviations) - 1
+    sets = "1 other set of friction terms or shapes predicts"
+    if others > 1:
+        sets = f"{others} other sets of friction terms or shapes predict"
+    return (
+        f"{sets} the torques about as well; the differences are included in the standard deviations, which are up to {factor:.2g} times as "
+        f"large as without them ({name})"
+    )
+
+
+def _by_joint(names: tuple[str, ...]) -> dict[str, list[str]]:
+    found: dict[str, list[str]] = {}
+    for name in names:
+        joint, _, key = name.rpartition(".")
+        found.setdefault(joint, []).append(key)
+    return found
+
+
+def _attenuated(data: RegressionData, estimate: Estimate) -> Iterator[str]:
+    for name, share in attenuation(data, estimate).items():
+        if share * estimate.values[name] > _LARGEST_ATTENUATION * (estimate.std(name) or 0.0):
+            yield (
+                f"encoder noise on either side of the drive may have reduced {name} by up to {100 * share:.2g} %, "
+                "which its interval does not include; larger torques or finer encoders help"
+            )

@@ -1,0 +1,166 @@
+"""Identified dynamics of a robot, and the content of their results.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, WeightShare
+from flexcal.dynamics.friction import FrictionSelection
+from flexcal.dynamics.regression import RegressionData
+from flexcal.estimation import Estimate
+from flexcal.jobs.dynamics.estimators import EstimatorName
+from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
+from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
+from flexcal.jobs.logs import Treatment
+from flexcal.jobs.result_files import dropped_parameters, quantities
+from flexcal.model.parts import is_body
+from flexcal.model.robot import torque_units
+from flexcal.report.checks import Trust
+from flexcal.report.pages import dynamics_checks
+
+
+@dataclass(frozen=True, eq=False)
+class RobotDynamics:
+    """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
+
+    The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
+    whose motors have equations of their own; `signals` are as `used_signals` has them. `weight_faults` are torques unlike the links' weight
+    that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was accepted. `external`
+    tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what was learned beside the
+    estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the command line, where there was one.
+    """
+
+    estimate: Estimate
+    estimator: EstimatorName
+    structural_rank: int
+    train: RegressionData
+    held_out: RegressionData | None
+    hold_out: float
+    validated: tuple[Path, ...]
+    essential: EssentialParameters
+    friction: FrictionSelection
+    motors: tuple[str, ...]
+    treatment: Treatment
+    signals: Mapping[str, Any]
+    weight_faults: tuple[str, ...]
+    weight_shares: Mapping[str, WeightShare]
+    external: ExternalShare | None
+    learned: LearnedDynamics | None
+    seconds: float
+    estimates: Path
+    provenance: Mapping[str, str]
+    command: str = ""
+
+    @property
+    def bodiless(self) -> tuple[str, ...]:
+        """The links whose inertials no body can have: right for torques, useless for springs and for a URDF."""
+        links = (joint.link for joint in self.train.observation.model.joints)
+        return tuple(link for link in links if not is_body(self.estimate.values, link))
+
+    @cached_property
+    def trust(self) -> Trust:
+        """The verdict, from the same checks as on the page."""
+        return Trust(dynamics_checks(self._numbers))
+
+    def document(self) -> dict[str, Any]:
+        """The content of results.json."""
+        return {**self._numbers, "verdict": self.trust.document()}
+
+    @cached_property
+    def _numbers(self) -> dict[str, Any]:
+        x = self.estimate.parameters.coordinates()
+        error, each = self.train.errors(x)
+        joints = self.train.observation.model.joint_names
+        percent: dict[str, Any] = {"train": 100 * error, "held_out": None}
+        if self.held_out is not None:
+            error, each = self.held_out.errors(x)
+            percent["held_out"] = 100 * error
+        percent["per_joint"] = dict(zip(joints, 100 * each[: len(joints)], strict=True))
+        if self.motors:
+            others = len(joints) + len(self.motors)
+            percent["per_motor"] = dict(zip(self.motors, 100 * each[len(joints) : others], strict=True))
+            bearings = self.train.observation.labels[others:]
+            if bearings:
+                percent["per_bearing"] = dict(zip(bearings, 100 * each[others:], strict=True))
+        return {
+            "robot": self.train.observation.model.name,
+            "structural_rank": self.structural_rank,
+            "rank": self.estimate.rank,
+            "equations": sum(s.triangle.rows for s in self.train.subsystems),
+            "masked_rows": self.train.masked,
+            "error_percent": percent,
+            "hold_out": {"share": self.hold_out, "logs": [str(log) for log in self.validated]},
+            "torque_units": torque_units(self.train.observation.model),
+            "bodiless_links": list(self.bodiless),
+            "signals": dict(self.signals),
+            "friction_terms": list(self.friction.names),
+            "friction_shapes": {c.name: c.shape for c in self.friction.chosen if c.shape},
+            "friction_tried": [
+                {"terms": list(t.terms), "cross_validation_percent": 100 * t.error, "p_value": t.p_value}
+                for t in self.friction.trials
+            ],
+            "weight_faults": list(self.weight_faults),
+            "external_share": None if self.external is None else asdict(self.external),
+            "selection_remark": selection_remark(self.friction, self.estimate),
+            "remarks": list(dynamics_remarks(self.train, self.estimate)),
+            "notes": list(dynamics_notes(self.train, self.estimate, self.estimator)),
+            "weight_shares": {
+                joint: asdict(share) for joint, share in self.weight_shares.items() if share.unlike
+            },
+            "base_parameters": self._base_parameters(),
+            "essential_parameters": self._essential_parameters(),
+            "parameters": quantities(self.estimate),
+            "dropped": dropped_parameters(self.estimate.dropped),
+            "learned_residual": None if self.learned is None else self.learned.document(self.estimates),
+            "seconds": self.seconds,
+            "estimates": self.estimates,
+            "provenance": dict(self.provenance),
+            "command": self.command,
+        }
+
+    def _essential_parameters(self) -> dict[str, Any]:
+        """What stays of the base parameters, with value and standard deviation, and the error of the torques with it alone."""
+        found = self.essential
+        percent = {"train": 100 * self.train.errors(found.parameters)[0], "held_out": None}
+        if self.held_out is not None:
+            percent["held_out"] = 100 * self.held_out.errors(found.parameters)[0]
+        stay = zip(found.names, found.values, found.std, strict=True)
+        return {
+            "parameters": [{"name": name, "estimate": value, "std": std} for name, value, std in stay],
+            "eliminated": list(found.eliminated),
+            "error_percent": percent,
+        }
+
+    def _base_parameters(self) -> list[dict[str, Any]]:
+        """Value, standard deviation and that in per cent of every base parameter, written out; None where the data do not tell.
+
+        `kept` is the parameter that it is counted as; `essential` its value where the others are left out, None where it is left out
+        itself.
+        """
+        essential = dict(zip(self.essential.names, self.essential.values, strict=True))
+        base, x = self.train.base, self.estimate.parameters.coordinates()
+        hidden = {entry.name for entry in self.estimate.dropped}
+        rows = []
+        for expression, kept, row in zip(
+            base.expressions, base.found.kept, base.found.regrouping, strict=True
+        ):
+            name, value = base.found.names[kept], float(row @ x)
+            std = None if name in hidden else self.estimate.std(name)
+            percent = None if std is None or value == 0 else 100 * std / abs(value)
+            unit = self.estimate.parameters[name].unit
+            rows.append(
+                {
+                    "name": expression,
+                    "kept": name,
+                    "unit": unit,
+                    "estimate": value,
+                    "std": std,
+                    "std_percent": percent,
+                    "essential": essential.get(name),
+                }
+            )
+        return rows

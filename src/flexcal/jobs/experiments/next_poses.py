@@ -1,0 +1,104 @@
+"""Selection of the next poses after measured ones."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data.plans import PosePlan
+from flexcal.data.poses import PosePool, read_poses
+from flexcal.design.poses import CriterionName, NextPoses, WorkingVolume, next_poses
+from flexcal.jobs.experiments.candidate_poses import PoseChoice
+from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_pose_plan
+from flexcal.jobs.inputs import robot_origin
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class ContinuedPoses:
+    """The next poses, best first, up to where to stop; `plan` and `file` are None where nothing is left to measure.
+
+    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones.
+    """
+
+    plan: PosePlan | None
+    file: Path | None
+    found: NextPoses
+    stop: int | None
+    wanted: float | None
+    seed: int
+    working: WorkingVolume | None = None
+    pool: PosePool | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
+    command: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
+        found, design = self.found, self.found.design
+        return (
+            {
+                "plan": self.file,
+                "poses": 0 if self.plan is None else len(self.plan),
+                "measured": found.measured,
+            }
+            | pool_block(design, self.pool, self.seed)
+            | {
+                "criterion": design.criterion.name,
+                "candidates": len(design.candidates),
+                "wanted_mm": None if self.wanted is None else self.wanted / MILLIMETRE,
+                "stop_after": self.stop,
+                "working": working_block(self.working),
+                "flanks": flank_block(design),
+                "tool_error_mm": found.tool_error / MILLIMETRE,
+                "least_possible_mm": found.possible / MILLIMETRE,
+                "provenance": dict(self.provenance),
+                "command": self.command,
+            }
+        )
+
+
+def plan_next_poses(
+    robot: Path,
+    out: Path,
+    count: int,
+    *,
+    measured: Sequence[Path],
+    criterion: CriterionName = "c",
+    candidates: int | Path = 4000,
+    working: str | None = None,
+    wanted: float | None = None,
+    payload: float | None = None,
+    seed: int = 0,
+    command: str = "",
+    progress: Progress = silent,
+) -> ContinuedPoses:
+    """Write to `out` the next poses, at most `count`, after the files of `measured` ones; nothing where these are enough.
+
+    They end where the predicted tool error is `wanted` (m), or without it where more poses only average. The other arguments are those of
+    `plan_calibration_poses`. Raises `FlexcalError` as `next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
+    """
+    model = RobotModel.from_yaml(robot)
+    known = read_poses(measured, model, require_motion=False)
+    rng = np.random.default_rng([seed, 7])
+    choice = PoseChoice.of(model, candidates, working, payload, count, rng, seed, progress)
+    after = next_poses(choice.found, known, count, rng=rng, criterion=criterion)
+    stop = after.enough(wanted)
+    origin = robot_origin(model, (*measured, *choice.files))
+    if stop == 0:
+        return ContinuedPoses(
+            None, None, after, stop, wanted, seed, choice.working, choice.pool, origin, command
+        )
+    design = after.design.in_order(np.arange(count if stop is None else stop))
+    plan = replace(design.plan, name="calibration")
+    after = replace(after, design=design)
+    result = ContinuedPoses(
+        plan, out, after, stop, wanted, seed, choice.working, choice.pool, origin, command
+    )
+    write_pose_plan(out, model, plan, result.document(), choice.working)
+    return result

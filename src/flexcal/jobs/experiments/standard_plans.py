@@ -1,0 +1,61 @@
+"""Default plans of frequency experiments: six poses with a payload, or the paper's three without."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan
+from flexcal.data.tables import check_joint_limits, open_table
+from flexcal.design.frequency import flat_multisine, room, share_at_rest
+from flexcal.errors import InputError
+from flexcal.model.robot import RobotModel
+from flexcal.units import DEGREE
+
+REFERENCE = {"default": 1.5 * DEGREE, "paper": 3.0 * DEGREE}
+"""Amplitude of the reference motion, rad."""
+_LEAST = 0.5
+"""What is left of the excitation at least: a drive that gravity does not load crosses its gap however small that is."""
+
+
+def frequency_plan(
+    model: RobotModel, poses_file: Path, kind: Literal["default", "paper"], seed: int
+) -> MultisinePlan:
+    """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°); P1 §4.1.3, Fig. 4.
+
+    Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two of them dropped, both signs. The
+    excitation is lowered, on all axes alike, until its peaks no longer pull a drive with backlash across its gap against gravity.
+    Raises `InputError` where the file lacks the plan's poses, robot.yaml a controller, or a pose the room that the motion about it needs.
+    """
+    payload = None if kind == "default" else 0.0
+    reference = REFERENCE[kind]
+    anywhere = np.zeros((1, model.n))
+    plan = flat_multisine(model, anywhere, name=kind, payload=payload, reference=reference, seed=seed)
+    plan = replace(plan, poses=read_frequency_poses(poses_file, kind, model, room(model, reference)))
+    share = float(np.clip(share_at_rest(model, plan), _LEAST, 1.0))
+    return replace(plan, amplitude=share * plan.amplitude)
+
+
+def read_frequency_poses(
+    path: Path, kind: str, model: RobotModel, room: np.ndarray | float = 0.0
+) -> np.ndarray:
+    """Poses (P, n) in rad of one plan from a table with columns plan, pose, q1_deg … qn_deg.
+
+    Raises `InputError` with file, line and column for what does not fit and for a joint with less than `room` (n,) rad to its limits.
+    """
+    file = open_table(path)
+    columns = [f"q{i}_deg" for i in range(1, model.n + 1)]
+    if file.columns != ("plan", "pose", *columns):
+        raise file.error(
+            f"the columns are {', '.join(file.columns)}, but for {model.path} they must be plan, pose, {', '.join(columns)}."
+        )
+    table = file.read(("plan", "pose"))
+    rows = np.flatnonzero(table.columns["plan"] == kind)
+    if not len(rows):
+        raise InputError(f"{path}: there is no pose of the plan '{kind}'.")
+    poses = np.stack([table.columns[column] for column in columns], axis=1)[rows] * DEGREE
+    check_joint_limits(model, table, rows, columns, poses, room)
+    return poses

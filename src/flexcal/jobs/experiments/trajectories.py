@@ -1,0 +1,248 @@
+"""Design of exciting trajectories."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.data.plans import TrajectoryPlan, page_beside, read_plan_of, write_plan
+from flexcal.design.optimality import condition_number
+from flexcal.design.trajectories import (
+    COULOMB,
+    VISCOUS,
+    Kind,
+    SequenceName,
+    TimedMotion,
+    TorqueColumns,
+    TrajectoryCriterion,
+    TrajectoryDesign,
+    design_trajectories,
+    require_stated_limits,
+    sequence,
+    timed_motion,
+    with_assumed_friction,
+)
+from flexcal.errors import InputError
+from flexcal.files.formats import provenance
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+from flexcal.report.pages import write_trajectory_page
+
+SEARCHES = 3
+ALIKE = 1.3
+"""Condition numbers of searches that differ by more than this factor are said."""
+LEAST_RATE_HZ = 100.0
+"""Of timed joint positions, where none is asked for; more where the motion is fast."""
+_INSTANTS_A_PERIOD = 50
+"""Of the highest harmonic."""
+_NEXT_SEED = 7919
+
+
+@dataclass(frozen=True)
+class TrajectoryRequest:
+    """What is asked of a design; see `design_trajectories`. The best of so many `searches` counts, each from a start of its own."""
+
+    count: int = 3
+    criterion: TrajectoryCriterion = "compound"
+    of: tuple[str, ...] = ()
+    sequence: SequenceName | None = None
+    after: Path | None = None
+    kind: Kind = "fourier"
+    duration: float = 10.0
+    base_frequency_hz: float = 0.2
+    harmonics: int = 5
+    rest: bool = False
+    start: tuple[float, ...] = ()
+    share: float = 0.8
+    loaded: bool = False
+    searches: int = SEARCHES
+    steps: int = 20
+    seed: int = 0
+
+    def design(self, nominal: RobotModel, progress: Progress = silent) -> list[TrajectoryDesign]:
+        """The designs of all searches, best first.
+
+        Raises `FlexcalError` as `design_trajectories` does, and for a start of another number of joints.
+        """
+        if self.start and len(self.start) != nominal.n:
+            raise InputError(
+                f"the start has {len(self.start)} positions, but {nominal.name} has {nominal.n} joints; give one each."
+            )
+
+        def onward(search: int) -> Progress:
+            return lambda stage, share: progress(stage, (search + share) / self.searches)
+
+        found = [self._search(nominal, search, onward(search)) for search in range(self.searches)]
+        return sorted(found, key=lambda design: -design.merits[-1])
+
+    def _search(self, nominal: RobotModel, search: int, progress: Progress) -> TrajectoryDesign:
+        loaded = self.loaded or any(name.startswith("payload.") for name in self.of)
+        found = design_trajectories(
+            nominal,
+            self.count,
+            criterion=self.criterion,
+            of=self.of,
+            sequence=() if self.sequence is None else sequence(TorqueColumns.of(nominal), self.sequence),
+            after=None if self.after is None else read_plan_of(self.after, TrajectoryPlan),
+            kind=self.kind,
+            duration=self.duration,
+            base_frequency_hz=self.base_frequency_hz,
+            harmonics=self.harmonics,
+            rest=self.rest,
+            start=np.array(self.start) if self.start else None,
+            share=self.share,
+            payload=None if loaded or nominal.payload is None else 0.0,
+            starts=1,
+            steps=self.steps,
+            seed=self.seed + _NEXT_SEED * search,
+            progress=progress,
+        )
+        return replace(found, plan=replace(found.plan, seed=self.seed))
+
+
+@dataclass(frozen=True, eq=False)
+class DesignedTrajectories:
+    """The designs of all searches, best first, and the file that the plan of the first was written to.
+
+    `timed` are its trajectories as timed joint positions, `rate_hz` apart. `assumed_friction` names the joints of which robot.yaml gives no
+    friction.
+    """
+
+    designs: list[TrajectoryDesign]
+    timed: tuple[TimedMotion, ...]
+    rate_hz: float
+    assumed_friction: tuple[str, ...]
+    file: Path
+    provenance: Mapping[str, str]
+    command: str = ""
+
+    @property
+    def design(self) -> TrajectoryDesign:
+        """The best."""
+        return self.designs[0]
+
+    @property
+    def page(self) -> Path:
+        """Where the pictures are: beside the plan."""
+        return page_beside(self.file)
+
+    @property
+    def timed_files(self) -> list[tuple[Path, Path]]:
+        """CSV and ROS message of every trajectory, beside the plan."""
+        stems = [f"{self.file.stem}_{number}" for number in range(1, len(self.timed) + 1)]
+        return [
+            (self.file.with_name(f"{stem}.csv"), self.file.with_name(f"{stem}_ros.yaml")) for stem in stems
+        ]
+
+    @cached_property
+    def conditions(self) -> list[float]:
+        """Condition numbers of all searches, that of the plan first."""
+        return [condition_number(design.information[-1]) for design in self.designs]
+
+    @property
+    def remarks(self) -> tuple[str, ...]:
+        """One sentence each, on what the plan leans on."""
+        remarks = []
+        if self.assumed_friction:
+            remarks.append(
+                f"robot.yaml gives no friction of {', '.join(self.assumed_friction)}: {100 * COULOMB:.0f} % of the effort and "
+                f"{100 * VISCOUS:.0f} % more at the velocity limit are left free for it; for the torques that the drives really have left, "
+                "give `drives:` with `coulomb:` (N m) and `viscous:` (N m s/rad), for example of a first 'flexcal identify dynamics'"
+            )
+        if self.design.clearance is None:
+            remarks.append(
+                "the URDF has no collision shapes, so collisions are not excluded: run the motion in a simulator, or slowly, first"
+            )
+        least, most, kept = min(self.conditions), max(self.conditions), self.conditions[0]
+        if most > ALIKE * least:
+            remarks.append(
+                f"the {len(self.designs)} searches differ: their condition numbers are {least:.3g} to {most:.3g}, and {kept:.3g} of the "
+                "kept one, the best by its criterion; more searches may find a better plan (--searches 10)"
+            )
+        for motion, (file, _) in zip(self.timed, self.timed_files, strict=True):
+            what, share = max(motion.largest_shares.items(), key=lambda item: item[1])
+            if share > 1:
+                remarks.append(
+                    f"{file} takes {100 * share:.0f} % of the permitted {what} while it gets up speed; let the controller slow it down"
+                )
+        return tuple(remarks)
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        design, plan = self.design, self.design.plan
+        return {
+            "plan": self.file,
+            "trajectories": len(plan),
+            "base_frequency_hz": plan.base_frequency_hz,
+            "periods": plan.periods,
+            "payload": plan.payload,
+            "seconds_on_the_robot": len(plan) * plan.duration,
+            "base_parameters": design.columns.rank,
+            "condition": self.conditions[0],
+            "searches": [
+                {"condition": condition, "merit": found.merits[-1]}
+                for condition, found in zip(self.conditions, self.designs, strict=True)
+            ],
+            "criterion": design.goal.criterion.name,
+            "merits": list(design.merits),
+            "largest_shares": design.largest_shares(),
+            "clearance": design.clearance,
+            "prior_gain": design.prior_gain(),
+            "assumed_friction": list(self.assumed_friction),
+            "timed": [
+                {
+                    "csv": csv,
+                    "ros": ros,
+                    "rate_hz": self.rate_hz,
+                    "seconds": float(motion.positions.time[-1]),
+                    "run_up_s": motion.run_up,
+                }
+                for motion, (csv, ros) in zip(self.timed, self.timed_files, strict=True)
+            ],
+            "remarks": list(self.remarks),
+            "page": self.page,
+            "seed": plan.seed,
+            "provenance": dict(self.provenance),
+            "command": self.command,
+        }
+
+
+def plan_trajectories(
+    robot: Path,
+    out: Path,
+    request: TrajectoryRequest,
+    *,
+    rate_hz: float | None = None,
+    command: str = "",
+    progress: Progress = silent,
+) -> DesignedTrajectories:
+    """Write exciting trajectories of the nominal robot to the file `out`; beside it a page of pictures, and the motions as timed positions.
+
+    These come `rate_hz` a second; None: 100, more where a motion is fast. Raises `FlexcalError` as `design_trajectories` does.
+    """
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    require_stated_limits(nominal)
+    known, assumed = with_assumed_friction(nominal)
+    if rate_hz is None:
+        rate_hz = max(LEAST_RATE_HZ, _INSTANTS_A_PERIOD * request.harmonics * request.base_frequency_hz)
+    origin = provenance([robot, nominal.urdf, *(() if request.after is None else (request.after,))])
+    designs = request.design(known, progress)
+    timed = tuple(timed_motion(designs[0], number, rate_hz) for number in range(len(designs[0].plan)))
+    found = DesignedTrajectories(designs, timed, rate_hz, assumed, out, origin, command)
+    write_trajectory_page(found.page, found.design, found.document())
+    for motion, (csv, ros) in zip(timed, found.timed_files, strict=True):
+        motion.positions.write_csv(csv)
+        motion.positions.write_ros(ros)
+    write_plan(out, found.design.plan)
+    return found
+
+
+def exciting_plan(nominal: RobotModel, *, count: int = 3, seed: int) -> TrajectoryPlan:
+    """Trajectories of stage 0 of the demonstration: without payload, of one search, by the criterion posterior."""
+    request = TrajectoryRequest(count=count, criterion="posterior", searches=1, seed=seed)
+    return request.design(nominal)[0].plan

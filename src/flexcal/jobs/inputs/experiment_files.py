@@ -1,0 +1,86 @@
+"""Files that verbs pass to each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flexcal.data.experiments import PLAN
+from flexcal.data.plans import MultisinePlan, Plan, read_plan, read_plan_of
+from flexcal.errors import InputError
+from flexcal.files.formats import to_plain
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.jobs.inputs.distinct_files import require_distinct
+from flexcal.model.robot import RobotModel
+
+FREQUENCY_PLAN = "frequency_plan.yaml"
+_PLANS = (PLAN, FREQUENCY_PLAN)
+"""The frequency plan in a folder of responses: as 'identify response' leaves it, and as the demo does."""
+
+
+def robot_file(plan: Path, given: Path | None) -> Path:
+    """The robot.yaml of a plan: the one given, else that beside the plan, else that in the current folder; raises `InputError`."""
+    if given is not None:
+        return given
+    for folder in (plan.parent, Path()):
+        if (folder / "robot.yaml").is_file():
+            return folder / "robot.yaml"
+    raise InputError(f"there is no robot.yaml beside {plan} nor in the current folder; name it with --robot.")
+
+
+def example_robot(name: str) -> Path:
+    """robot.yaml of an example: in `examples/` of the current folder, else of flexcal's checkout; raises `InputError`."""
+    places = [Path("examples"), Path(__file__).parents[4] / "examples"]
+    for place in places:
+        if (place / name / "robot.yaml").is_file():
+            return place / name / "robot.yaml"
+    raise InputError(
+        f"the example '{name}' is not here; run in flexcal's folder, or name a robot.yaml with --robot."
+    )
+
+
+def read_fitting_plan(path: Path, model: RobotModel) -> Plan:
+    """A plan for this robot; raises `InputError` where it has another number of joints."""
+    plan = read_plan(path)
+    if plan.joint_count != model.n:
+        raise InputError(
+            f"{path}: the plan is for {plan.joint_count} joints, but {model.path} has {model.n}; give the plan of this robot."
+        )
+    return plan
+
+
+def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path], list[FrequencyResponse]]:
+    """Frequency responses of a robot from files, or from the response_pose_<p>.npz of folders, by pose number; raises `InputError`."""
+    files: list[Path] = []
+    for path in paths:
+        found = sorted(path.glob("response_pose_*.npz")) if path.is_dir() else [path]
+        if not found:
+            raise InputError(
+                f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first."
+            )
+        files += found
+    require_distinct(files)
+    responses = [FrequencyResponse.load(file) for file in files]
+    for file, response in zip(files, responses, strict=True):
+        if response.q_mean.size != model.n:
+            raise InputError(
+                f"{file} is of a robot of {response.q_mean.size} joints, but {model.path} has {model.n}; give the responses of this robot."
+            )
+    order = sorted(range(len(files)), key=lambda i: responses[i].pose)
+    return [files[i] for i in order], [responses[i] for i in order]
+
+
+def plan_files(files: Sequence[Path]) -> list[Path]:
+    """The frequency plans beside responses, one a folder; none where a folder lacks it."""
+    folders = dict.fromkeys(file.parent for file in files)
+    found = [next((f / name for name in _PLANS if (f / name).is_file()), None) for f in folders]
+    return [path for path in found if path is not None] if all(found) else []
+
+
+def common_plan(paths: Sequence[Path]) -> MultisinePlan | None:
+    """The plan in these files, None without any; raises `InputError` where plans differ."""
+    plans = [read_plan_of(path, MultisinePlan) for path in paths]
+    for path, plan in zip(paths[1:], plans[1:], strict=True):
+        if to_plain(plan) != to_plain(plans[0]):
+            raise InputError(f"{path} is another plan than {paths[0]}; identify from responses of one plan.")
+    return plans[0] if plans else None

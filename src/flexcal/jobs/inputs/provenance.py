@@ -1,0 +1,16 @@
+"""Provenance of pages that are based on the present robot model."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from flexcal.files.formats import provenance, read_estimates
+from flexcal.model.robot import RobotModel
+
+
+def robot_origin(model: RobotModel, files: Iterable[Path] = ()) -> dict[str, str]:
+    """Program, and SHA-256 of robot.yaml, its URDF, all blocks of its estimates where there are some, and the `files`."""
+    stored = model.path.parent / model.config.estimates
+    blocks = tuple(read_estimates(stored)) if stored.exists() else ()
+    return provenance([model.path, model.urdf, *files], estimates=stored, blocks=blocks)

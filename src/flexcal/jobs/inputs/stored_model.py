@@ -1,0 +1,112 @@
+"""The calibrated robot, from robot.yaml and stored estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+
+from flexcal.calibration.fit import found_point, probable_robot
+from flexcal.errors import InputError
+from flexcal.estimation import Estimate
+from flexcal.files.formats import BLOCKS, Block, read_estimates, read_yaml_file
+from flexcal.jobs.result_files import ESTIMATES
+from flexcal.model.robot import RobotModel, with_blocks
+
+TARGETS = "targets"
+"""Option in the provenance of a calibration: the points that it measured."""
+TARGETS_BETWEEN = ", "
+
+
+@dataclass(frozen=True, eq=False)
+class CalibratedRobot:
+    """`nominal` as robot.yaml and URDF have it, `model` with the `blocks` of the estimates in the file `stored`."""
+
+    nominal: RobotModel
+    model: RobotModel
+    stored: Path
+    blocks: Mapping[Block, Estimate]
+
+    @property
+    def measured(self) -> tuple[str, ...]:
+        """The points that the calibration measured."""
+        return measured_points(self.nominal, self.blocks)
+
+    @cached_property
+    def probable(self) -> RobotModel:
+        """`model` with the most probable values of the directions that the measured points do not determine; for all other frames."""
+        return probable_robot(self.model, self.measured)
+
+    @cached_property
+    def found(self) -> RobotModel:
+        """`nominal` with the measured points at their calibrated positions on the tool."""
+        return found_point(self.nominal, self.probable, self.measured)
+
+
+def unmeasured_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:
+    """A sentence on those of the `targets` that no calibration pose measured; none where there are none."""
+    named = [name for name in targets if name not in calibrated.measured]
+    if not named:
+        return ()
+    return (
+        f"no calibration pose measured {' and '.join(named)}: its position on the tool is the declared one, whose error is not part of the "
+        "predicted uncertainty",
+    )
+
+
+def measured_points(nominal: RobotModel, blocks: Mapping[Block, Estimate]) -> tuple[str, ...]:
+    """The points that the calibration among `blocks` measured; none without one."""
+    if "calibration" not in blocks:
+        return ()
+    estimate = blocks["calibration"]
+    said = estimate.provenance.get(f"option.{TARGETS}")
+    if said is not None:
+        return tuple(name for name in said.split(TARGETS_BETWEEN) if name in nominal.points)
+    further = (name for name in nominal.points if f"point.{name}.x" in estimate.parameters)
+    return tuple(dict.fromkeys([*list(nominal.points)[:1], *further]))
+
+
+def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
+    """The estimates.yaml of a robot: that named or in the folder named, else that beside robot.yaml.
+
+    Raises `InputError` where what is named is another kind of file, or a folder without one.
+    """
+    if estimates is None:
+        return nominal.path.parent / nominal.config.estimates
+    expected = f"--estimates takes the {ESTIMATES} that 'flexcal calibrate' or another identification wrote, or the folder with it"
+    if estimates.is_dir():
+        if not (estimates / ESTIMATES).is_file():
+            raise InputError(f"{estimates} holds no {ESTIMATES}; {expected}.")
+        return estimates / ESTIMATES
+    if estimates.suffix not in ("", ".yaml", ".yml"):
+        raise InputError(f"{estimates} is no {ESTIMATES}; {expected}.")
+    if estimates.is_file():
+        blocks = read_yaml_file(estimates).data
+        if not isinstance(blocks, dict) or not set(BLOCKS) & set(blocks):
+            raise InputError(f"{estimates} holds no estimates; {expected}.")
+    return estimates
+
+
+def found_station(model: RobotModel, station: str) -> bool:
+    """Whether the calibration estimated the placement of this station."""
+    return f"station.{station}.x" in model.posterior.parameters
+
+
+def calibrated_robot(robot: Path, estimates: Path | None, task: str) -> CalibratedRobot:
+    """Read a robot and its estimates: a file, or a folder with an estimates.yaml, in place of that beside robot.yaml.
+
+    Raises `FlexcalError` as reading does, and `InputError` where there is no calibration, and so nothing to `task`.
+    """
+    nominal = RobotModel.from_yaml(robot, estimates=False)
+    stored = stored_estimates(nominal, estimates)
+    if not stored.exists():
+        raise InputError(
+            f"{stored} does not exist, so there is nothing to {task}; run 'flexcal calibrate {nominal.path} POSES…' first."
+        )
+    blocks = read_estimates(stored)
+    if "calibration" not in blocks:
+        raise InputError(
+            f"{stored}: there is no calibration in it; run 'flexcal calibrate {robot} POSES…' first."
+        )
+    return CalibratedRobot(nominal, with_blocks(nominal, blocks, stored), stored, blocks)

@@ -1,0 +1,85 @@
+"""Checks of joint logs: payload column, force sensor's columns, and torques against gravity."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from flexcal.dynamics.signals import JointLog
+from flexcal.errors import InputError
+from flexcal.model.robot import RobotModel
+
+
+def log_payloads(logs: Sequence[JointLog], model: RobotModel) -> list[float]:
+    """kg, one a log; 0 where robot.yaml declares none. Raises `InputError` for a log that does not say, though one is declared."""
+    return [_payload(log, model) for log in logs]
+
+
+def _payload(log: JointLog, model: RobotModel) -> float:
+    if model.payload is None:
+        return 0.0
+    if log.payload is None:
+        raise InputError(
+            f"{log.path}: a payload is declared in {model.path.name}, but the log does not say whether it was held; add a column "
+            "'payload' (kg; 0 without it)."
+        )
+    return log.payload
+
+
+def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
+    """Raises `InputError` for a log that was recorded with a payload."""
+    for log, held in zip(logs, log_payloads(logs, model), strict=True):
+        if held > 0:
+            raise InputError(
+                f"{log.path}: recorded with a payload of {held:g} kg, but the robot's own dynamics need logs without; give both kinds to "
+                "'flexcal identify gains'."
+            )
+
+
+def require_wrenches(logs: Sequence[JointLog], model: RobotModel) -> None:
+    """Raises `InputError` for a log without the columns of the force sensor that robot.yaml declares."""
+    for log in logs:
+        if model.force_sensor is not None and not log.wrench:
+            raise InputError(
+                f"{log.path}: robot.yaml declares a force sensor, but the columns fx, fy, fz, mx, my, mz are missing, so what acts beyond "
+                "it is unknown; add them, or remove `force_sensor:` if nothing is beyond it."
+            )
+
+
+def require_no_wrenches(logs: Sequence[JointLog]) -> None:
+    """Raises `InputError` for a log with the columns of a force sensor, which carries the payload and so takes it out of the torques."""
+    for log in logs:
+        if log.wrench:
+            raise InputError(
+                f"{log.path}: the force sensor's columns (fx, …) contain the payload, which would be taken out of the torques with them; "
+                "remove these columns."
+            )
+
+
+_OVERRIDE = (
+    "; where springs balance the arm, declare them under `dynamics: joint_springs:`, and where its masses in the URDF are guesses, go on "
+    "with --accept weight"
+)
+
+
+def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
+    """A sentence for every log of torques that are the motors' own, or of the other sign."""
+    for log in logs:
+        joint = log.weight.reversed
+        if joint is not None:
+            yield (
+                f"{log.path}: the torque of {model.joint_names[joint]} has the sign of its gravity torque instead of the "
+                "opposite; change its sign by "
+                "`tau: {gain: […]}` under `signals:`, or correct `gravity:` in robot.yaml"
+            )
+        elif log.weight.by_motors:
+            yield (
+                f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} is only {log.weight.share:.2%} of its "
+                "gravity torque; these look "
+                "like torques on the motor side: declare gear ratios as `tau: {gain: […]}` under `signals:`"
+            )
+
+
+def require_joint_torques(logs: Sequence[JointLog], model: RobotModel) -> None:
+    """Raises `InputError` for the first of the `weight_faults`."""
+    for fault in weight_faults(logs, model):
+        raise InputError(f"{fault}{_OVERRIDE}.")

@@ -1,0 +1,108 @@
+"""Logs of a robot, divided into a fitted and a held-out part."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flexcal.dynamics.diagnostics import TorquePrediction
+from flexcal.dynamics.estimators import RecordedRows
+from flexcal.dynamics.inverse_model import BaseParameters, Observation
+from flexcal.dynamics.regression import ExperimentSystem, batches_each
+from flexcal.dynamics.signals import JointLog, Window
+from flexcal.estimation import Estimate
+from flexcal.jobs.logs.checks import require_joint_torques, require_unloaded, require_wrenches
+from flexcal.jobs.logs.preprocessing import Treatment
+from flexcal.jobs.logs.regression_systems import LogPart, log_systems, read_logs, split, watched
+from flexcal.jobs.logs.torque_predictions import log_predictions
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress
+
+
+@dataclass(frozen=True, eq=False)
+class DividedLogs:
+    """All `logs`, filtered; the parts of them that are `fitted`, and those `unseen`; each log's time in s `borders` between both.
+
+    Equations are made by so many `jobs` (processes).
+    """
+
+    logs: tuple[JointLog, ...]
+    borders: tuple[float, ...]
+    fitted: tuple[LogPart, ...]
+    unseen: tuple[LogPart, ...]
+    treatment: Treatment
+    jobs: int
+    progress: Progress
+
+    @classmethod
+    def read(
+        cls,
+        fit: Sequence[Path],
+        validate: Sequence[Path],
+        hold_out: float,
+        model: RobotModel,
+        treatment: Treatment,
+        scratch: Path,
+        *,
+        accept_weight: bool = False,
+        jobs: int,
+        progress: Progress,
+    ) -> DividedLogs:
+        """The last share `hold_out` of the time of every log to `fit` is unseen, and so are the logs `validate`.
+
+        Filtered logs are files of the folder `scratch`. Raises `InputError` and `FlexcalError` for a log that lies, has a payload, or
+        has the torques of motors without a map, unless they are to be accepted (`accept_weight`).
+        """
+        seen, others = (read_logs(paths, model, treatment, scratch, jobs=jobs) for paths in (fit, validate))
+        require_unloaded([*seen, *others], model)
+        if not accept_weight:
+            require_joint_torques([*seen, *others], model)
+        require_wrenches([*seen, *others], model)
+        windows = [split(log, treatment, hold_out) for log in seen]
+        late = [LogPart(log, w) for log, (_, w) in zip(seen, windows, strict=True) if w is not None]
+        borders = [math.inf if w is None else w.start for _, w in windows]
+        return cls(
+            (*seen, *others),
+            (*borders, *(-math.inf for _ in others)),
+            tuple(LogPart(log, early) for log, (early, _) in zip(seen, windows, strict=True)),
+            (*late, *(LogPart(log, Window()) for log in others)),
+            treatment,
+            jobs,
+            progress,
+        )
+
+    def equations(self, observation: Observation) -> list[ExperimentSystem]:
+        """Of what is fitted."""
+        return self._systems(self.fitted, observation, batches_each(len(self.fitted)))
+
+    def unseen_equations(self, observation: Observation) -> list[ExperimentSystem]:
+        """Of what is not."""
+        return self._systems(self.unseen, observation, 1)
+
+    def rows(self, observation: Observation, base: BaseParameters) -> RecordedRows:
+        """Of what is fitted, log after log in this process; every pass over them is told anew."""
+        return self._rows(self.fitted, observation, base)
+
+    def unseen_rows(self, observation: Observation, base: BaseParameters) -> RecordedRows | None:
+        """Of what is not, if there is any."""
+        return self._rows(self.unseen, observation, base) if self.unseen else None
+
+    def predictions(self, observation: Observation, estimate: Estimate) -> list[TorquePrediction]:
+        """Of all logs, for the report."""
+        predicted = [(observation, estimate.parameters.coordinates())] * len(self.logs)
+        return log_predictions(self.logs, self.borders, predicted, self.treatment, progress=self.progress)
+
+    def _systems(
+        self, parts: Sequence[LogPart], observation: Observation, batches: int
+    ) -> list[ExperimentSystem]:
+        return log_systems(
+            parts, observation, self.treatment, batches=batches, jobs=self.jobs, progress=self.progress
+        )
+
+    def _rows(self, parts: Sequence[LogPart], observation: Observation, base: BaseParameters) -> RecordedRows:
+        logs = [part.log for part in watched(parts, "estimating", self.progress)]
+        windows = [part.window for part in parts]
+        treatment = self.treatment
+        return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

@@ -1,0 +1,123 @@
+"""Filtering and decimation of a log: as robot.yaml declares, else proposed from the motion."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.data.recordings import Decimation
+from flexcal.dynamics.regression import CutoffChoice, Piece, choose_cutoff, pieces
+from flexcal.dynamics.signals import JointLog, log_blocks, motion_bandwidth
+from flexcal.errors import InputError
+from flexcal.model.robot import RobotModel
+
+_PASSED = 20.0
+"""Cut-off, and rows a second, over the bandwidth of the motion: ten times twice of it, as products of two velocities reach twice as far."""
+_HIGHEST = 0.4
+"""Cut-off over the sampling rate, at most."""
+_REVERSALS = 0.1
+"""Cut-off over the sampling rate, at least, where springs are identified."""
+_ROWS = 4.0
+"""Rows a second over a cut-off that is chosen by cross-validation: twice what it passes."""
+_SAMPLES = 40_000
+"""Of all logs, at most, that cross-validation looks at."""
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """Low-pass of the positions, decimation, and whether standstill is masked; `proposed` names what robot.yaml lacks.
+
+    `choice` is that of a cut-off by cross-validation, None where the spectrum alone tells it.
+    """
+
+    cutoff_hz: float
+    decimation: Decimation
+    mask_standstill: bool
+    proposed: tuple[str, ...] = ()
+    choice: CutoffChoice | None = None
+
+
+def treatment_of(
+    model: RobotModel, logs: Sequence[Path], *, flexible: bool = False, loaded: Sequence[bool] | None = None
+) -> Treatment:
+    """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
+
+    The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities, unless a lower one predicts the torques of
+    left-out blocks better (`choose_cutoff`); logs differ in load where `loaded` or their column says so. For `flexible` drives it is a
+    tenth of the sampling rate, where that is more: a low-pass sees the motor reverse late, as its Coulomb friction brakes it before and
+    after, and what friction then lacks looks like more stiffness. Raises `InputError` where a log that is needed for it shows no motion.
+    """
+    declared = model.config.dynamics
+    if declared.cutoff_hz is not None and declared.decimation is not None:
+        return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
+    found = [motion_bandwidth(log_blocks(log, model)) for log in logs]
+    for log, motion in zip(logs, found, strict=True):
+        if motion.frequency_hz == 0:
+            raise InputError(
+                f"{log}: the positions show no motion above their noise; record a motion that excites all joints."
+            )
+    rate = min(motion.rate_hz for motion in found)
+    wanted = rows_hz = min(_PASSED * max(motion.frequency_hz for motion in found), _HIGHEST * rate)
+    choice = None
+    if flexible:
+        wanted = max(wanted, _REVERSALS * rate)
+    elif declared.cutoff_hz is None:
+        choice = _chosen(model, logs, wanted, loaded)
+        if choice is not None:
+            wanted, rows_hz = choice.cutoff_hz, min(rows_hz, _ROWS * choice.cutoff_hz)
+    proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
+    return Treatment(
+        float(f"{wanted:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
+        Decimation.near(rate / rows_hz) if declared.decimation is None else Decimation(declared.decimation),
+        declared.mask_standstill,
+        proposed,
+        choice,
+    )
+
+
+def _chosen(
+    model: RobotModel, logs: Sequence[Path], proposed_hz: float, loaded: Sequence[bool] | None
+) -> CutoffChoice | None:
+    """By cross-validation within the logs of each load."""
+    loads: dict[tuple[bool, float | None], list[Piece]] = {}
+    for number, log in enumerate(logs):
+        for piece in pieces(log_blocks(log, model), _SAMPLES // len(logs), proposed_hz):
+            load = (bool(loaded and loaded[number]), piece.payload)
+            loads.setdefault(load, []).append(piece)
+    return choose_cutoff(model, list(loads.values()), proposed_hz)
+
+
+def used_signals(treatment: Treatment, logs: Sequence[JointLog]) -> dict[str, Any]:
+    """The entry `signals` of results.json: filters, and what was done with the time stamps of each log where they are not uniform."""
+    return {
+        "cutoff_hz": treatment.cutoff_hz,
+        "decimation": treatment.decimation.factor,
+        "proposed": list(treatment.proposed),
+        "cross_validation": None
+        if treatment.choice is None
+        else {
+            "error_percent": 100 * treatment.choice.error,
+            "error_of_spectrum_percent": 100 * treatment.choice.proposed_error,
+        },
+        "time_stamps": {str(log.path): log.time_stamps for log in logs if log.time_stamps},
+    }
+
+
+def signal_sentences(signals: Mapping[str, Any]) -> list[str]:
+    """The same in words: what was proposed and from what, and the treatment of time stamps."""
+    said = []
+    if signals["proposed"]:
+        tried = signals["cross_validation"]
+        source = "the spectrum of the motion" if tried is None else "the torques of left-out blocks"
+        said.append(
+            f"proposed from {source}, because robot.yaml lacks {' and '.join(signals['proposed'])}: "
+            f"'dynamics: {{cutoff_hz: {signals['cutoff_hz']:g}, decimation: {signals['decimation']}}}'"
+        )
+        if tried is not None:
+            said.append(
+                f"with ten times the bandwidth of the positions as cut-off, which noise increases, the error in left-out blocks would be "
+                f"{tried['error_of_spectrum_percent']:.1f} % instead of {tried['error_percent']:.1f} %"
+            )
+    return said + [f"{log}: {words}" for log, words in signals["time_stamps"].items()]

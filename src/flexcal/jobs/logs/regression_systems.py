@@ -1,0 +1,117 @@
+"""Equations of joint logs, one after the other or in several processes."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.dynamics.inverse_model import Observation
+from flexcal.dynamics.regression import ExperimentSystem, experiment_system
+from flexcal.dynamics.signals import JointLog, Window
+from flexcal.jobs.logs.preprocessing import Treatment
+from flexcal.jobs.logs.worker_processes import WorkerTask, start_workers
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress
+
+_LEAST = 1e-6
+"""Share of a log that is fitted, at least, when it is told how much of that is done."""
+
+
+@dataclass(frozen=True, eq=False)
+class LogPart:
+    """What of a log lies in a window of time."""
+
+    log: JointLog
+    window: Window
+
+
+def read_logs(
+    paths: Sequence[Path], model: RobotModel, treatment: Treatment, scratch: Path, *, jobs: int
+) -> list[JointLog]:
+    """The logs, filtered into files of the folder `scratch`, so many at once as there are `jobs` (processes).
+
+    Raises `InputError` and `FlexcalError` as `JointLog.read` does.
+    """
+    if jobs == 1:
+        return [JointLog.read(path, model, treatment.cutoff_hz, scratch) for path in paths]
+    from joblib import Parallel, delayed
+
+    start_workers(jobs)
+    read: Any = Parallel(n_jobs=jobs)(
+        delayed(WorkerTask(JointLog.read))(path, model, treatment.cutoff_hz, scratch) for path in paths
+    )
+    return read
+
+
+def log_systems(
+    parts: Sequence[LogPart],
+    observation: Observation,
+    treatment: Treatment,
+    *,
+    batches: int,
+    jobs: int,
+    progress: Progress,
+) -> list[ExperimentSystem]:
+    """The equations of every part, in their order, whatever the number of `jobs` (processes) is.
+
+    Each part has at most about so many `batches`. Raises `FlexcalError` as `experiment_system` does.
+    """
+    if jobs == 1:
+        progress("reading", 0.0)
+        found = [
+            _log_system(part, observation, treatment, batches) for part in watched(parts, "reading", progress)
+        ]
+        progress("reading", 1.0)
+        return found
+    from joblib import Parallel, delayed
+
+    systems = Parallel(n_jobs=jobs, return_as="generator")(
+        delayed(WorkerTask(_log_system))(part, observation, treatment, batches) for part in parts
+    )
+    progress("reading", 0.0)
+    found = []
+    for system in systems:
+        found.append(system)
+        progress("reading", len(found) / len(parts))
+    return found
+
+
+def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window, Window | None]:
+    """What of a log is fitted, and its last share `hold_out` of time, if there is one; the filters reach from neither into the other."""
+    if hold_out == 0:
+        return Window(), None
+    border = log.last(hold_out)
+    reach = treatment.decimation.support * log.time_step
+    return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
+
+
+def watched(parts: Sequence[LogPart], stage: str, progress: Progress) -> list[LogPart]:
+    """The parts, of which every pass over all of them is told to `progress` as a `stage`."""
+
+    def told(number: int, until: float) -> Callable[[float], None]:
+        return lambda share: progress(stage, (number + min(1.0, share / until)) / len(parts))
+
+    found = []
+    for number, part in enumerate(parts):
+        start, end = part.log.span
+        until = max((min(end, part.window.end) - start) / (end - start), _LEAST)
+        found.append(replace(part, log=replace(part.log, watch=told(number, until))))
+    return found
+
+
+def _log_system(
+    part: LogPart, observation: Observation, treatment: Treatment, batches: int
+) -> ExperimentSystem:
+    return experiment_system(
+        observation,
+        part.log,
+        treatment.decimation,
+        part.window,
+        mask_standstill=treatment.mask_standstill,
+        batches=batches,
+    )

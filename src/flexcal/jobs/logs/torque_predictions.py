@@ -1,0 +1,39 @@
+"""Predicted torques of every log, for the report."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexcal.dynamics.diagnostics import TorquePrediction, predict_torques
+from flexcal.dynamics.inverse_model import Observation
+from flexcal.dynamics.signals import JointLog
+from flexcal.jobs.logs.preprocessing import Treatment
+from flexcal.progress import Progress
+
+_POINTS = 6000
+"""Points of each joint in all logs together, about: what a page can carry."""
+_FEWEST = 300
+"""Points of each joint in one log, at least."""
+
+
+def log_predictions(
+    logs: Sequence[JointLog],
+    held_out_from: Sequence[float],
+    predicted: Sequence[tuple[Observation, np.ndarray]],
+    treatment: Treatment,
+    *,
+    progress: Progress,
+) -> list[TorquePrediction]:
+    """One a log, which the fit did not see from its time `held_out_from` on, s; `predicted` has each one's columns and parameters (p,)."""
+    points = max(_FEWEST, _POINTS // len(logs))
+    found = []
+    progress("report", 0.0)
+    for log, border, (observation, parameters) in zip(logs, held_out_from, predicted, strict=True):
+        prediction = predict_torques(
+            observation, parameters, log, treatment.decimation, held_out_from=border, points=points
+        )
+        found.append(prediction)
+        progress("report", len(found) / len(logs))
+    return found

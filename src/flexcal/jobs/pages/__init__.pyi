@@ -1,0 +1,10 @@
+from .comparison import compare_folders
+from .customer import customer_report
+from .report import report_folder, two_stage_study
+
+__all__ = [
+    "compare_folders",
+    "customer_report",
+    "report_folder",
+    "two_stage_study",
+]

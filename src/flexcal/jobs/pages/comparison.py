@@ -1,0 +1,119 @@
+"""Two folders of the same verb, side by side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from flexcal.data.poses import DEFAULT_SIGMA
+from flexcal.errors import InputError
+from flexcal.files.formats import read_estimates
+from flexcal.jobs.pages.report import OF_CALIBRATION, OF_VERIFICATION, lacking
+from flexcal.jobs.result_files import (
+    ESTIMATES,
+    RESULTS,
+    VERIFICATION,
+    read_points,
+    read_results,
+    read_verification,
+)
+from flexcal.report.pages import write_comparison
+from flexcal.report.results import Comparison, Run
+from flexcal.report.sections import common_origin
+
+COMPARISON = "comparison.html"
+_DECLARED = (".yaml", ".yml", ".urdf", ".xml")
+"""Inputs that say what the robot is, and measure nothing."""
+
+
+def compare_folders(first: Path, second: Path) -> dict[str, Any]:
+    """Write comparison.html into the folder `first`, and return its numbers.
+
+    Raises `InputError` where one holds no calibration, verification or demo, they are of different kinds or robots, or both are the same.
+    """
+    if first.resolve() == second.resolve():
+        raise InputError(f"{first} and {second} are the same folder; give two.")
+    names = _names(first, second)
+    one, two = _run(first, names[0]), _run(second, names[1])
+    if one.kind != two.kind:
+        raise InputError(f"{first} is a {one.kind}, {second} a {two.kind}; compare two of the same kind.")
+    if one.robot != two.robot or one.q.shape[1] != two.q.shape[1]:
+        raise InputError(
+            f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot."
+        )
+    found = Comparison(one, two)
+    write_comparison(first / COMPARISON, found)
+    return found.document()
+
+
+def _names(first: Path, second: Path) -> tuple[str, str]:
+    """The folders' names, with as much of the path as tells them apart."""
+    parts = [path.resolve().parts for path in (first, second)]
+    for depth in range(1, max(len(p) for p in parts) + 1):
+        one, two = ("/".join(p[-depth:]) for p in parts)
+        if one != two:
+            return one, two
+    raise InputError(f"{first} and {second} are the same folder; give two.")
+
+
+def _run(folder: Path, name: str) -> Run:
+    try:
+        return _left(folder, name)
+    except KeyError as problem:
+        raise lacking(folder, problem) from problem
+
+
+def _left(folder: Path, name: str) -> Run:
+    if not (folder / RESULTS).is_file():
+        raise InputError(
+            f"{folder} holds no {RESULTS}; give a folder that calibrate, verify or demo wrote with --out."
+        )
+    results = read_results(folder)
+    path = folder / ESTIMATES
+    estimates = read_estimates(path) if path.is_file() else {}
+    origin: dict[str, str] = {"command": results.get("command", "")}
+    if OF_VERIFICATION in results or OF_CALIBRATION in results:
+        points = read_points(folder, sigma=DEFAULT_SIGMA)
+        verified = OF_VERIFICATION in results
+        found = results["provenance"] if verified else common_origin(estimates)
+        return Run(
+            name=name,
+            kind="verification" if verified else "calibration",
+            robot=results["robot"],
+            q=points.poses.q,
+            points=points.poses.position,
+            errors=points.calibrated,
+            fresh=verified and not results["fitted"],
+            before=points.before,
+            estimates=estimates,
+            data=_data(found),
+            origin=origin | found,
+        )
+    if "plan" in results and (folder / VERIFICATION).is_file():
+        found = common_origin(estimates)
+        fresh, _ = read_verification(folder / VERIFICATION)
+        return Run(
+            name=name,
+            kind="demo",
+            robot=results["robot"],
+            q=fresh.poses.q,
+            points=fresh.poses.position,
+            errors=fresh.calibrated,
+            fresh=True,
+            before=fresh.before,
+            estimates=estimates,
+            data=_data(found),
+            origin=origin | found,
+        )
+    raise InputError(f"{folder} is no folder of calibrate, verify or demo; only these can be compared.")
+
+
+def _data(origin: Mapping[str, str]) -> dict[str, str]:
+    """Digests of measurements and of blocks that were used, by name."""
+    return {
+        key.partition(".")[2]: value
+        for key, value in origin.items()
+        if key.startswith("block.")
+        or (key.startswith("input.") and not key.split(" (")[0].endswith(_DECLARED))
+    }

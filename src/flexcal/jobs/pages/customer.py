@@ -1,0 +1,41 @@
+"""The customer's version of a report, from a folder of calibrate or verify."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from flexcal.data.poses import DEFAULT_SIGMA
+from flexcal.errors import InputError
+from flexcal.jobs.pages.report import OF_CALIBRATION, OF_VERIFICATION, calibration_study, lacking
+from flexcal.jobs.result_files import read_points, read_results
+from flexcal.report.checks import Trust
+from flexcal.report.pages import CustomerStudy, calibration_checks, verification_checks, write_customer_report
+from flexcal.report.results import Particulars
+from flexcal.report.sections import input_files
+
+CUSTOMER = "customer.html"
+
+
+def customer_report(folder: Path, particulars: Particulars) -> Path:
+    """Write customer.html of a folder of `calibrate` or `verify`.
+
+    Raises `InputError` for the folder of another verb, and where a file is not there or cannot be read.
+    """
+    results, path = read_results(folder), folder / CUSTOMER
+    try:
+        if OF_VERIFICATION in results:
+            points, origin = read_points(folder, sigma=DEFAULT_SIGMA), results["provenance"]
+            trust = Trust(verification_checks(results, points))
+        elif OF_CALIBRATION in results:
+            study = calibration_study(folder)
+            points, origin = study.points, study.estimate.provenance
+            trust = Trust(calibration_checks(results, study.estimate, points))
+        else:
+            raise InputError(
+                f"{folder} holds no calibration or verification of measured points; give a folder that calibrate or verify "
+                "wrote with --out."
+            )
+        write_customer_report(path, CustomerStudy(results, points, trust, input_files(origin), particulars))
+    except KeyError as problem:
+        raise lacking(folder, problem) from problem
+    return path

@@ -1,0 +1,147 @@
+"""Report of a folder that a verb has written."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from flexcal.data.plans import MultisinePlan, read_plan_of
+from flexcal.data.poses import DEFAULT_SIGMA
+from flexcal.errors import InputError
+from flexcal.estimation import Estimate
+from flexcal.files.formats import Block, read_estimates
+from flexcal.files.transaction import current
+from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.jobs.inputs import FREQUENCY_PLAN
+from flexcal.jobs.result_files import (
+    ESTIMATES,
+    RESULTS,
+    VERIFICATION,
+    read_arm,
+    read_fitted,
+    read_loads,
+    read_points,
+    read_predictions,
+    read_response_arrays,
+    read_results,
+    read_verification,
+)
+from flexcal.report.pages import (
+    CalibrationStudy,
+    DynamicsStudy,
+    ExcitationStudy,
+    InertialsStudy,
+    PayloadStudy,
+    ResponseStudy,
+    StiffnessStudy,
+    VerificationStudy,
+    write_calibration_report,
+    write_dynamics_report,
+    write_excitation_report,
+    write_gains_report,
+    write_inertials_report,
+    write_payload_report,
+    write_response_report,
+    write_stiffness_report,
+    write_two_stage_report,
+    write_verification_report,
+)
+from flexcal.report.results import TX90L_PAPER, TwoStageStudy
+from flexcal.units import MILLIMETRE
+
+REPORT = "report.html"
+_DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"
+_PAYLOAD, _RESPONSES, _EXCITATION = "declaration", "responses", "excitation"
+OF_CALIBRATION, OF_VERIFICATION, OF_DEMO = "term_selection", "rms_mm", "calibration_fit"
+"""What results.json of `identify dynamics`, `inertials`, `gains`, `stiffness`, `payload` and `response`, of `calibrate`, of `verify` and of
+`demo` holds, and no other; the demo has a `stage1` too."""
+
+
+def report_folder(folder: Path) -> Path:
+    """Write report.html of a folder from what a verb left in it: results.json and, as they are there, estimates, points or responses.
+
+    Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
+    """
+    if not current(folder / RESULTS).is_file():
+        raise InputError(
+            f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out."
+        )
+    results, path = read_results(folder), folder / REPORT
+    try:
+        if _INERTIALS in results:
+            write_inertials_report(path, InertialsStudy(results, _block(folder, "dynamics")))
+        elif _GAINS in results:
+            write_gains_report(path, results)
+        elif _PAYLOAD in results:
+            payload = PayloadStudy(results, _block(folder, "payload"), read_predictions(folder))
+            write_payload_report(path, payload)
+        elif _DYNAMICS in results:
+            dynamics = DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder))
+            write_dynamics_report(path, dynamics)
+        elif OF_VERIFICATION in results:
+            points = read_points(folder, sigma=DEFAULT_SIGMA)
+            write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
+        elif OF_CALIBRATION in results:
+            write_calibration_report(path, calibration_study(folder))
+        elif OF_DEMO in results:
+            write_two_stage_report(path, two_stage_study(folder))
+        elif _STIFFNESS in results:
+            stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted(folder))
+            write_stiffness_report(path, stiffness)
+        elif _EXCITATION in results:
+            write_excitation_report(path, ExcitationStudy(results, read_response_arrays(folder)))
+        elif _RESPONSES in results:
+            write_response_report(path, ResponseStudy(results, _responses(folder, results)))
+        else:
+            raise InputError(
+                f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these."
+            )
+    except KeyError as problem:
+        raise lacking(folder, problem) from problem
+    return path
+
+
+def lacking(folder: Path, problem: KeyError) -> InputError:
+    """Of a results.json that lacks a key."""
+    return InputError(
+        f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had written it; run the verb that writes it again."
+    )
+
+
+def calibration_study(folder: Path) -> CalibrationStudy:
+    """What `calibrate` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    results = read_results(folder)
+    points = read_points(folder, sigma=results["fit"]["sigma_mm"] * MILLIMETRE)
+    return CalibrationStudy(
+        results, _block(folder, "calibration"), points, read_arm(folder), read_loads(folder)
+    )
+
+
+def two_stage_study(folder: Path) -> TwoStageStudy:
+    """What `demo` left in a folder; raises `InputError` where a file is not there or cannot be read."""
+    results = read_results(folder)
+    fresh, exact = read_verification(folder / VERIFICATION)
+    return TwoStageStudy(
+        results=results,
+        estimates=read_estimates(folder / ESTIMATES),
+        plan=read_plan_of(folder / FREQUENCY_PLAN, MultisinePlan),
+        responses=read_fitted(folder),
+        points=read_points(folder, sigma=DEFAULT_SIGMA),
+        arms=read_arm(folder),
+        fresh=fresh,
+        exact=exact,
+        paper=TX90L_PAPER if results["robot"] == "tx90l" else None,
+    )
+
+
+def _responses(folder: Path, results: Mapping[str, Any]) -> tuple[FrequencyResponse, ...]:
+    return tuple(FrequencyResponse.load(folder / Path(entry["file"]).name) for entry in results[_RESPONSES])
+
+
+def _block(folder: Path, block: Block) -> Estimate:
+    path = folder / ESTIMATES
+    estimates = read_estimates(path)
+    if block not in estimates:
+        raise InputError(f"{path} holds no {block}; run the verb that writes it again.")
+    return estimates[block]

@@ -1,0 +1,68 @@
+"""The equations of recordings with and without a payload, and what a fit of them predicts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.dynamics.diagnostics import TorquePrediction
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from flexcal.dynamics.payload import ArmYield, PayloadEquations, PayloadFit, RobotPrior
+from flexcal.dynamics.regression import RegressionData, batches_each
+from flexcal.dynamics.signals import JointLog, Window
+from flexcal.estimation import Estimate
+from flexcal.jobs.logs import LogPart, Treatment, log_predictions, log_systems
+from flexcal.model.robot import RobotModel
+from flexcal.progress import silent
+
+
+@dataclass(frozen=True, eq=False)
+class PayloadSystem:
+    """The `equations` of `logs`, each of which has its own `observations`, for springs yield along its own motion."""
+
+    logs: Sequence[JointLog]
+    observations: Sequence[Observation]
+    equations: PayloadEquations
+    treatment: Treatment
+
+    @classmethod
+    def of(
+        cls,
+        model: RobotModel,
+        logs: Sequence[JointLog],
+        loaded: Sequence[bool],
+        dynamics: Estimate | None,
+        sources: tuple[str, ...],
+        treatment: Treatment,
+    ) -> PayloadSystem:
+        """With springs that yield under the payload of the `model`; raises `FlexcalError` as `ArmYield` and `experiment_system` do."""
+        plain = Observation(model, CLASSIC)
+        base = BaseParameters.of(plain)
+        prior = RobotPrior.of(plain, base, dynamics, sources)
+        observations, systems = [], []
+        for log, held in zip(logs, loaded, strict=True):
+            wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, sources, None if held else 0.0)))
+            observations.append(wide)
+            systems += log_systems(
+                [LogPart(log, Window())],
+                wide,
+                treatment,
+                batches=batches_each(len(logs)),
+                jobs=1,
+                progress=silent,
+            )
+        assert model.payload is not None
+        data = RegressionData.of(observations[-1], base, systems)
+        return cls(logs, observations, PayloadEquations(data, loaded, model.payload, prior), treatment)
+
+    def predictions(self, fit: PayloadFit) -> list[TorquePrediction]:
+        """Torques of every log as the `fit` of these equations has them, beside the measured ones."""
+        predicted = [
+            (observation, self.equations.coefficients(fit.unknowns, held))
+            for observation, held in zip(self.observations, self.equations.loaded, strict=True)
+        ]
+        return log_predictions(
+            self.logs, [np.inf] * len(self.logs), predicted, self.treatment, progress=silent
+        )

@@ -1,0 +1,110 @@
+"""The documents for scripts (FORMATS: results.json), and their common blocks."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.errors import InputError
+from flexcal.estimation import Dropped, Estimate, Identifiability
+from flexcal.files.transaction import current, settle, write_text
+
+RESULTS = "results.json"
+
+_ROUNDING = 1e-9
+"""A coefficient below this, in SI units, is what rounding leaves of zero."""
+
+
+def json_text(document: Mapping[str, Any]) -> str:
+    """`document` as JSON, in ASCII letters; numbers that are not finite become null."""
+    return json.dumps(plain(document), indent=2, allow_nan=False)
+
+
+def write_results(folder: Path, document: Mapping[str, Any]) -> None:
+    """Leave `document` in `folder` as results.json, atomically."""
+    write_text(folder / RESULTS, json_text(document) + "\n")
+
+
+def read_results(folder: Path) -> dict[str, Any]:
+    """The document that a verb left in `folder`; raises `InputError` where there is none."""
+    settle(folder)
+    path = folder / RESULTS
+    again = "run the verb that writes it again"
+    try:
+        document = json.loads(current(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, RecursionError) as problem:
+        raise InputError(f"{path} cannot be read ({problem}); {again}.") from problem
+    if not isinstance(document, dict):
+        raise InputError(f"{path} holds no results of a verb; {again}.")
+    return document
+
+
+def quantities(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, dict[str, Any]]:
+    """Every parameter of an estimate as {estimate, std, low, high, truth, identifiable}, by name."""
+    known = truth or {}
+    return {name: estimate.quantity(name, known.get(name)) for name in estimate.parameters.names}
+
+
+def dropped_parameters(dropped: Iterable[Dropped]) -> list[dict[str, Any]]:
+    """The dropped parameters and what absorbed each: kept + coefficient · dropped is what the kept one estimates."""
+    return [
+        {
+            "name": d.name,
+            "absorbed_by": [{"name": n, "coefficient": c} for n, c in d.absorbed_by if abs(c) > _ROUNDING],
+        }
+        for d in dropped
+    ]
+
+
+def identifiability_block(found: Identifiability) -> dict[str, Any]:
+    """Number of parameters, rank, dropped parameters, decades of the gap, and the weakest of the directions that are seen."""
+    return {
+        "parameters": len(found.names),
+        "rank": found.rank,
+        "gap_decades": found.gap,
+        "dropped": dropped_parameters(found.dropped),
+        "weak_directions": [
+            {"relative_singular_value": value, "direction": direction}
+            for direction, value in found.weak_seen_directions()
+        ],
+    }
+
+
+def identifiability_spectrum(found: Identifiability) -> dict[str, Any]:
+    """The parameters that are kept, and singular values and the diagonal of R, relative to the largest: what a figure of the rank shows."""
+    return {
+        "kept": list(found.kept_names),
+        "singular_values": found.singular_values,
+        "diagonal": found.diagonal,
+    }
+
+
+def plain(value: Any) -> Any:
+    """`value` as JSON has it: lists for arrays, null for numbers that are not finite, text for paths."""
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, np.generic):
+        return plain(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value
+
+
+def springs_block(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, Any]:
+    """{stiffness, damping} of every spring as quantities, by joint and drive, bearing_x or bearing_y."""
+    found: dict[str, Any] = {"stiffness": {}, "damping": {}}
+    for name in estimate.parameters.names:
+        owner, _, kind = name.rpartition(".")
+        joint, _, spring = owner.rpartition(".")
+        if kind in found and joint:
+            found[kind].setdefault(joint, {})[spring] = estimate.quantity(name, (truth or {}).get(name))
+    return found

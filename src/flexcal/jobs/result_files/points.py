@@ -1,0 +1,173 @@
+"""Files of points and arm drawings of calibrate and verify: points.csv and arm.npz."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+
+from flexcal.calibration.diagnostics import GravityLoads
+from flexcal.calibration.verification import (
+    CALIBRATED,
+    DECLARED,
+    NOMINAL,
+    OWN,
+    RIGID,
+    ArmPoses,
+    MeasuredPoints,
+)
+from flexcal.data.poses import PoseSet
+from flexcal.errors import InputError
+from flexcal.files.formats import ArrayForm, NpzFile
+from flexcal.files.transaction import atomic_path, current
+from flexcal.units import LARGEST
+
+POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
+_MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
+_TEXTS = ("target", "station")
+_AGAIN = "run the verb that writes it again"
+
+
+def write_points(folder: Path, points: MeasuredPoints) -> None:
+    """Leave `points` as points.csv in `folder`, atomically; rad and m."""
+    poses = points.poses
+    columns: dict[str, np.ndarray] = {"pose": poses.pose, "target": poses.target, "station": poses.station}
+    columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
+    columns |= _vectors("", poses.position)
+    if poses.sigma_given:
+        columns |= _vectors("sigma_", poses.sigma)
+    for name in ("payload", "temperature"):
+        values = getattr(poses, name)
+        if values is not None:
+            columns[name] = values
+    if poses.time is not None:
+        columns["t"] = poses.time
+    for model, errors in points.errors.items():
+        columns |= _vectors(f"{model}_d", errors)
+    if points.parameter_rms is not None:
+        columns["parameter_rms"] = points.parameter_rms
+    if points.scatter_rms is not None:
+        columns["scatter_rms"] = points.scatter_rms
+    columns["ambiguous"] = points.ambiguous
+    with atomic_path(folder / POINTS) as temporary, temporary.open("wb") as stream:
+        pl.DataFrame(columns).write_csv(stream)
+
+
+def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
+    """The points that `write_points` left; `sigma` (m) is that of each coordinate where the file gives none.
+
+    Raises `InputError` where the file is not there or not such a one.
+    """
+    path = folder / POINTS
+    try:
+        table = pl.read_csv(current(path).read_bytes(), schema_overrides=dict.fromkeys(_TEXTS, pl.String))
+        joints = [name for name in table.columns if name.startswith("q") and name[1:].isdigit()]
+
+        def vectors(prefix: str) -> np.ndarray:
+            return _numbers(path, table.select([f"{prefix}{axis}" for axis in "xyz"]))
+
+        def column(name: str) -> np.ndarray | None:
+            return _numbers(path, table.select(name))[:, 0] if name in table.columns else None
+
+        given = "sigma_x" in table.columns
+        poses = PoseSet(
+            q=_numbers(path, table.select(joints)),
+            position=vectors(""),
+            sigma=vectors("sigma_") if given else np.full((len(table), 3), sigma),
+            torque=None,
+            payload=column("payload"),
+            target=table["target"].to_numpy(),
+            station=table["station"].to_numpy(),
+            temperature=column("temperature"),
+            time=column("t"),
+            pose=table["pose"].to_numpy(),
+            sigma_given=given,
+        )
+        errors = {model: vectors(f"{model}_d") for model in _MODELS if f"{model}_dx" in table.columns}
+        ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
+        if CALIBRATED not in errors or not joints or not len(table):
+            raise InputError(f"{path} lacks columns or rows; run the verb that writes it again.")
+        return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"), column("scatter_rms"))
+    except (pl.exceptions.PolarsError, OSError) as problem:
+        raise _unreadable(path, problem) from problem
+
+
+def _numbers(path: Path, columns: pl.DataFrame) -> np.ndarray:
+    values = columns.cast(pl.Float64).to_numpy()
+    if (np.abs(values) > LARGEST).any():
+        raise InputError(
+            f"{path} holds {values[np.abs(values) > LARGEST][0]:g}, which is no measurement; {_AGAIN}."
+        )
+    return values
+
+
+def write_arm(folder: Path, arms: ArmPoses) -> None:
+    """Leave `arms` as arm.npz in `folder`, atomically."""
+    arrays = {
+        "corners": arms.corners,
+        "surface": arms.surface,
+        "triangles": arms.triangles,
+        "pose": arms.pose,
+        "tip": arms.tip,
+    }
+    arrays |= {f"errors_{model}": errors for model, errors in arms.errors.items()}
+    with atomic_path(folder / ARM) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def read_arm(folder: Path) -> ArmPoses:
+    """What `write_arm` left; raises `InputError` where the file is not there or not such a one."""
+    file = NpzFile(folder / ARM, _AGAIN)
+    forms = {
+        "corners": ArrayForm("real", ("drawn", "corners", 3)),
+        "surface": ArrayForm("real", ("in full", "vertices", 3)),
+        "triangles": ArrayForm("whole", ("triangles", 3)),
+        "pose": ArrayForm("whole", ("points",)),
+        "tip": ArrayForm("real", ("points", 3)),
+    }
+    found = file.read(
+        forms | {name: ArrayForm("real", ("points", 3)) for name in _of_models(file, "errors_")}
+    )
+    triangles = found["triangles"]
+    if triangles.size and not 0 <= triangles.min() <= triangles.max() < found["surface"].shape[1]:
+        raise file.error("holds triangles of vertices that are not there")
+    errors = {name.removeprefix("errors_"): found.pop(name) for name in _of_models(file, "errors_")}
+    return ArmPoses(**found, errors=errors)
+
+
+def write_loads(folder: Path, loads: GravityLoads) -> None:
+    """Leave `loads` as gravity_loads.npz in `folder`, atomically."""
+    arrays = {"torque": loads.torque} | {f"along_{model}": along for model, along in loads.along.items()}
+    with atomic_path(folder / LOADS) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def read_loads(folder: Path) -> GravityLoads | None:
+    """What `write_loads` left, None without the file, as in folders of an older flexcal; raises `InputError` where it cannot be read."""
+    path = folder / LOADS
+    if not current(path).is_file():
+        return None
+    file = NpzFile(path, _AGAIN)
+    loads = ArrayForm("real", ("points", "joints"))
+    found = file.read({name: loads for name in ("torque", *_of_models(file, "along_"))})
+    return GravityLoads(
+        found.pop("torque"), {name.removeprefix("along_"): along for name, along in found.items()}
+    )
+
+
+def _of_models(file: NpzFile, prefix: str) -> list[str]:
+    return [f"{prefix}{model}" for model in _MODELS if f"{prefix}{model}" in file]
+
+
+def _vectors(prefix: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    return {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
+
+
+def _unreadable(path: Path, problem: Exception) -> InputError:
+    reason = (
+        problem.strerror
+        if isinstance(problem, OSError) and problem.strerror
+        else " ".join(str(problem).split())
+    )
+    return InputError(f"{path} cannot be read ({reason}); run the verb that writes it again.")

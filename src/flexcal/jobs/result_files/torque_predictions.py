@@ -1,0 +1,67 @@
+"""Measured and predicted torques of identify dynamics and identify payload: predictions.npz."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.dynamics.diagnostics import TorquePrediction
+from flexcal.files.formats import ArrayForm, NpzFile
+from flexcal.files.transaction import atomic_path
+
+PREDICTIONS = "predictions.npz"
+_ARRAYS = ("time", "measured", "predicted", "frequencies_hz", "measured_density", "residual_density")
+_KIND = {"time": np.float64}
+"""Torques are drawn, so four bytes each are enough; times tell what was held out."""
+
+
+def write_predictions(folder: Path, predictions: Sequence[TorquePrediction]) -> None:
+    """Leave `predictions`, one a log, in `folder`, atomically: arrays `<name>_<k>` of log k, counted from 0."""
+    arrays = {
+        "names": np.array([log.name for log in predictions]),
+        "strides": np.array([log.stride for log in predictions]),
+        "held_out_from": np.array([log.held_out_from for log in predictions]),
+    }
+    for k, log in enumerate(predictions):
+        arrays |= {
+            f"{name}_{k}": np.asarray(getattr(log, name), _KIND.get(name, np.float32)) for name in _ARRAYS
+        }
+    with atomic_path(folder / PREDICTIONS) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+
+
+def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
+    """What `write_predictions` left; raises `InputError` where the file is not there or not such a one."""
+    file = NpzFile(folder / PREDICTIONS, "run the verb that writes it again")
+    logs = file.read(
+        {
+            "names": ArrayForm("text", ("logs",)),
+            "strides": ArrayForm("whole", ("logs",)),
+            "held_out_from": ArrayForm("real", ("logs",), finite=False),
+        }
+    )
+    return tuple(
+        TorquePrediction(
+            name=str(name),
+            stride=int(logs["strides"][k]),
+            held_out_from=float(logs["held_out_from"][k]),
+            **{array: found[f"{array}_{k}"] for array in _ARRAYS},
+        )
+        for k, name in enumerate(logs["names"])
+        for found in [file.read({f"{array}_{k}": form for array, form in _forms(k).items()})]
+    )
+
+
+def _forms(log: int) -> dict[str, ArrayForm]:
+    torques = ArrayForm("real", (f"rows {log}", "joints"))
+    densities = ArrayForm("real", (f"frequencies {log}", "joints"))
+    return {
+        "time": ArrayForm("real", (f"rows {log}",)),
+        "measured": torques,
+        "predicted": torques,
+        "frequencies_hz": ArrayForm("real", (f"frequencies {log}",)),
+        "measured_density": densities,
+        "residual_density": densities,
+    }

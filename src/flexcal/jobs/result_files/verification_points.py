@@ -1,0 +1,81 @@
+"""Measured and predicted points of a verification as a table, written and read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from flexcal.calibration.verification import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
+from flexcal.data.poses import PoseSet
+from flexcal.errors import InputError
+from flexcal.files.transaction import atomic_path, current
+
+if TYPE_CHECKING:
+    from flexcal.jobs.two_stage import TwoStageRun
+
+VERIFICATION = "verification.csv"
+
+
+_COLUMNS = {NOMINAL: "nominal", OWN: "own", CALIBRATED: "elastic", RIGID: "rigid"}
+"""Models of verification.csv, and what their columns are called there."""
+
+
+def write_verification(path: Path, run: TwoStageRun) -> None:
+    """Write verification.csv, atomically; rad and m: pose, q1…, x, y, z (noise-free truth), where the tracker read the point, with 1σ, and
+    where every model has it, the distance that the covariance of the elastic model's parameters predicts, and whether the flanks are
+    certain."""
+    poses, elastic = run.verification_poses, run.elastic_verification
+    before = {NOMINAL: run.nominal_verification, OWN: run.own_verification}
+    models = before | {CALIBRATED: elastic, RIGID: run.rigid_verification[0]}
+    columns: dict[str, np.ndarray] = {"pose": poses.pose}
+    columns |= {f"q{i + 1}": poses.q[:, i] for i in range(poses.q.shape[1])}
+    columns |= {axis: poses.position[:, k] for k, axis in enumerate("xyz")}
+    measured = run.measured_verification.position + run.measured_verification.errors
+    columns |= {f"measured_{axis}": measured[:, k] for k, axis in enumerate("xyz")}
+    columns |= {f"sigma_{axis}": poses.sigma[:, k] for k, axis in enumerate("xyz")}
+    for model, verification in models.items():
+        columns |= {f"{_COLUMNS[model]}_{axis}": verification.position[:, k] for k, axis in enumerate("xyz")}
+    columns |= {"parameter_rms": elastic.parameter_rms, "scatter_rms": run.measured_verification.scatter_rms}
+    columns |= {"model_rms": elastic.scatter_rms}
+    columns["unambiguous"] = ~elastic.ambiguous
+    with atomic_path(path) as temporary, temporary.open("wb") as stream:
+        pl.DataFrame(columns).write_csv(stream)
+
+
+def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
+    """The fresh poses that `write_verification` left, as the tracker read them and in truth; raises `InputError` where it cannot."""
+    try:
+        table = pl.read_csv(current(path).read_bytes())
+
+        def vectors(prefix: str) -> np.ndarray:
+            return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()
+
+        predicted = {m: vectors(f"{name}_") for m, name in _COLUMNS.items() if f"{name}_x" in table.columns}
+        size, certain = len(table), table["unambiguous"].cast(pl.Boolean).to_numpy()
+        q = table.select([name for name in table.columns if name[0] == "q"]).cast(pl.Float64).to_numpy()
+
+        def points(position: np.ndarray, sigma: np.ndarray, scatter: str) -> MeasuredPoints:
+            poses = PoseSet(
+                q=q,
+                position=position,
+                sigma=sigma,
+                torque=None,
+                payload=None,
+                target=np.full(size, ""),
+                station=np.full(size, ""),
+                temperature=None,
+                pose=table["pose"].to_numpy(),
+            )
+            errors = {model: position - where for model, where in predicted.items()}
+            rms = (table[name].cast(pl.Float64).to_numpy() for name in ("parameter_rms", scatter))
+            return MeasuredPoints(poses, errors, ~certain, *rms)
+
+        measured = points(vectors("measured_"), vectors("sigma_"), "scatter_rms")
+        return measured, points(vectors(""), np.zeros((size, 3)), "model_rms")
+    except (pl.exceptions.PolarsError, TypeError, OSError) as problem:
+        raise InputError(
+            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that writes it again."
+        ) from problem

@@ -1,0 +1,12 @@
+from .measurement_import import ImportedFile, import_file
+from .point_declaration import write_point_place
+from .robot_description import init_robot
+from .signals_declaration import add_signals
+
+__all__ = [
+    "ImportedFile",
+    "add_signals",
+    "import_file",
+    "init_robot",
+    "write_point_place",
+]

@@ -1,0 +1,313 @@
+"""Import of measurements of other programs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from flexcal.data.poses import (
+    PoseSet,
+    check_metres,
+    check_positive,
+    check_same_pose,
+    unit_quaternions,
+    whole_numbers,
+)
+from flexcal.data.tables import JOINT_QUANTITIES, Table, check_joint_units, standard_columns, write_table
+from flexcal.errors import InputError
+from flexcal.importing.columns import (
+    TOOL,
+    Guess,
+    LeftOut,
+    Misfit,
+    PlacedColumns,
+    apply_map,
+    check_nominal,
+    guess_columns,
+    reasons_of,
+)
+from flexcal.importing.readers import read_foreign
+from flexcal.importing.tables import ForeignTable
+from flexcal.model.robot import RobotModel
+from flexcal.units import LARGEST, MILLIMETRE
+
+_POSES = (
+    "pose",
+    "q",
+    "xyz",
+    "length",
+    "quaternion",
+    "sigma",
+    "sigma_xyz",
+    "tau",
+    "payload",
+    "temperature",
+    "t",
+)
+_LOG = ("t", *JOINT_QUANTITIES, "temperature", "payload")
+
+
+@dataclass(frozen=True, eq=False)
+class ImportedFile:
+    """What the columns of a file are taken to be, and the values that were or would be written.
+
+    kind: poses were measured, a log of joints, or joint positions only, from which poses can be chosen. columns: in flexcal's names and
+    SI units. misfit: how the nominal robot goes with the points, None where there are none or too few.
+    """
+
+    file: Path
+    kind: Literal["poses", "log", "joints"]
+    placed: tuple[PlacedColumns, ...]
+    left_out: tuple[LeftOut, ...]
+    columns: dict[str, np.ndarray]
+    misfit: Misfit | None
+    remarks: tuple[str, ...]
+    out: Path | None
+    model: RobotModel
+
+    @property
+    def signals(self) -> dict[str, dict[str, Any]]:
+        """The block `signals:` that reads the file's columns; empty where none is needed."""
+        return {p.quantity: p.config() for p in self.placed if p.quantity != "pose" and not p.standard()}
+
+    @property
+    def trusted(self) -> bool:
+        """Whether the points can be this robot's."""
+        return self.misfit is None or not self.misfit.doubtful
+
+    def document(self) -> dict[str, Any]:
+        """The JSON document."""
+        return {
+            "file": self.file,
+            "kind": self.kind,
+            "rows": len(next(iter(self.columns.values()))),
+            "columns": {
+                name: {"from": column, "unit": unit, "gain": gain, "offset": offset, "why": placed.why}
+                for placed in self.placed
+                for name, column, unit, gain, offset in zip(
+                    standard_columns(placed.quantity, self.model.n),
+                    placed.columns,
+                    placed.units,
+                    placed.gains,
+                    placed.offsets,
+                    strict=True,
+                )
+            },
+            "left_out": {left.column: left.why for left in self.left_out},
+            "nominal": None
+            if self.misfit is None
+            else {
+                "rms_mm": self.misfit.rms / MILLIMETRE,
+                "rms_with_point_moved_mm": self.misfit.moved_rms / MILLIMETRE,
+                "point_moved_to": self.misfit.moved.tolist(),
+                "doubtful": self.misfit.doubtful,
+                "proposal": self.misfit.proposal,
+                "map": list(self.misfit.options),
+            },
+            "signals": self.signals,
+            "remarks": list(self.remarks),
+            "out": self.out,
+        }
+
+
+def import_file(
+    robot: Path,
+    file: Path,
+    *,
+    mapped: Sequence[str] = (),
+    out: Path | None = None,
+    sigma: float | None = None,
+    sheet: str | None = None,
+    topic: str | None = None,
+    unchecked: bool = False,
+) -> ImportedFile:
+    """Recognise the columns of `file`, with `mapped` over the guess, and write them as flexcal has them to `out`.
+
+    `sigma` (m) is the instrument's 1σ a coordinate where the file does not say it. Nothing is written without `out`, nor, unless
+    `unchecked`, where the nominal robot cannot go with the points. Raises `InputError` where the file cannot be read, joint positions are
+    not recognised, or a value is missing or cannot be, and for a `sigma` that is not positive or has no place.
+    """
+    model = RobotModel.from_yaml(robot, estimates=False)
+    foreign = read_foreign(file, model.joint_names, sheet=sheet, topic=topic)
+    guess = guess_columns(foreign, model)
+    if mapped:
+        guess = apply_map(mapped, guess, foreign, model)
+    kind, guess = _kind(foreign, guess, model)
+    columns, values = _converted(foreign, guess, model)
+    remarks = list(foreign.notes)
+    stated = {"sigma", "sigma_xyz"} & guess.placed.keys()
+    if sigma is not None:
+        _check_sigma(sigma, file, kind, stated)
+        columns["sigma"] = np.full(len(foreign), sigma)
+    elif kind == "poses" and not stated:
+        remarks.append(
+            "the file does not state the instrument's noise: give it with --sigma MM (1σ per coordinate), or it is counted as "
+            "an error of the robot"
+        )
+    if "xyz" in guess.placed and guess.placed["xyz"].columns == TOOL:
+        remarks.append(
+            "these points are computed by the controller from the joints, not measured: they cannot be used for a calibration"
+        )
+    if kind == "log" and "tau" not in guess.placed:
+        remarks.append("there are no torques: 'identify dynamics' needs tau1 and so on")
+    misfit = _misfit(guess, model, columns, values) if kind == "poses" else None
+    if "xyz" in values and misfit is None:
+        why = "there are too few poses" if model.points else "robot.yaml declares no point under `points:`"
+        remarks.append(f"{why}, so they were not compared with the nominal robot")
+    found = ImportedFile(
+        file, kind, tuple(guess.placed.values()), guess.left_out, columns, misfit, tuple(remarks), None, model
+    )
+    if misfit is not None and misfit.proposal and not unchecked:
+        return found
+    check_joint_units(model, foreign.table, guess.placed["q"].signal(), values["q"])
+    if kind == "poses":
+        _check_poses(foreign, guess, model, columns, values)
+    elif kind == "log":
+        _check_time(foreign, guess, values["t"][:, 0])
+    if out is None or not (found.trusted or unchecked):
+        return found
+    write_table(out, columns)
+    return replace(found, out=out)
+
+
+def _kind(
+    foreign: ForeignTable, guess: Guess, model: RobotModel
+) -> tuple[Literal["poses", "log", "joints"], Guess]:
+    """What the file holds, and the guess with what belongs to that only, in the order of the columns to write."""
+    unsure = [left for left in guess.left_out if "could both be" in left.why]
+    if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
+        left = "; ".join(reasons_of(guess.left_out)) or "every column is something else"
+        what = (
+            f"the joint positions q1 … q{model.n}"
+            if "q" not in guess.placed
+            else "the measured points x, y, z"
+        )
+        example = "q1=COLUMN[deg]" if "q" not in guess.placed else "x=COLUMN[mm]"
+        raise InputError(
+            f"{foreign.table.file.path}: {what} were not recognised ({left}); say which they are: --map {example} and so on."
+        )
+    kind = "poses" if {"xyz", "length"} & guess.placed.keys() else "log" if "t" in guess.placed else "joints"
+    wanted = {"poses": _POSES, "log": _LOG, "joints": ("pose", "q", "payload")}[kind]
+    placed = {quantity: guess.placed[quantity] for quantity in wanted if quantity in guess.placed}
+    reasons = {
+        "payload": "robot.yaml declares no payload",
+        "quaternion": "calibrate takes points alone; --map qw=… and so on keeps it",
+    }
+    if model.payload is None:
+        placed.pop("payload", None)
+    if "quaternion" in placed and placed["quaternion"].why != "--map":
+        placed.pop("quaternion")
+    what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions only"}[kind]
+    left = [
+        LeftOut(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))
+        for quantity, item in guess.placed.items()
+        if quantity not in placed
+        for column in item.columns
+    ]
+    texts = guess.texts if kind == "poses" else {}
+    left += [
+        LeftOut(column, f"no part of {what}") for name, column in guess.texts.items() if name not in texts
+    ]
+    return kind, Guess(placed, texts, (*guess.left_out, *left))
+
+
+def _converted(
+    foreign: ForeignTable, guess: Guess, model: RobotModel
+) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+    """Columns (N,) by flexcal's names, and quantities (N, m); raises `InputError` at the first value that is missing."""
+    columns: dict[str, np.ndarray] = {}
+    values: dict[str, np.ndarray] = {}
+    if "pose" not in guess.placed and ({"xyz", "length"} & guess.placed.keys() or "t" not in guess.placed):
+        columns["pose"] = np.arange(1, len(foreign) + 1)
+    for quantity, placed in guess.placed.items():
+        for column in placed.columns:
+            numbers = foreign.numbers[column]
+            bad = ~(np.abs(numbers) <= LARGEST)
+            if bad.any():
+                row = int(np.argmax(bad))
+                what = "there is no time" if column in foreign.times else "there is no number"
+                if not np.isnan(numbers[row]):
+                    what = f"the value is {numbers[row]:g}, which is no measurement"
+                raise foreign.table.error(
+                    row,
+                    column,
+                    f"{what}; complete or remove the line, or discard the column with --map {quantity}=none.",
+                )
+        found = placed.values(foreign.table)
+        if quantity == "quaternion":
+            found = unit_quaternions(foreign.table, placed.signal(), found)
+        values[quantity] = found
+        names = standard_columns(quantity, model.n)
+        columns |= {name: found[:, i] for i, name in enumerate(names)}
+    if "pose" in columns:
+        if "pose" in guess.placed:
+            columns["pose"] = whole_numbers(foreign.table, guess.placed["pose"].columns[0], columns["pose"])
+        values["pose"] = columns["pose"]
+    columns |= {name: foreign.table.columns[column] for name, column in guess.texts.items()}
+    return columns, values
+
+
+def _check_poses(
+    foreign: ForeignTable,
+    guess: Guess,
+    model: RobotModel,
+    columns: dict[str, np.ndarray],
+    values: dict[str, np.ndarray],
+) -> None:
+    n = len(foreign)
+    table: Table = foreign.table
+    check_same_pose(values["pose"], values["q"], table)
+    for quantity in ("sigma", "sigma_xyz", "length"):
+        if quantity in values:
+            check_positive(table, guess.placed[quantity].signal(), values[quantity], zero=False)
+    place = "xyz" if "xyz" in values else "length"
+    poses = PoseSet(
+        q=values["q"],
+        position=values.get("xyz", np.full((n, 3), np.nan)),
+        sigma=np.ones((n, 3)),
+        torque=None,
+        payload=None,
+        target=columns.get("target", np.full(n, "")),
+        station=columns.get("station", np.full(n, "")),
+        temperature=None,
+        pose=values["pose"],
+        length=None if "length" not in values else values["length"][:, 0],
+    )
+    check_metres(poses, model, table, guess.placed[place].signal())
+
+
+def _check_sigma(sigma: float, file: Path, kind: str, stated: set[str]) -> None:
+    if not 0 < sigma < np.inf:
+        raise InputError(f"--sigma is {sigma / MILLIMETRE:g}; it must be positive, in mm.")
+    if kind != "poses":
+        raise InputError(f"--sigma is of measured points, but {file} has none; leave it out.")
+    if stated:
+        raise InputError(
+            f"{file} contains sigma; leave --sigma out, or discard its own with --map {min(stated)}=none."
+        )
+
+
+def _check_time(foreign: ForeignTable, guess: Guess, t: np.ndarray) -> None:
+    if (np.diff(t) <= 0).any():
+        row = int(np.argmax(np.diff(t) <= 0)) + 1
+        raise foreign.table.error(
+            row, guess.placed["t"].columns[0], "the time does not increase; sort or repair the log."
+        )
+
+
+def _misfit(
+    guess: Guess, model: RobotModel, columns: dict[str, np.ndarray], values: dict[str, np.ndarray]
+) -> Misfit | None:
+    """That of the largest group of rows with one station and target."""
+    if "xyz" not in values or not model.points:
+        return None
+    n = len(values["q"])
+    places = np.stack([columns.get(name, np.full(n, "")) for name in ("station", "target")], axis=1)
+    groups, inverse, counts = np.unique(places, axis=0, return_inverse=True, return_counts=True)
+    rows = inverse.ravel() == int(np.argmax(counts))
+    target = str(groups[int(np.argmax(counts)), 1]) or None
+    return check_nominal(model, values["q"][rows], values["xyz"][rows], guess.placed["q"], point=target)

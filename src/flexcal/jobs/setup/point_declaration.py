@@ -1,0 +1,56 @@
+"""Calibrated position of a measured point, written to robot.yaml in place of the declared one."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from flexcal.errors import InputError
+from flexcal.files.formats import read_yaml_file
+from flexcal.files.transaction import current, write_text
+from flexcal.model.robot import RobotConfig
+
+_DIGITS = 6
+"""m: micrometres."""
+
+
+def write_point_place(robot: Path, name: str, xyz: np.ndarray) -> None:
+    """Put `xyz` (3,) m in place of the `xyz` of the point `name` under `points:`; comments and everything else stay as they are.
+
+    Raises `InputError`, and changes nothing, where the file says it in a way that cannot be replaced.
+    """
+    text = current(robot).read_text(encoding="utf-8")
+    before = read_yaml_file(robot).structure(RobotConfig)
+    place = tuple(round(float(value), _DIGITS) for value in xyz)
+    told = ", ".join(f"{value:.{_DIGITS}f}" for value in place)
+    block = re.search(r"^points:.*?(?=^\S|\Z)", _blanked(text), flags=re.MULTILINE | re.DOTALL)
+    own = re.compile(rf"(?:^|[\s{{,])[\"']?{re.escape(name)}[\"']?\s*:", flags=re.MULTILINE)
+    entry = None if block is None else own.search(_blanked(text), block.start(), block.end())
+    found = None
+    if entry is not None and block is not None:
+        found = re.compile(r"\bxyz\s*:\s*(\[[^\]]*\])").search(_blanked(text), entry.end(), block.end())
+    if found is not None:
+        changed = f"{text[: found.start(1)]}[{told}]{text[found.end(1) :]}"
+        expected = replace(before, points=before.points | {name: replace(before.points[name], xyz=place)})
+        write_text(robot, changed)
+        if _structured(robot) == expected:
+            return
+        write_text(robot, text)
+    raise InputError(
+        f"the xyz of the point '{name}' in {robot} could not be replaced; write xyz: [{told}] there by hand."
+    )
+
+
+def _blanked(text: str) -> str:
+    """The text with comments blanked, every character in its place."""
+    return re.sub(r"(?:(?<=\s)|^)#[^\n]*", lambda found: " " * len(found[0]), text, flags=re.MULTILINE)
+
+
+def _structured(robot: Path) -> RobotConfig | None:
+    try:
+        return read_yaml_file(robot).structure(RobotConfig)
+    except InputError:
+        return None

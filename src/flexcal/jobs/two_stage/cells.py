@@ -1,0 +1,51 @@
+"""The cells of the demonstration: the virtual cell and the hard cell."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal, Protocol
+
+import numpy as np
+
+from flexcal.data.experiments import Cell
+from flexcal.data.plans import PosePlan
+from flexcal.errors import FlexcalError
+from flexcal.files.formats import read_yaml
+from flexcal.hard_cell import HardCell, counterparts
+from flexcal.model.robot import RobotModel
+from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
+
+CellName = Literal["virtual", "hard"]
+"""Which robot stands in the demonstration's cell."""
+
+
+class KnownCell(Cell, Protocol):
+    """A cell whose truth can be asked for at the end."""
+
+    def noise_free(self, plan: PosePlan) -> np.ndarray:
+        """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
+        ...
+
+
+def open_cell(
+    kind: CellName, robot: Path, nominal: RobotModel, *, truth: Path | None, hidden: Path, seed: int
+) -> KnownCell:
+    """A cell with the robot of `robot` in it, whose true values of the model's parameters are left in the file `hidden`.
+
+    They are drawn from `seed`, or those of the file `truth`; of a hard robot only those that have a counterpart in the model. Raises
+    `FlexcalError` where the cell cannot hold the robot, and for a `truth` of a hard one.
+    """
+    if kind == "hard":
+        if truth is not None:
+            raise FlexcalError(
+                "a hard cell's robot has no truth in the form of estimates.yaml; leave out --truth or --cell hard."
+            )
+        cell = HardCell.drawn(robot, seed)
+        write_truth(hidden, counterparts(cell.robot))
+        return cell
+    config = read_yaml(robot.parent / "cell.yaml", CellConfig)
+    rng = np.random.default_rng([seed, 0])
+    write_truth(
+        hidden, draw_truth(nominal, config.spread, rng) if truth is None else read_truth_of(truth, nominal)
+    )
+    return VirtualCell(nominal.with_values(read_truth(hidden)), config, seed, controller_model=nominal)

@@ -1,0 +1,25 @@
+from .forward import PointKinematics, joint_batch, point_kinematics
+from .inverse import damped_step, reach_points
+from .joint_space import even_configurations, joint_limits, joint_ranges
+from .link_poses import joint_origins, link_frames
+from .link_surface import LinkSurface
+from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
+
+__all__ = [
+    "LinkSurface",
+    "PointKinematics",
+    "bearing_placement",
+    "damped_step",
+    "even_configurations",
+    "found_xyz",
+    "joint_batch",
+    "joint_limits",
+    "joint_origins",
+    "joint_placement",
+    "joint_ranges",
+    "link_frames",
+    "link_placement",
+    "point_kinematics",
+    "point_placement",
+    "reach_points",
+]

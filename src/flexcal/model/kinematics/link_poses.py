@@ -1,0 +1,58 @@
+"""Positions of joints and links, for figures, gravity preload and line of sight."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.model.kinematics.forward import joint_batch, point_kinematics
+from flexcal.model.kinematics.placements import joint_placement
+from flexcal.model.parts import Joint
+from flexcal.model.robot import RobotModel
+
+
+def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation (samples, n, 3, 3) and origin (samples, n, 3), m, of every joint's link in the base frame at `q` (samples, n).
+
+    Geometric errors count, deflection does not (Eqs. 15-17 with q_arm = q_motor). Raises `FlexcalError` for a wrong joint count.
+    """
+    q = joint_batch(model, q)
+    rotation = np.empty((len(q), model.n, 3, 3))
+    origin = np.empty((len(q), model.n, 3))
+    for i, joint in enumerate(model.joints):
+        shift, turn = joint_placement(model, i)
+        moved = q[:, i] + model.geometry[i, 0]
+        if joint.parent < 0:
+            turned, origin[:, i] = np.broadcast_to(turn, (len(q), 3, 3)), shift
+        else:
+            parent = rotation[:, joint.parent]
+            turned, origin[:, i] = parent @ turn, origin[:, joint.parent] + parent @ shift
+        if joint.kind == "prismatic":
+            rotation[:, i] = turned
+            origin[:, i] += moved[:, None] * (turned @ joint.axis)
+        else:
+            rotation[:, i] = turned @ _turns(joint, moved)
+    return rotation, origin
+
+
+def joint_origins(model: RobotModel, q: np.ndarray, *, point: str | None = None) -> np.ndarray:
+    """Corners (samples, joints + 2, 3), m, of the chain from the base through every joint to the target `point`.
+
+    Joints of a tree that do not carry the target are left out. Raises `FlexcalError` for an unknown point or a wrong joint count.
+    """
+    chain: list[int] = []
+    joint = model.point(point).joint
+    while joint >= 0:
+        chain.insert(0, joint)
+        joint = model.joints[joint].parent
+    _, origin = link_frames(model, q)
+    target = point_kinematics(model, q, point=point, jacobians=False).position
+    return np.concatenate([np.zeros((len(origin), 1, 3)), origin[:, chain], target[:, None]], axis=1)
+
+
+def _turns(joint: Joint, angle: np.ndarray) -> np.ndarray:
+    """Rotations (samples, 3, 3) about the joint's axis: Rodrigues."""
+    x, y, z = joint.axis
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    return (
+        np.eye(3) + np.sin(angle)[:, None, None] * skew + (1 - np.cos(angle))[:, None, None] * (skew @ skew)
+    )

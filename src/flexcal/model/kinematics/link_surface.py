@@ -1,0 +1,124 @@
+"""The surface of a robot's links, for drawing: the visual or collision shapes of its URDF, else capsules from joint to joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexcal.model.kinematics.link_poses import link_frames
+from flexcal.model.kinematics.placements import joint_placement, point_placement
+from flexcal.model.kinematics.triangle_meshes import box, capsule, cylinder, decimated, ellipsoid
+from flexcal.model.robot import RobotModel
+from flexcal.model.urdf import locked_joints, read_elements
+
+_MOST = 6000
+"""Triangles of the whole arm."""
+_SLENDER = 0.045
+"""Radius of a capsule over the length of the arm."""
+
+
+@dataclass(frozen=True, eq=False)
+class LinkSurface:
+    """Triangles of all links: `vertices` (V, 3) m in the link of the joint `owner` (V,), −1 for the base; `triangles` (F, 3)."""
+
+    vertices: np.ndarray
+    owner: np.ndarray
+    triangles: np.ndarray
+
+    @classmethod
+    def of(cls, model: RobotModel) -> LinkSurface:
+        """From the URDF's visual shapes; where it has none or meshes are missing, from its collision shapes; else capsules."""
+        return cls._joined(_urdf_shapes(model) or _capsules(model))
+
+    @classmethod
+    def _joined(cls, parts: list[tuple[int, np.ndarray, np.ndarray]]) -> LinkSurface:
+        total = sum(len(triangles) for _, _, triangles in parts)
+        vertices, owners, triangles, start = [], [], [], 0
+        for joint, corners, faces in parts:
+            kept, faces = decimated(corners, faces, max(12, _MOST * len(faces) // total))
+            vertices.append(kept)
+            owners.append(np.full(len(kept), joint))
+            triangles.append(faces + start)
+            start += len(kept)
+        return cls(np.concatenate(vertices), np.concatenate(owners), np.concatenate(triangles))
+
+    def at(self, model: RobotModel, q: np.ndarray) -> np.ndarray:
+        """Vertices (N, V, 3), m, in the base frame at joint positions `q` (N, n), geometric errors included, undeflected."""
+        rotation, origin = link_frames(model, q)
+        moving = self.owner >= 0
+        placed = np.broadcast_to(self.vertices, (len(q), *self.vertices.shape)).copy()
+        own = self.owner[moving]
+        turned = np.einsum("nvij,vj->nvi", rotation[:, own], self.vertices[moving])
+        placed[:, moving] = turned + origin[:, own]
+        return placed
+
+
+def _urdf_shapes(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """(joint, vertices in its link, triangles) of every shape; empty where the URDF has none that can be read."""
+    import pinocchio as pin
+
+    urdf = read_elements(model.urdf).text()
+    whole = pin.buildModelFromXML(urdf)
+    folders = [str(above) for above in model.urdf.absolute().parents]
+    for kind in (pin.GeometryType.VISUAL, pin.GeometryType.COLLISION):
+        try:
+            shapes = pin.buildGeomFromUrdfString(whole, urdf, kind, package_dirs=folders)
+        except (ValueError, RuntimeError):
+            continue
+        reduced, shapes = pin.buildReducedModel(whole, shapes, *locked_joints(whole, model.config.locked))
+        joints = {reduced.getJointId(name): k for k, name in enumerate(model.joint_names)} | {0: -1}
+        parts = []
+        for item in shapes.geometryObjects:
+            mesh = _mesh(item.geometry)
+            if mesh is None or item.parentJoint not in joints:
+                continue
+            placed = mesh[0] @ np.array(item.placement.rotation).T + np.array(item.placement.translation)
+            parts.append((joints[item.parentJoint], placed, mesh[1]))
+        if parts:
+            return parts
+    return []
+
+
+def _mesh(shape: Any) -> tuple[np.ndarray, np.ndarray] | None:
+    """Triangles of a shape of coal, None of a kind that is not drawn."""
+    import coal
+
+    match shape:
+        case coal.Box():
+            return box(np.array(shape.halfSide))
+        case coal.Cylinder():
+            return cylinder(shape.radius, shape.halfLength)
+        case coal.Capsule():
+            return capsule(shape.radius, shape.halfLength)
+        case coal.Sphere():
+            return ellipsoid(np.full(3, shape.radius))
+        case coal.BVHModelBase() if shape.num_tris:
+            corners = [shape.tri_indices(k) for k in range(shape.num_tris)]
+            return np.array(shape.vertices()), np.array([(t[0], t[1], t[2]) for t in corners])
+    return None
+
+
+def _capsules(model: RobotModel) -> list[tuple[int, np.ndarray, np.ndarray]]:
+    """Capsules in every link from its joint to the next joints and to the first point."""
+    ends = [(model.joints[k].parent, joint_placement(model, k)[0]) for k in range(model.n)]
+    ends += [point_placement(model, name)[:2] for name in list(model.points)[:1]]
+    radius = _SLENDER * sum(float(np.linalg.norm(end)) for _, end in ends)
+    parts = []
+    for owner, end in ends:
+        length = float(np.linalg.norm(end))
+        if length < 1e-6:
+            continue
+        vertices, triangles = capsule(min(radius, 0.6 * length), length / 2)
+        parts.append(
+            (owner, (vertices + np.array([0.0, 0.0, length / 2])) @ _towards(end / length).T, triangles)
+        )
+    return parts
+
+
+def _towards(direction: np.ndarray) -> np.ndarray:
+    """A rotation (3, 3) that takes the z axis to a unit vector."""
+    across = np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))])
+    across /= np.linalg.norm(across)
+    return np.stack([across, np.cross(direction, across), direction], axis=1)

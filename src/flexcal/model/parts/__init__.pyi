@@ -1,0 +1,39 @@
+from .inertia import INERTIAL, Inertia, parallel_axis
+from .joint import ElasticJoint, Joint, normals_to
+from .point import ForceSensor, Payload, Point
+from .pseudo_inertia_matrix import PSEUDO_INERTIA, is_body, pseudo_inertia
+from .rotations import (
+    axis_rotation,
+    rotation_rpy,
+    rotation_vector,
+    rotation_wxyz,
+    rpy_rotation,
+    vector_rotation,
+    wxyz_rotation,
+)
+from .tree import Bearings, bearing_frame, kinematic_tree
+
+__all__ = [
+    "INERTIAL",
+    "PSEUDO_INERTIA",
+    "Bearings",
+    "ElasticJoint",
+    "ForceSensor",
+    "Inertia",
+    "Joint",
+    "Payload",
+    "Point",
+    "axis_rotation",
+    "bearing_frame",
+    "is_body",
+    "kinematic_tree",
+    "normals_to",
+    "parallel_axis",
+    "pseudo_inertia",
+    "rotation_rpy",
+    "rotation_vector",
+    "rotation_wxyz",
+    "rpy_rotation",
+    "vector_rotation",
+    "wxyz_rotation",
+]

@@ -1,0 +1,66 @@
+"""Measured points, payload and force sensor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.model.parts.inertia import Inertia
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A target: `xyz` (3,) in a frame that sits at `rotation`, `translation` in the link of joint `joint`."""
+
+    name: str
+    frame: str
+    joint: int
+    rotation: np.ndarray
+    translation: np.ndarray
+    xyz: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class Payload:
+    """A body held in a frame that sits at `rotation`, `translation` in the link of joint `joint`.
+
+    `mass` kg with standard deviation `mass_std`, `com` (3,) in the frame, `inertia` (3, 3) about the centre of mass in frame axes.
+    """
+
+    frame: str
+    joint: int
+    rotation: np.ndarray
+    translation: np.ndarray
+    mass: float
+    mass_std: float
+    com: np.ndarray
+    inertia: np.ndarray
+
+    def carried(self, mass: float) -> Inertia:
+        """Inertia in the link's frame of `mass` kg held in its place; the declared inertia scales with the mass."""
+        share = mass / self.mass if self.mass > 0 else 0.0
+        return Inertia(mass, self.com_in_link, self.rotation @ (share * self.inertia) @ self.rotation.T)
+
+    @property
+    def moments(self) -> np.ndarray:
+        """Ixx, Ixy, Ixz, Iyy, Iyz, Izz (6,) of `inertia`."""
+        return self.inertia[np.triu_indices(3)]
+
+    @property
+    def com_in_link(self) -> np.ndarray:
+        """Centre of mass (3,) in the frame of the link that carries the payload, m."""
+        return self.translation + self.rotation @ self.com
+
+
+@dataclass(frozen=True, eq=False)
+class ForceSensor:
+    """A force and torque sensor whose axes sit at `rotation`, `translation` in the link of joint `joint`.
+
+    `sign` is 1 where it reads what acts on the robot, -1 where it reads what the robot does to its surroundings.
+    """
+
+    joint: int
+    rotation: np.ndarray
+    translation: np.ndarray
+    sign: float

@@ -1,0 +1,47 @@
+"""The pseudo-inertia of a link, positive definite for physically consistent inertials (Wensing, Kim & Slotine 2018)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from flexcal.model.parts.inertia import INERTIAL, Inertia, parallel_axis
+
+
+def _basis() -> np.ndarray:
+    result = np.zeros((len(INERTIAL), 4, 4))
+    for matrix, key in zip(result, INERTIAL, strict=True):
+        if key == "mass":
+            matrix[3, 3] = 1.0
+            continue
+        places = ["xyz".index(axis) for axis in key[-2:] if axis in "xyz"]
+        row, column = places[0], places[-1]
+        if key.startswith("mc_"):
+            matrix[row, 3] = matrix[3, row] = 1.0
+        elif row == column:
+            matrix[:3, :3] = 0.5 * np.eye(3)
+            matrix[row, row] -= 1.0
+        else:
+            matrix[row, column] = matrix[column, row] = -1.0
+    return result
+
+
+PSEUDO_INERTIA = _basis()
+"""(10, 4, 4): what one unit of each parameter in `INERTIAL` adds to [[Σ, mc], [mcᵀ, m]], Σ = ½ tr(I) 1 - I at the joint frame."""
+
+
+def pseudo_inertia(link: Inertia) -> np.ndarray:
+    """[[Σ, mc], [mcᵀ, m]] (4, 4) of a link at its joint frame, in kg m², kg m and kg."""
+    at_joint = link.inertia + parallel_axis(link.mass, link.com)
+    result = np.empty((4, 4))
+    result[:3, :3] = 0.5 * np.trace(at_joint) * np.eye(3) - at_joint
+    result[:3, 3] = result[3, :3] = link.mass * link.com
+    result[3, 3] = link.mass
+    return result
+
+
+def is_body(values: Mapping[str, float], link: str) -> bool:
+    """Whether some body has the ten named parameters of a link: positive mass, and triangle inequalities that hold strictly."""
+    own = np.array([values[f"{link}.{key}"] for key in INERTIAL])
+    return bool(np.linalg.eigvalsh(np.tensordot(own, PSEUDO_INERTIA, 1))[0] > 0)

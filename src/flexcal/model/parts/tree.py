@@ -1,0 +1,35 @@
+"""Kinematic tree of the kernels, made of joints and bearing frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Literal
+
+import numpy as np
+
+from flexcal.kernels import Tree
+from flexcal.model.parts.joint import Joint
+
+Bearings = Literal["before", "after"]
+"""Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
+
+
+def bearing_frame(joint: Joint) -> np.ndarray:
+    """The default bearing frame (3, 3) of a joint: z its axis, x the first axis normal to it."""
+    x = joint.normals[0]
+    return np.column_stack([x, np.cross(joint.axis, x), joint.axis])
+
+
+def kinematic_tree(
+    joints: Sequence[Joint], bearing_frames: Mapping[int, np.ndarray], bearings: Bearings | None = None
+) -> Tree:
+    """The kernels' view of some joints, of the bearing frames (3, 3) of the elastic ones by joint index, and of where bearings tilt."""
+    return Tree.build(
+        [j.parent for j in joints],
+        [j.kind == "prismatic" for j in joints],
+        np.array([j.rotation for j in joints]),
+        np.array([j.translation for j in joints]),
+        np.array([j.normals for j in joints]),
+        np.array([bearing_frames.get(i, bearing_frame(j)) for i, j in enumerate(joints)]),
+        bearings == "before",
+    )

@@ -1,0 +1,75 @@
+"""Sensors on the arm side of the springs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexcal.model.robot.config import ArmSensorConfig
+
+
+@dataclass(frozen=True, eq=False)
+class ArmSensor:
+    """What sees one point of a link move in one direction: an accelerometer on it, or a vibrometer that stands still.
+
+    `xyz` (3,) m is the point in the frame of the link that moves with joint number `joint`. `direction` (3,), of unit length, is in the
+    link's frame where the sensor `moves` with the link, else in the robot's base frame. `order` is the time derivative that is measured: 0
+    for a displacement, 1 for a velocity, 2 for an acceleration. An accelerometer measures n · (p̈ − g), so that its tilt counts.
+    """
+
+    name: str
+    joint: int
+    xyz: np.ndarray
+    direction: np.ndarray
+    moves: bool
+    order: int
+    config: ArmSensorConfig
+
+    @property
+    def unit(self) -> str:
+        """SI unit of its readings."""
+        return ("m", "m/s", "m/s²")[self.order]
+
+    @property
+    def feels_gravity(self) -> bool:
+        """Whether its tilt changes the reading: an accelerometer that turns with the link."""
+        return self.moves and self.order == 2
+
+    @property
+    def mounting_std(self) -> np.ndarray:
+        """1σ (5,) of its errors of mounting, in the order of `mounting_names`."""
+        return np.repeat([self.config.position_std, self.config.direction_std], [3, 2])
+
+    def misplaced(self, errors: np.ndarray) -> ArmSensor:
+        """This sensor with `errors` (5,) of mounting: three of its position in m, two of its direction in rad."""
+        first = np.cross(self.direction, np.eye(3)[np.argmin(np.abs(self.direction))])
+        first /= np.linalg.norm(first)
+        turned = self.direction + errors[3] * first + errors[4] * np.cross(self.direction, first)
+        return replace(self, xyz=self.xyz + errors[:3], direction=turned / np.linalg.norm(turned))
+
+    @property
+    def column(self) -> str:
+        """The column of its readings in a log."""
+        return sensor_column(self.name)
+
+
+def sensor_column(name: str) -> str:
+    """The column of a log that holds the readings of the sensor of this name."""
+    return f"sensor_{name}"
+
+
+def sensitivity_name(sensor: str) -> str:
+    """Name of what the readings of a sensor on the arm are multiplied by."""
+    return f"sensor.{sensor}.sensitivity"
+
+
+def sensor_delay_name(sensor: str) -> str:
+    """Name of the delay of the readings of a sensor on the arm."""
+    return f"sensor.{sensor}.delay"
+
+
+def mounting_names(sensor: str) -> tuple[str, ...]:
+    """Names of the five errors of mounting of a sensor on the arm, in the order that `ArmSensor.misplaced` takes."""
+    keys = ("position_x", "position_y", "position_z", "direction_1", "direction_2")
+    return tuple(f"sensor.{sensor}.{key}" for key in keys)

@@ -1,0 +1,88 @@
+"""A robot with a payload or a measured point in any URDF frame, and the inertias that its joints carry."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexcal.errors import FlexcalError, InputError
+from flexcal.model.parts import Inertia, Payload, Point, parallel_axis
+from flexcal.model.robot.robot_model import RobotModel
+from flexcal.model.urdf import read_urdf
+
+if TYPE_CHECKING:
+    from flexcal.model.robot.robot_model import RobotModel
+
+
+def last_frame(model: RobotModel) -> str:
+    """The link of the last joint."""
+    return model.joints[-1].link
+
+
+def holding(model: RobotModel, frame: str, mass: float, com: np.ndarray, inertia: np.ndarray) -> RobotModel:
+    """`model` with a payload of `mass` (kg) in the URDF frame `frame`, as if robot.yaml declared it.
+
+    `com` (3,) m and `inertia` (3, 3) kg m² about it are in that frame. Raises `InputError` for a frame that the URDF lacks or that no
+    joint moves.
+    """
+    frames = read_urdf(model.urdf, model.config.locked).frames
+    place = frames.get(frame)
+    if place is None or place.joint < 0:
+        moving = ", ".join(name for name, known in frames.items() if known.joint >= 0)
+        raise InputError(f"no joint of {model.urdf.name} moves a frame '{frame}'; name one of {moving}.")
+    held = Payload(frame, place.joint, place.rotation, place.translation, mass, 0.0, com, inertia)
+    return replace(
+        model,
+        nominal_payload=held,
+        payload_mass=np.array([mass]),
+        payload_com=np.array(com),
+        payload_inertia=held.moments,
+    )
+
+
+def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[Inertia, ...]:
+    """Inertia of every joint's link, the payload (kg, default: the declared one) merged into the link that carries it."""
+    held = model.payload
+    if held is None:
+        if payload:
+            raise FlexcalError(
+                f"a payload of {payload:g} kg is given but {model.path} declares none; add `payload:`."
+            )
+        return model.inertias
+    mass = held.mass if payload is None else payload
+    if mass == 0:
+        return model.inertias
+    link, own = model.inertias[held.joint], held.carried(mass)
+    total = link.mass + mass
+    com = (link.mass * link.com + mass * own.com) / total
+    inertia = link.inertia + own.inertia
+    inertia = inertia + parallel_axis(link.mass, link.com - com) + parallel_axis(mass, own.com - com)
+    return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
+
+
+def with_frame(model: RobotModel, frame: str) -> RobotModel:
+    """`model` with a point named as the URDF frame `frame`, at its origin, after the declared ones; itself where robot.yaml declares that.
+
+    Raises `InputError` for a frame that the URDF lacks or that no joint moves, and where a declared point of that name is elsewhere.
+    """
+    declared = model.points.get(frame)
+    if declared is not None:
+        if declared.frame == frame and not declared.xyz.any():
+            return model
+        raise InputError(
+            f"{model.path} declares a point '{frame}' that is not at the origin of the frame '{frame}'; rename it there, or give --target."
+        )
+    frames = read_urdf(model.urdf, model.config.locked).frames
+    place = frames.get(frame)
+    if place is None or place.joint < 0:
+        moving = ", ".join(name for name, known in frames.items() if known.joint >= 0)
+        raise InputError(f"no joint of {model.urdf.name} moves a frame '{frame}'; give one of {moving}.")
+    point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
+    return replace(
+        model,
+        points=MappingProxyType({**model.points, frame: point}),
+        point_error=np.vstack([model.point_error, np.zeros(3)]),
+    )

@@ -1,0 +1,360 @@
+"""Content of robot.yaml, one frozen dataclass per block (FORMATS: robot.yaml)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal
+
+from flexcal.errors import FlexcalError
+from flexcal.model.parts import Bearings
+
+Triple = tuple[float, float, float]
+_LEAST_PRIOR = 1e-12
+
+
+@dataclass(frozen=True)
+class AcceptanceConfig:
+    """A reflector fixed to the tool is seen within `half_angle` (rad) of its `axis`, in the frame of the point: ±30° if not said."""
+
+    axis: Triple
+    half_angle: float = 0.5236
+
+    def __post_init__(self) -> None:
+        if not any(self.axis) or not 0 < self.half_angle <= 3.1416:
+            raise FlexcalError(
+                "an acceptance needs an axis of three numbers, not all zero, and a half_angle between 0 and 3.1416 rad."
+            )
+
+
+@dataclass(frozen=True)
+class PointConfig:
+    """A reflector: nominal position `xyz` (m) in the URDF frame `frame`; `acceptance` where it does not turn towards the instrument."""
+
+    frame: str
+    xyz: Triple
+    acceptance: AcceptanceConfig | None = None
+
+
+@dataclass(frozen=True)
+class ArmSensorConfig:
+    """An accelerometer or a vibrometer that records in frequency experiments: the point `xyz` (m) in the URDF frame `frame`.
+
+    `direction` in which it measures: of an accelerometer in the axes of `frame`, with which it moves; of a vibrometer, which stands still,
+    in the robot's base frame. `quantity` is what the log holds, in m/s², m/s or m: without it the acceleration of an accelerometer and the
+    velocity of a vibrometer. 1σ: `sensitivity_std` relative, `position_std` m, `direction_std` rad, and `flatness_std`, by which the
+    sensitivity departs from a constant over frequency, relative.
+    """
+
+    frame: str
+    xyz: Triple
+    direction: Triple
+    kind: Literal["accelerometer", "vibrometer"] = "accelerometer"
+    quantity: Literal["acceleration", "velocity", "displacement"] | None = None
+    sensitivity_std: float = 0.02
+    position_std: float = 0.003
+    direction_std: float = 0.02
+    flatness_std: float = 0.01
+
+    def __post_init__(self) -> None:
+        if not any(self.direction):
+            raise FlexcalError("a sensor's direction has three numbers, not all zero.")
+        if not self.sensitivity_std > 0 or min(self.position_std, self.direction_std, self.flatness_std) < 0:
+            raise FlexcalError(
+                "a sensor's sensitivity_std must be positive, its position_std, direction_std and flatness_std not negative."
+            )
+
+
+@dataclass(frozen=True)
+class PayloadConfig:
+    """A body held by the robot: kg, m, kg m² about its centre of mass, in the axes of `frame`."""
+
+    frame: str
+    mass: float
+    com: Triple
+    mass_std: float = 0.0
+    inertia: tuple[Triple, Triple, Triple] | None = None
+
+    def __post_init__(self) -> None:
+        if self.mass < 0 or self.mass_std < 0:
+            raise FlexcalError("the payload's mass and mass_std must not be negative.")
+        if self.mass == 0 and (self.mass_std > 0 or self.inertia is not None):
+            raise FlexcalError(
+                "a payload of 0 kg has neither mass_std nor inertia; give the mass they belong to, or leave them out."
+            )
+
+
+@dataclass(frozen=True)
+class PriorConfig:
+    """How far nominal values may be off, 1σ: mass (relative), centre of mass (m), rotor inertia (relative), stiffness (relative), and the
+    torque constants behind the motor torques that a controller gives (relative; 0 for torques that were measured).
+
+    `length` (m) and `angle` (rad) are those of the joints' geometric errors, and `parameters` those of single ones by name; a geometric
+    parameter without is estimated from the measurements alone.
+    """
+
+    mass: float = 0.07
+    com: float = 0.010
+    rotor_inertia: float = 0.05
+    stiffness: float = 0.3
+    torque_constant: float = 0.02
+    length: float | None = None
+    angle: float | None = None
+    parameters: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("mass", "com", "torque_constant"):
+            if getattr(self, name) < 0 or 0 < getattr(self, name) < _LEAST_PRIOR:
+                raise FlexcalError(
+                    "the prior's mass, com and torque_constant must not be negative (0: known exactly), and no less than "
+                    f"{_LEAST_PRIOR:g} otherwise; {name} is {getattr(self, name):g}."
+                )
+        single = {"rotor_inertia": self.rotor_inertia, "stiffness": self.stiffness}
+        named = single | {"length": self.length, "angle": self.angle} | self.parameters
+        for name, value in named.items():
+            if value is not None and not value >= _LEAST_PRIOR:
+                raise FlexcalError(
+                    f"the prior's {name} must be positive, at least {_LEAST_PRIOR:g}, not {value:g}."
+                )
+
+
+@dataclass(frozen=True)
+class CouplingConfig:
+    """A transmission in which `motor` also turns `joint`, by `ratio`. For the identification of dynamics."""
+
+    motor: str
+    joint: str
+    ratio: float
+
+    def __post_init__(self) -> None:
+        if self.motor == self.joint or self.ratio == 0:
+            raise FlexcalError("a coupling is between two different joints, with a ratio other than 0.")
+
+
+@dataclass(frozen=True)
+class DrivesConfig:
+    """Drive values referred to the joint, one entry per joint: kg m², N m s/rad, N m, turns per turn.
+
+    `ratio` is for exported joint offsets, `coupling` for the identification of dynamics.
+    """
+
+    rotor_inertia: tuple[float, ...] | None = None
+    viscous: tuple[float, ...] | None = None
+    coulomb: tuple[float, ...] | None = None
+    ratio: tuple[float, ...] | None = None
+    coupling: tuple[CouplingConfig, ...] = ()
+
+
+@dataclass(frozen=True)
+class SpringConfig:
+    """Stiffness (N m/rad) and damping (N m s/rad) of one spring."""
+
+    stiffness: float
+    damping: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.stiffness > 0:
+            raise FlexcalError(f"a stiffness must be positive, not {self.stiffness:g} N m/rad.")
+        if self.damping < 0:
+            raise FlexcalError(f"a damping must not be negative, not {self.damping:g} N m s/rad.")
+
+
+@dataclass(frozen=True)
+class ElasticConfig:
+    """An elastic joint: its drive spring and, optionally, the two bearing springs.
+
+    `frame_rpy` turns the parent link's axes into the bearing's: z is the joint axis, x and y the tilt axes at q = 0. The default takes
+    the joint's own axis as z and the first axis normal to it, in cyclic order, as x.
+    """
+
+    joint: str
+    drive: SpringConfig
+    bearing_x: SpringConfig | None = None
+    bearing_y: SpringConfig | None = None
+    frame_rpy: Triple | None = None
+
+    def __post_init__(self) -> None:
+        if (self.bearing_x is None) != (self.bearing_y is None):
+            raise FlexcalError(
+                f"the elastic joint '{self.joint}' has one bearing spring; give bearing_x and bearing_y or neither."
+            )
+
+
+@dataclass(frozen=True)
+class GeometryConfig:
+    """Which terms the geometric calibration may use, and the joints with backlash."""
+
+    terms: str | tuple[str, ...] = "auto"
+    backlash: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        known = ("kinematic", "backlash", "gravity_compliance", "lateral_compliance", "transmission")
+        if isinstance(self.terms, str) and self.terms != "auto":
+            raise FlexcalError(
+                f"geometry terms must be 'auto' or a list out of {', '.join(known)}, not '{self.terms}'."
+            )
+        for term in () if isinstance(self.terms, str) else self.terms:
+            owner, _, kind = term.rpartition(".")
+            if kind not in (known[2:4] if owner else known):
+                raise FlexcalError(f"unknown geometry term '{term}'; known are {', '.join(known)}.")
+
+
+@dataclass(frozen=True)
+class JointSpringConfig:
+    """A spring parallel to a joint, as of a balancer or a hose package, against which the motor gives stiffness · (q - rest).
+
+    `stiffness` in N m/rad (N/m of a prismatic joint), `rest` in rad or m. What is absent is identified.
+    """
+
+    joint: str
+    stiffness: float | None = None
+    rest: float | None = None
+
+
+@dataclass(frozen=True)
+class CableTorqueConfig:
+    """A constant `torque` (N m, or N) that the motor of a joint gives against cables; absent: identified."""
+
+    joint: str
+    torque: float | None = None
+
+
+@dataclass(frozen=True)
+class DynamicsConfig:
+    """Signal treatment and friction of the identification of dynamics; an absent cut-off and decimation are proposed from the data.
+
+    friction: "classic" (viscous, Coulomb, offset), a list of terms, or "auto": the classic ones and what cross-validation adds to them.
+    torque: what a logged torque is over a sample, as in plans; `tau` in files.
+    joint_springs, cable_torques: what acts on a joint beside motor and friction, one entry a joint.
+    """
+
+    friction: str | tuple[str, ...] = "auto"
+    cutoff_hz: float | None = None
+    decimation: int | None = None
+    mask_standstill: bool = True
+    torque: Literal["held", "instantaneous", "mean"] = field(default="instantaneous", metadata={"key": "tau"})
+    joint_springs: tuple[JointSpringConfig, ...] = ()
+    cable_torques: tuple[CableTorqueConfig, ...] = ()
+
+    def __post_init__(self) -> None:
+        if isinstance(self.friction, str) and self.friction not in ("auto", "classic"):
+            raise FlexcalError(
+                f"friction must be 'auto', 'classic' or a list of terms, not '{self.friction}'."
+            )
+        if self.cutoff_hz is not None and not self.cutoff_hz > 0:
+            raise FlexcalError(f"cutoff_hz must be positive, not {self.cutoff_hz:g} Hz.")
+        if self.decimation is not None and self.decimation < 1:
+            raise FlexcalError(f"decimation must be 1 or more, not {self.decimation}.")
+
+
+@dataclass(frozen=True)
+class ForceSensorConfig:
+    """A force and torque sensor whose axes lie at `xyz` (m), turned by `rpy` (rad), in the URDF frame `frame`.
+
+    wrench: whether the columns fx, fy, fz, mx, my, mz are what everything beyond the sensor does to the robot ("on_robot"), or the robot
+    to that ("on_environment"). offset: what they are without load; "zero" for a sensor that is tared there.
+    """
+
+    frame: str
+    wrench: Literal["on_robot", "on_environment"]
+    xyz: Triple = (0.0, 0.0, 0.0)
+    rpy: Triple = (0.0, 0.0, 0.0)
+    offset: Literal["estimated", "zero"] = "estimated"
+
+
+@dataclass(frozen=True)
+class StationConfig:
+    """Where the instrument stands, in the robot's base frame (m), for planning; the calibration estimates it, and needs none."""
+
+    xyz: Triple | None = None
+    line_of_sight: bool = False
+
+    def __post_init__(self) -> None:
+        if self.line_of_sight and self.xyz is None:
+            raise FlexcalError("line_of_sight needs the station's xyz (m in the base frame).")
+
+
+@dataclass(frozen=True)
+class BoxConfig:
+    """Corners of a box in the robot's base frame, m."""
+
+    lower: Triple
+    upper: Triple
+
+    def __post_init__(self) -> None:
+        for axis, low, high in zip("xyz", self.lower, self.upper, strict=True):
+            if not low < high:
+                raise FlexcalError(
+                    f"the box's limits cross along {axis} ({low:g} to {high:g} m); give `lower` and `upper` corners."
+                )
+
+
+@dataclass(frozen=True)
+class LimitsConfig:
+    """What a designed motion keeps beside the URDF's limits.
+
+    Accelerations of the joints, rad/s² or m/s², the speed of the first point, m/s, and a box in which that stays.
+    """
+
+    acceleration: tuple[float, ...] | None = None
+    speed: float | None = None
+    box: BoxConfig | None = None
+
+    def __post_init__(self) -> None:
+        if min(self.acceleration or (1.0,)) <= 0 or (self.speed is not None and not self.speed > 0):
+            raise FlexcalError("limits of acceleration and speed must be positive.")
+
+
+@dataclass(frozen=True)
+class ControllerConfig:
+    """Joint-side PD gains (N m/rad, N m s/rad) and the rate (Hz) of the position controller."""
+
+    kp: tuple[float, ...]
+    kd: tuple[float, ...]
+    rate_hz: float
+
+    def __post_init__(self) -> None:
+        if min(self.kp, default=0.0) < 0 or min(self.kd, default=0.0) < 0 or not self.rate_hz > 0:
+            raise FlexcalError(
+                "the controller's kp and kd must not be negative, and its rate_hz must be positive."
+            )
+
+
+@dataclass(frozen=True)
+class SignalConfig:
+    """How columns of a log become SI values at the joint: matrix · (gain ⊙ column · unit) + offset · unit."""
+
+    columns: tuple[str, ...]
+    unit: str | None = None
+    gain: tuple[float, ...] | None = None
+    matrix: str | None = None
+    offset: tuple[float, ...] | None = None
+
+
+@dataclass(frozen=True)
+class RobotConfig:
+    """The whole of robot.yaml. `locked`: movable joints of the URDF that stand still, as those of a gripper, and where (rad or m).
+
+    `bearings` says whether the bearings of elastic joints tilt before or after the joint's rotation (Eq. 1: after); without it the data
+    decide, where they tell.
+    """
+
+    robot: str
+    points: dict[str, PointConfig] = field(default_factory=dict)
+    locked: dict[str, float] = field(default_factory=dict)
+    sensors: dict[str, ArmSensorConfig] = field(default_factory=dict)
+    payload: PayloadConfig | None = None
+    gravity: Triple = (0.0, 0.0, -9.81)
+    prior: PriorConfig = PriorConfig()
+    drives: DrivesConfig = DrivesConfig()
+    elastic: tuple[ElasticConfig, ...] = ()
+    bearings: Bearings | None = None
+    geometry: GeometryConfig = GeometryConfig()
+    dynamics: DynamicsConfig = DynamicsConfig()
+    stations: dict[str, StationConfig] = field(default_factory=dict)
+    obstacles: tuple[str, ...] = ()
+    limits: LimitsConfig = LimitsConfig()
+    working_volume: BoxConfig | None = None
+    controller: ControllerConfig | None = None
+    force_sensor: ForceSensorConfig | None = None
+    signals: dict[str, SignalConfig] = field(default_factory=dict)
+    estimates: str = "estimates.yaml"

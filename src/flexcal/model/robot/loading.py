@@ -1,0 +1,246 @@
+"""Reading of robot.yaml and URDF into the parts of a robot model."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.files.formats import YamlFile, read_yaml_file
+from flexcal.files.structuring import suggestion
+from flexcal.model.parts import (
+    ForceSensor,
+    Joint,
+    Payload,
+    Point,
+    bearing_frame,
+    kinematic_tree,
+    rpy_rotation,
+)
+from flexcal.model.robot.arm_sensor import ArmSensor
+from flexcal.model.robot.config import ElasticConfig, RobotConfig
+from flexcal.model.robot.parameter_names import COUPLED, FRICTION, PARALLEL, SCATTER
+from flexcal.model.urdf import Description, Frame, read_urdf
+
+HARMONICS = (1, 2, 3)
+
+
+def robot_parts(path: Path) -> dict[str, Any]:
+    """Arguments of `RobotModel` for a robot.yaml and its URDF; raises `InputError` with file and line where they do not fit."""
+    file = read_yaml_file(path)
+    config = file.structure(RobotConfig)
+    urdf = path.parent / config.robot
+    return _parts(file, config, urdf, read_urdf(urdf, config.locked))
+
+
+def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Description) -> dict[str, Any]:
+    joints = description.joints
+    n = len(joints)
+    names = [joint.name for joint in joints]
+    for k, name in enumerate(config.geometry.backlash):
+        _joint(file, ("geometry", "backlash", k), names, name)
+    for k, coupling in enumerate(config.drives.coupling):
+        _joint(file, ("drives", "coupling", k, "motor"), names, coupling.motor)
+        _joint(file, ("drives", "coupling", k, "joint"), names, coupling.joint)
+    for key in ("joint_springs", "cable_torques"):
+        entries = getattr(config.dynamics, key)
+        for k, entry in enumerate(entries):
+            _joint(file, ("dynamics", key, k, "joint"), names, entry.joint)
+            if entry.joint in {other.joint for other in entries[:k]}:
+                raise file.error(
+                    ("dynamics", key, k), f"the joint '{entry.joint}' stands twice under `{key}:`; keep one."
+                )
+    for key in ("kp", "kd") if config.controller is not None else ():
+        _check_count(file, ("controller", key), getattr(config.controller, key), n)
+    if config.limits.acceleration is not None:
+        _check_count(file, ("limits", "acceleration"), config.limits.acceleration, n)
+    points = {name: _point(file, description, name, config) for name in config.points}
+    payload = _payload(file, description, config)
+    stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
+    bearing_frames: dict[int, np.ndarray] = {}
+    carrying = {i for p in points.values() for i in _path(joints, p.joint)}
+    for k, entry in enumerate(config.elastic):
+        i = _joint(file, ("elastic", k, "joint"), names, entry.joint)
+        if i in bearing_frames:
+            raise file.error(
+                ("elastic", k), f"the joint '{entry.joint}' stands twice under `elastic:`; keep one."
+            )
+        if points and i not in carrying:
+            seen = ", ".join(points)
+            raise file.error(
+                ("elastic", k),
+                f"no declared point ({seen}) is downstream of the elastic joint '{entry.joint}'; "
+                "declare a point that it moves, or remove the joint from `elastic:`.",
+            )
+        bearing_frames[i] = _bearing_frame(file, k, entry, joints[i])
+        stiffness[i, 2], damping[i, 2] = entry.drive.stiffness, entry.drive.damping
+        for c, spring in enumerate((entry.bearing_x, entry.bearing_y)):
+            if spring is not None:
+                stiffness[i, c], damping[i, c] = spring.stiffness, spring.damping
+    stations = tuple(config.stations) or ("tracker",)
+    return dict(
+        config=config,
+        path=file.path,
+        urdf=urdf,
+        name=description.name,
+        joints=joints,
+        points=points,
+        nominal_payload=payload,
+        force_sensor=_force_sensor(file, description, config),
+        bearing_frames=bearing_frames,
+        tree=kinematic_tree(joints, bearing_frames, config.bearings),
+        stations=stations,
+        harmonics=HARMONICS,
+        geometry=np.zeros((n, 6)),
+        tool=np.zeros(6),
+        point_error=np.zeros((len(points), 3)),
+        station=np.zeros((len(stations), 6)),
+        scatter=np.zeros(len(SCATTER)),
+        backlash=np.zeros(n),
+        gravity_compliance=np.zeros(n),
+        lateral_compliance=np.zeros((n, 2)),
+        transmission=np.zeros((n, len(HARMONICS), 2)),
+        stiffness=stiffness,
+        damping=damping,
+        hardening=np.zeros(n),
+        held_inertia=np.zeros(n),
+        rotor_inertia=_per_joint(file, config, "rotor_inertia", n),
+        viscous=_per_joint(file, config, "viscous", n),
+        coulomb=_per_joint(file, config, "coulomb", n),
+        torque_offset=np.zeros(n),
+        parallel=np.zeros((n, len(PARALLEL))),
+        friction=np.zeros((n, len(FRICTION))),
+        coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
+        delay=np.zeros(n),
+        ratio=_per_joint(file, config, "ratio", n),
+        mass=np.array([y.mass for y in description.inertias]),
+        com=np.array([y.com for y in description.inertias]),
+        inertia=np.array([y.inertia for y in description.inertias]),
+        payload_mass=np.array([payload.mass if payload else 0.0]),
+        payload_com=np.array(payload.com if payload else np.zeros(3)),
+        payload_inertia=payload.moments if payload else np.zeros(6),
+        sensors={name: _sensor(file, description, name, config) for name in config.sensors},
+    )
+
+
+def _joint(file: YamlFile, keys: tuple[str | int, ...], names: list[str], name: str) -> int:
+    if name not in names:
+        raise file.error(keys, f"the URDF has no movable joint '{name}'; it has {', '.join(names)}.")
+    return names.index(name)
+
+
+def _frame(file: YamlFile, keys: tuple[str | int, ...], description: Description, name: str) -> Frame:
+    frame = description.frames.get(name)
+    if frame is None:
+        known = [f for f in description.frames if f != "universe"]
+        near = suggestion(name, known) or f"; it has {', '.join(known)}."
+        raise file.error(keys, f"the URDF lacks the frame '{name}'{near}")
+    if frame.joint < 0:
+        raise file.error(
+            keys, f"the frame '{name}' does not move with any joint; name one beyond the first joint."
+        )
+    return frame
+
+
+def _point(file: YamlFile, description: Description, name: str, config: RobotConfig) -> Point:
+    entry = config.points[name]
+    frame = _frame(file, ("points", name, "frame"), description, entry.frame)
+    return Point(name, entry.frame, frame.joint, frame.rotation, frame.translation, np.array(entry.xyz))
+
+
+_ORDERS = {"displacement": 0, "velocity": 1, "acceleration": 2}
+
+
+def _sensor(file: YamlFile, description: Description, name: str, config: RobotConfig) -> ArmSensor:
+    entry = config.sensors[name]
+    frame = _frame(file, ("sensors", name, "frame"), description, entry.frame)
+    if not re.fullmatch(r"\w+", name):
+        raise file.error(
+            ("sensors", name), f"the sensor's name '{name}' may have letters, digits and _ only."
+        )
+    moves = entry.kind == "accelerometer"
+    direction = np.array(entry.direction) / np.linalg.norm(entry.direction)
+    quantity = entry.quantity or ("acceleration" if moves else "velocity")
+    return ArmSensor(
+        name,
+        frame.joint,
+        frame.translation + frame.rotation @ np.array(entry.xyz),
+        frame.rotation @ direction if moves else direction,
+        moves,
+        _ORDERS[quantity],
+        entry,
+    )
+
+
+def _payload(file: YamlFile, description: Description, config: RobotConfig) -> Payload | None:
+    entry = config.payload
+    if entry is None:
+        return None
+    frame = _frame(file, ("payload", "frame"), description, entry.frame)
+    com = np.array(entry.com)
+    inertia = np.zeros((3, 3)) if entry.inertia is None else np.array(entry.inertia)
+    if np.linalg.eigvalsh(inertia)[0] < 0 or np.abs(inertia - inertia.T).max() > 0:
+        raise file.error(("payload", "inertia"), "the payload's inertia must be symmetric and positive.")
+    return Payload(
+        entry.frame, frame.joint, frame.rotation, frame.translation, entry.mass, entry.mass_std, com, inertia
+    )
+
+
+def _force_sensor(file: YamlFile, description: Description, config: RobotConfig) -> ForceSensor | None:
+    entry = config.force_sensor
+    if entry is None:
+        return None
+    frame = _frame(file, ("force_sensor", "frame"), description, entry.frame)
+    return ForceSensor(
+        frame.joint,
+        frame.rotation @ rpy_rotation(np.array(entry.rpy)),
+        frame.translation + frame.rotation @ np.array(entry.xyz),
+        1.0 if entry.wrench == "on_robot" else -1.0,
+    )
+
+
+def _bearing_frame(file: YamlFile, k: int, entry: ElasticConfig, joint: Joint) -> np.ndarray:
+    if joint.kind != "revolute":
+        raise file.error(
+            ("elastic", k, "joint"),
+            f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic.",
+        )
+    if entry.frame_rpy is None:
+        return bearing_frame(joint)
+    frame = joint.rotation.T @ rpy_rotation(np.array(entry.frame_rpy))
+    if frame[:, 2] @ joint.axis < 1 - 1e-6:
+        raise file.error(
+            ("elastic", k, "frame_rpy"),
+            f"the z axis of frame_rpy is not the axis of '{joint.name}'; turn it so that it is, or leave frame_rpy out.",
+        )
+    return frame
+
+
+def _per_joint(file: YamlFile, config: RobotConfig, key: str, n: int) -> np.ndarray:
+    values = getattr(config.drives, key)
+    if values is None:
+        return np.full(n, np.nan)
+    _check_count(file, ("drives", key), values, n)
+    if key != "ratio" and min(values) < 0:
+        raise file.error(("drives", key), f"{key} must not be negative, but is {min(values):g}.")
+    if key == "ratio" and 0 in values:
+        raise file.error(("drives", key), "a ratio of 0 is not possible; give motor turns per joint turn.")
+    return np.array(values)
+
+
+def _check_count(file: YamlFile, keys: tuple[str, str], values: Sequence[float], n: int) -> None:
+    if len(values) != n:
+        raise file.error(
+            keys, f"{keys[1]} has {len(values)} entries but the robot has {n} joints; give one per joint."
+        )
+
+
+def _path(joints: tuple[Joint, ...], joint: int) -> list[int]:
+    result = []
+    while joint >= 0:
+        result.append(joint)
+        joint = joints[joint].parent
+    return result

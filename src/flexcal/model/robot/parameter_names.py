@@ -1,0 +1,148 @@
+"""Table of parameter names (FORMATS): attribute of `RobotModel` and unit of each."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flexcal.model.robot.robot_model import RobotModel
+
+GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
+SPRINGS = ("bearing_x", "bearing_y", "drive")
+LATERAL = ("gravity_compliance_1", "gravity_compliance_2")
+FRICTION = (
+    "coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "load_stribeck", "stribeck", "presliding", "warm_up", "coulomb_warm_up",
+    "cable_stiffness",
+)  # fmt: skip
+PARALLEL = ("spring_stiffness", "spring_torque", "cable_torque")
+COUPLED = ("rotor_inertia", "viscous", "coulomb")
+INERTIALS = ("mass", "com_x", "com_y", "com_z")
+MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+STATION = ("x", "y", "z", "rx", "ry", "rz")
+SCATTER = ("instrument", "instrument_share", "robot", "angular", "model", "pose", "transmission")
+
+_UNITS = {
+    "offset": "rad", "misalignment_1": "rad", "misalignment_2": "rad", "length_x": "m", "length_y": "m", "length_z": "m",
+    "x": "m", "y": "m", "z": "m", "rx": "rad", "ry": "rad", "rz": "rad", "backlash": "rad", "gravity_compliance": "rad/(N m)",
+    "gravity_compliance_1": "rad/(N m)", "gravity_compliance_2": "rad/(N m)",
+    "stiffness": "N m/rad", "damping": "N m s/rad",
+    "rotor_inertia": "kg m²", "viscous": "N m s/rad", "coulomb": "N m",
+    "spring_stiffness": "N m/rad", "spring_torque": "N m", "cable_torque": "N m",
+    **dict.fromkeys(("fx_offset", "fy_offset", "fz_offset"), "N"), **dict.fromkeys(("mx_offset", "my_offset", "mz_offset"), "N m"),
+    "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
+    "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
+    "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
+    "warm_up": "N m s/rad", "coulomb_warm_up": "N m", "cable_stiffness": "N m/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
+    **dict.fromkeys(("position_x", "position_y", "position_z"), "m"), "direction_1": "rad", "direction_2": "rad",
+    "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad",
+}  # fmt: skip
+
+
+_OF_DRIVES = ("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION, *PARALLEL)
+_SLIDING = {
+    "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
+}  # fmt: skip
+
+
+def unit_in(model: RobotModel, name: str) -> str:
+    """SI unit of a parameter of a robot: that of a prismatic joint's drive, spring or friction is in N and m."""
+    unit, (owner, _, key) = unit_of(name), name.rpartition(".")
+    key, _, other = key.partition("_at_")
+    if key not in _OF_DRIVES or owner not in model.joint_names:
+        return unit
+    slides = [model.joints[model.joint_index(j)].kind == "prismatic" for j in (owner, other or owner)]
+    return _SLIDING.get(unit, unit) if all(slides) else unit
+
+
+def torque_units(model: RobotModel) -> dict[str, str]:
+    """SI unit of the torque, or force, of every joint."""
+    return {joint.name: "N" if joint.kind == "prismatic" else "N m" for joint in model.joints}
+
+
+def unit_of(name: str) -> str:
+    """SI unit of a parameter name, of joints that turn."""
+    last = name.rpartition(".")[2].partition("_at_")[0]
+    if last.startswith("transmission_"):
+        return "rad"
+    if last.startswith("I") and len(last) == 3:
+        return "kg m²"
+    return _UNITS.get(last, "1")
+
+
+def spring_names(model: RobotModel) -> tuple[str, ...]:
+    """Names of the stiffness, then of the damping of every spring, joint by joint: drive, bearing_x, bearing_y."""
+    springs = [
+        f"{joint.name}.{SPRINGS[c]}"
+        for joint in model.elastic
+        for c in ((2, 0, 1) if joint.bearings else (2,))
+    ]
+    return tuple(f"{spring}.{kind}" for kind in ("stiffness", "damping") for spring in springs)
+
+
+def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
+    """What robot.yaml declares to act on a joint beside motor and friction without saying how much, out of `PARALLEL`."""
+    config = model.config.dynamics
+    springs = [entry for entry in config.joint_springs if entry.joint == joint]
+    found = ["spring_stiffness"] if any(entry.stiffness is None for entry in springs) else []
+    found += ["spring_torque"] if any(entry.rest is None for entry in springs) else []
+    found += (
+        ["cable_torque"] if any(e.joint == joint and e.torque is None for e in config.cable_torques) else []
+    )
+    return tuple(found)
+
+
+def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
+    """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
+
+    Inertia entries of links (`<link>.Ixx`…, at the joint frame) and first moments (`<link>.mc_x`…) are not here: they depend on mass and
+    centre of mass too.
+    """
+    table: dict[str, tuple[str, tuple[int, ...]]] = {}
+    for s, name in enumerate(model.stations):
+        for k, key in enumerate(STATION):
+            table[f"station.{name}.{key}"] = ("station", (s, k))
+    elastic = {e.index: e for e in model.elastic}
+    for i, joint in enumerate(model.joints):
+        for k, key in enumerate(GEOMETRY):
+            table[f"{joint.name}.{key}"] = ("geometry", (i, k))
+        table[f"{joint.name}.backlash"] = ("backlash", (i,))
+        table[f"{joint.name}.gravity_compliance"] = ("gravity_compliance", (i,))
+        for k, key in enumerate(LATERAL):
+            table[f"{joint.name}.{key}"] = ("lateral_compliance", (i, k))
+        for h, order in enumerate(model.harmonics):
+            for k, key in enumerate(("sin", "cos")):
+                table[f"{joint.name}.transmission_{order}_{key}"] = ("transmission", (i, h, k))
+        for key in ("rotor_inertia", "viscous", "coulomb", "torque_offset", "delay"):
+            table[f"{joint.name}.{key}"] = (key, (i,))
+        for key in unknown_parallel(model, joint.name):
+            table[f"{joint.name}.{key}"] = ("parallel", (i, PARALLEL.index(key)))
+        for k, key in enumerate(FRICTION):
+            table[f"{joint.name}.{key}"] = ("friction", (i, k))
+        if i in elastic:
+            for k, key in enumerate(SPRINGS):
+                if key == "drive" or elastic[i].bearings:
+                    table[f"{joint.name}.{key}.stiffness"] = ("stiffness", (i, k))
+                    table[f"{joint.name}.{key}.damping"] = ("damping", (i, k))
+            table[f"{joint.name}.drive.hardening"] = ("hardening", (i,))
+        if i in model.braked:
+            table[f"{joint.name}.held_inertia"] = ("held_inertia", (i,))
+        table[f"{joint.link}.mass"] = ("mass", (i,))
+        for k, key in enumerate("xyz"):
+            table[f"{joint.link}.com_{key}"] = ("com", (i, k))
+    for c, entry in enumerate(model.config.drives.coupling):
+        for k, key in enumerate(COUPLED):
+            table[f"{entry.motor}.{key}_at_{entry.joint}"] = ("coupling", (c, k))
+    for k, key in enumerate(GEOMETRY):
+        table[f"tool.{key}"] = ("tool", (k,))
+    for p, name in enumerate(model.points):
+        for k, key in enumerate("xyz"):
+            table[f"point.{name}.{key}"] = ("point_error", (p, k))
+    for k, key in enumerate(SCATTER):
+        table[f"scatter.{key}"] = ("scatter", (k,))
+    if model.payload is not None:
+        table["payload.mass"] = ("payload_mass", (0,))
+        for k, key in enumerate("xyz"):
+            table[f"payload.com_{key}"] = ("payload_com", (k,))
+        for k, key in enumerate(MOMENTS):
+            table[f"payload.{key}"] = ("payload_inertia", (k,))
+    return table

@@ -1,0 +1,136 @@
+"""Prior knowledge of a robot, common to all identifications."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Parameter
+from flexcal.model.robot.arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_delay_name
+from flexcal.model.robot.parameter_names import GEOMETRY, spring_names, unit_in, unit_of
+from flexcal.model.robot.robot_model import RobotModel
+
+LENGTH_TOLERANCE = 3e-4
+"""1σ of an uncalibrated length, m."""
+ANGLE_TOLERANCE = 5e-4
+"""1σ of an uncalibrated offset or misalignment, rad."""
+GAP_TOLERANCE = 1e-4
+"""1σ of an uncalibrated backlash, half the gap, rad."""
+
+SPRING_LOG_STD = 1.5
+"""Prior of every stiffness and damping that a frequency response is to find, 1σ of the logarithm (a factor of 4.5): it only keeps the
+posterior proper."""
+FURTHER_SPRING_LOG_STD = 2.0
+"""The same for a spring that robot.yaml does not declare and the responses ask for, about a mode at the highest line."""
+SOFTEST_FURTHER_SPRING = 16.0
+"""How much softer it may be at most: with a mode at a quarter of the highest line. Softer ones would be seen by eye, and imitate
+friction."""
+FRICTION_LOG_STD = 1.5
+"""Prior of the motor's viscous coefficient in one pose of a frequency response, 1σ of the logarithm about what is seen or predicted."""
+FRICTION_TOLERANCE = 0.05
+"""1σ of the deviation of a motor's impedance from a viscous coefficient, relative to that, at any frequency."""
+SHARED_DISTORTION = 0.2
+"""Share of the nonlinear distortion of a frequency response that all realisations have in common, for reference motion and friction are
+the same in all: averaging over realisations does not lower it."""
+
+_POSITIVE = ("mass", "rotor_inertia", "stiffness")
+
+
+def uncertain_inertials(model: RobotModel, links: Collection[int]) -> list[str]:
+    """Names of mass and centre of mass of those of the `links` that have a mass, as far as robot.yaml's `prior:` lets them be off."""
+    keys = ["mass"] if model.prior.mass > 0 else []
+    keys += ["com_x", "com_y", "com_z"] if model.prior.com > 0 else []
+    return [f"{model.joints[i].link}.{key}" for i in sorted(links) if model.mass[i] > 0 for key in keys]
+
+
+def uncertain_payload(model: RobotModel) -> tuple[str, ...]:
+    """What is uncertain of the payload: its mass as robot.yaml's `mass_std` says, or what was identified of mass and centre of mass."""
+    held = model.nominal_payload
+    if held is None:
+        return ()
+    names = ("payload.mass", "payload.com_x", "payload.com_y", "payload.com_z")
+    found = tuple(name for name in names if model.posterior.determines(name))
+    return found or (("payload.mass",) if held.mass_std > 0 else ())
+
+
+def sensor_parameters(sensor: ArmSensor, sample_time: float) -> tuple[Parameter, ...]:
+    """Of a sensor on the arm: its sensitivity, about that stated, the delay of its readings, 0 ± the sample time in s, and its errors of
+    mounting."""
+    mounting = zip(mounting_names(sensor.name), sensor.mounting_std, strict=True)
+    return (
+        Parameter(
+            sensitivity_name(sensor.name), "1", 1.0, prior_std=sensor.config.sensitivity_std, scale="log"
+        ),
+        Parameter(sensor_delay_name(sensor.name), "s", 0.0, prior_std=sample_time),
+        *(Parameter(name, unit_of(name), 0.0, prior_std=std) for name, std in mounting if std > 0),
+    )
+
+
+def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
+    """Stiffness and damping of every spring, almost free, and the rotor inertias of the driven joints with robot.yaml's prior.
+
+    Raises `FlexcalError` for one without a positive value.
+    """
+    names = spring_names(model)
+    rotors = [f"{joint.name}.rotor_inertia" for joint in model.driven]
+    for name in (*names, *rotors):
+        if not model.value(name) > 0:
+            raise FlexcalError(f"{model.path} gives no positive value of {name} to start from; add one.")
+    declared_joints = {entry.joint for entry in model.config.elastic}
+
+    def spring(name: str) -> Parameter:
+        value, known = model.value(name), name.split(".")[0] in declared_joints
+        softest = -np.inf if known or name.endswith(".damping") else value / SOFTEST_FURTHER_SPRING
+        width = SPRING_LOG_STD if known else FURTHER_SPRING_LOG_STD
+        return Parameter(name, unit_of(name), value, lower=softest, prior_std=width, scale="log")
+
+    return (*map(spring, names), *(declared(model, name) for name in rotors))
+
+
+def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
+    """What robot.yaml leaves uncertain of the links that an elastic joint moves and, where `loaded`, the payload's mass."""
+    elastic = {joint.index for joint in model.elastic}
+    moved = []
+    for i in range(model.n):
+        at = i
+        while at >= 0 and at not in elastic:
+            at = model.joints[at].parent
+        moved += [i] if at >= 0 else []
+    items = [declared(model, name) for name in uncertain_inertials(model, moved)]
+    held = model.payload
+    if loaded and held is not None and held.mass > 0 and uncertain_payload(model):
+        items.append(declared(model, "payload.mass"))
+    return items
+
+
+def declared(model: RobotModel, name: str) -> Parameter:
+    """A parameter at the model's value, with what robot.yaml and workshop tolerances say of it as its prior.
+
+    Mass, rotor inertia and stiffness are estimated as logarithms. A link's inertia about its centre of mass goes with its mass and has no
+    prior of its own; friction and torque offset have none at all.
+    """
+    value, key = model.value(name), name.rpartition(".")[2]
+    std = _std(model, name, key)
+    scale = "log" if key in _POSITIVE else "linear"
+    lower = 0.0 if key == "hardening" else -np.inf
+    return Parameter(name, unit_in(model, name), value, lower=lower, prior_std=std, scale=scale)
+
+
+def _std(model: RobotModel, name: str, key: str) -> float:
+    if name == "payload.mass":
+        held = model.nominal_payload
+        assert held is not None
+        return held.mass_std / held.mass if held.mass_std > 0 else float("inf")
+    if key in GEOMETRY:
+        return LENGTH_TOLERANCE if key.startswith("length") else ANGLE_TOLERANCE
+    return {
+        "mass": model.prior.mass,
+        "com_x": model.prior.com,
+        "com_y": model.prior.com,
+        "com_z": model.prior.com,
+        "rotor_inertia": model.prior.rotor_inertia,
+        "stiffness": model.prior.stiffness,
+        "backlash": GAP_TOLERANCE,
+    }.get(key, float("inf"))

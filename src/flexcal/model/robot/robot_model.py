@@ -1,0 +1,345 @@
+"""The robot model: nominal from robot.yaml and URDF, updated by estimates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields, replace
+from difflib import get_close_matches
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.estimation import Estimate
+from flexcal.files.transaction import current
+from flexcal.kernels import Tree
+from flexcal.model.parts import (
+    Bearings,
+    ElasticJoint,
+    ForceSensor,
+    Inertia,
+    Joint,
+    Payload,
+    Point,
+    bearing_frame,
+    kinematic_tree,
+    parallel_axis,
+)
+from flexcal.model.robot.arm_sensor import ArmSensor
+from flexcal.model.robot.config import ControllerConfig, PriorConfig, RobotConfig
+from flexcal.model.robot.parameter_names import locations
+from flexcal.model.robot.posterior import NOTHING_ESTIMATED, Posterior
+
+_MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
+_FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
+
+
+@dataclass(frozen=True, eq=False)
+class RobotModel:
+    """An immutable robot: structure from the URDF, and one array a kind of parameter (n joints, SI units).
+
+    Every number that can be identified has a name (FORMATS): `values` reads them all, `with_values` makes a changed robot. Setting a
+    link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first moment `mc_x`…
+    (mass times centre of mass, after the mass) moves that inertia rigidly.
+    """
+
+    config: RobotConfig
+    path: Path
+    urdf: Path
+    name: str
+    joints: tuple[Joint, ...]
+    points: Mapping[str, Point]
+    nominal_payload: Payload | None
+    force_sensor: ForceSensor | None
+    bearing_frames: Mapping[int, np.ndarray]
+    tree: Tree
+    stations: tuple[str, ...]
+    harmonics: tuple[int, ...]
+    geometry: np.ndarray
+    tool: np.ndarray
+    point_error: np.ndarray
+    station: np.ndarray
+    scatter: np.ndarray
+    backlash: np.ndarray
+    gravity_compliance: np.ndarray
+    lateral_compliance: np.ndarray
+    transmission: np.ndarray
+    stiffness: np.ndarray
+    damping: np.ndarray
+    hardening: np.ndarray
+    held_inertia: np.ndarray
+    rotor_inertia: np.ndarray
+    viscous: np.ndarray
+    coulomb: np.ndarray
+    torque_offset: np.ndarray
+    parallel: np.ndarray
+    friction: np.ndarray
+    coupling: np.ndarray
+    delay: np.ndarray
+    ratio: np.ndarray
+    mass: np.ndarray
+    com: np.ndarray
+    inertia: np.ndarray
+    payload_mass: np.ndarray
+    payload_com: np.ndarray
+    payload_inertia: np.ndarray
+    posterior: Posterior = NOTHING_ESTIMATED
+    braked: frozenset[int] = frozenset()
+    sensors: Mapping[str, ArmSensor] = field(default_factory=dict)
+
+    @classmethod
+    def from_yaml(cls, path: str | Path, *, estimates: bool = True) -> RobotModel:
+        """Read robot.yaml, its URDF and, where present, the estimates beside it; raises `InputError` with file and line."""
+        from flexcal.model.robot.loading import robot_parts
+        from flexcal.model.robot.stored_estimates import apply_estimates
+
+        model = cls(**robot_parts(Path(path)))
+        stored = model.path.parent / model.config.estimates
+        return apply_estimates(model, stored) if estimates and current(stored).exists() else model
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without the kernels' view, which is built anew where the robot arrives: other processes can be handed robots."""
+        return {field.name: getattr(self, field.name) for field in fields(self) if field.name != "tree"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        self.__dict__.update(
+            state, tree=kinematic_tree(state["joints"], state["bearing_frames"], state["config"].bearings)
+        )
+
+    def with_bearings(self, bearings: Bearings) -> RobotModel:
+        """The robot whose bearings are known to tilt before or after the joint's rotation, its parameters and posterior as they are."""
+        config = replace(self.config, bearings=bearings)
+        tree = kinematic_tree(self.joints, self.bearing_frames, bearings)
+        return replace(self, config=config, tree=tree)
+
+    def with_drive_springs(self, springs: Mapping[int, tuple[float, float]]) -> RobotModel:
+        """The robot with a drive spring, (stiffness in N m/rad, damping in N m s/rad), at each of some rigid joints, by index.
+
+        In a frequency experiment the motors of these joints are braked. Raises `FlexcalError` for a prismatic joint.
+        """
+        frames, stiffness, damping = dict(self.bearing_frames), self.stiffness.copy(), self.damping.copy()
+        for i, (constant, loss) in springs.items():
+            joint = self.joints[i]
+            if joint.kind != "revolute":
+                raise FlexcalError(
+                    f"the joint '{joint.name}' is prismatic; only revolute joints can be elastic."
+                )
+            frames[i] = bearing_frame(joint)
+            stiffness[i, 2], damping[i, 2] = constant, loss
+        return replace(
+            self,
+            bearing_frames=frames,
+            tree=kinematic_tree(self.joints, frames, self.config.bearings),
+            stiffness=stiffness,
+            damping=damping,
+            braked=self.braked | set(springs),
+        )
+
+    def with_estimated_springs(self, values: Mapping[str, float]) -> RobotModel:
+        """The robot with a drive spring at every rigid joint whose `<joint>.drive.stiffness` is among `values`."""
+        springs = {}
+        for i, name in enumerate(self.joint_names):
+            stiffness = values.get(f"{name}.drive.stiffness")
+            if stiffness is not None and i not in self.bearing_frames:
+                springs[i] = (stiffness, values.get(f"{name}.drive.damping", 0.0))
+        return self.with_drive_springs(springs) if springs else self
+
+    def with_brakes(self, excited: tuple[str, ...]) -> RobotModel:
+        """The robot in a frequency experiment that excites the named joints: the motors of all other elastic joints are braked."""
+        return replace(self, braked=frozenset(e.index for e in self.elastic if e.name not in excited))
+
+    @property
+    def n(self) -> int:
+        """Number of movable joints."""
+        return len(self.joints)
+
+    @cached_property
+    def joint_names(self) -> tuple[str, ...]:
+        """URDF names of the movable joints."""
+        return tuple(joint.name for joint in self.joints)
+
+    @property
+    def gravity(self) -> np.ndarray:
+        """Gravity (3,) in the base frame, m/s²."""
+        return np.array(self.config.gravity)
+
+    @property
+    def prior(self) -> PriorConfig:
+        """How far the nominal inertials may be off."""
+        return self.config.prior
+
+    @property
+    def controller(self) -> ControllerConfig | None:
+        """The position controller, where declared."""
+        return self.config.controller
+
+    @property
+    def bearings(self) -> Bearings:
+        """Whether bearings tilt before the joint's rotation or after it: as Eq. (1) has it where nothing is known."""
+        return self.config.bearings or "after"
+
+    @property
+    def has_bearings(self) -> bool:
+        """Whether a joint has bearing springs, so that it matters where they tilt."""
+        return any(joint.bearings for joint in self.elastic)
+
+    @property
+    def backlash_joints(self) -> tuple[int, ...]:
+        """Indices of the joints declared to have backlash."""
+        return tuple(self.joint_index(name) for name in self.config.geometry.backlash)
+
+    @cached_property
+    def elastic(self) -> tuple[ElasticJoint, ...]:
+        """The joints with springs, in chain order."""
+        return tuple(
+            ElasticJoint(
+                i,
+                self.joints[i].name,
+                frame,
+                self.stiffness[i],
+                self.damping[i],
+                bool(np.isfinite(self.stiffness[i, 0])),
+                self.bearings == "before",
+            )
+            for i, frame in sorted(self.bearing_frames.items())
+        )
+
+    @cached_property
+    def driven(self) -> tuple[ElasticJoint, ...]:
+        """The elastic joints whose motors are excited in a frequency experiment: those that are not `braked`."""
+        return tuple(joint for joint in self.elastic if joint.index not in self.braked)
+
+    @cached_property
+    def inertias(self) -> tuple[Inertia, ...]:
+        """Inertia of the link of every joint."""
+        return tuple(
+            Inertia(float(m), c, y) for m, c, y in zip(self.mass, self.com, self.inertia, strict=True)
+        )
+
+    @property
+    def payload(self) -> Payload | None:
+        """The declared payload with its current mass, centre of mass and inertia."""
+        held = self.nominal_payload
+        if held is None:
+            return None
+        inertia = np.empty((3, 3))
+        for value, (row, column) in zip(self.payload_inertia, _MOMENTS.values(), strict=True):
+            inertia[row, column] = inertia[column, row] = value
+        return replace(held, mass=float(self.payload_mass[0]), com=self.payload_com, inertia=inertia)
+
+    @cached_property
+    def reach(self) -> float:
+        """Sum of the link lengths from the base to the farthest point, m."""
+        lengths = [float(np.linalg.norm(joint.translation)) for joint in self.joints]
+        far = [float(np.linalg.norm(p.translation) + np.linalg.norm(p.xyz)) for p in self.points.values()]
+        return sum(lengths) + max(far, default=0.0)
+
+    def joint_index(self, name: str) -> int:
+        """Index of a joint by its URDF name; raises `FlexcalError` that lists the names."""
+        if name not in self.joint_names:
+            raise FlexcalError(
+                f"there is no movable joint '{name}' in {self.urdf.name}; there are {', '.join(self.joint_names)}."
+            )
+        return self.joint_names.index(name)
+
+    def point(self, name: str | None = None) -> Point:
+        """A target by name, the first declared one without; raises `FlexcalError` that lists the names."""
+        if not self.points:
+            raise FlexcalError(
+                f"{self.path} declares no point; add one under `points:` so that there is something to measure."
+            )
+        key = next(iter(self.points)) if name is None else name
+        if key not in self.points:
+            raise FlexcalError(
+                f"there is no point '{key}' under `points:` in {self.path}; there are {', '.join(self.points)}."
+            )
+        return self.points[key]
+
+    def station_index(self, name: str) -> int:
+        """Index of one of the instrument's places; raises `FlexcalError` that lists the names."""
+        if name not in self.stations:
+            raise FlexcalError(
+                f"there is no station '{name}' in {self.path}, which has {', '.join(self.stations)}; declare it under `stations:`, "
+                "and the others there too."
+            )
+        return self.stations.index(name)
+
+    @cached_property
+    def _locations(self) -> dict[str, tuple[str, tuple[int, ...]]]:
+        return locations(self)
+
+    @cached_property
+    def values(self) -> Mapping[str, float]:
+        """Every named value, SI."""
+        table = {name: float(getattr(self, field)[index]) for name, (field, index) in self._locations.items()}
+        for i, joint in enumerate(self.joints):
+            at_joint = self.inertia[i] + parallel_axis(self.mass[i], self.com[i])
+            table.update({f"{joint.link}.{key}": float(at_joint[index]) for key, index in _MOMENTS.items()})
+            table.update(
+                {
+                    f"{joint.link}.{key}": float(self.mass[i] * self.com[i, k])
+                    for key, k in _FIRST_MOMENTS.items()
+                }
+            )
+        return MappingProxyType(table)
+
+    def value(self, name: str) -> float:
+        """One named value, SI; raises `FlexcalError` that suggests close names."""
+        if name not in self.values:
+            close = get_close_matches(name, self.values, 3)
+            raise FlexcalError(
+                f"unknown parameter '{name}'{'; did you mean ' + ', '.join(close) if close else ''}."
+            )
+        return self.values[name]
+
+    def with_values(self, values: Mapping[str, float]) -> RobotModel:
+        """A robot with some named values changed; raises `FlexcalError` for an unknown name."""
+        arrays: dict[str, np.ndarray] = {}
+
+        def own(field: str) -> np.ndarray:
+            return arrays.setdefault(field, getattr(self, field).copy())
+
+        moments: dict[int, dict[str, float]] = {}
+        for name, value in values.items():
+            if name in self._locations:
+                field, index = self._locations[name]
+                own(field)[index] = value
+                if field == "mass" and self.mass[index] > 0:
+                    own("inertia")[index] = self.inertia[index] * (value / self.mass[index])
+                elif field == "payload_mass" and self.payload_mass[0] > 0:
+                    own("payload_inertia")[:] = self.payload_inertia * (value / self.payload_mass[0])
+            else:
+                self.value(name)
+                link, _, key = name.rpartition(".")
+                moments.setdefault([j.link for j in self.joints].index(link), {})[key] = value
+        for i, entries in moments.items():
+            for key in _FIRST_MOMENTS.keys() & entries.keys():
+                own("com")[i, _FIRST_MOMENTS[key]] = self._com_of(i, entries.pop(key), own("mass")[i])
+            moved = parallel_axis(own("mass")[i], own("com")[i])
+            at_joint = own("inertia")[i] + moved
+            for key, value in entries.items():
+                row, column = _MOMENTS[key]
+                at_joint[row, column] = at_joint[column, row] = value
+            own("inertia")[i] = at_joint - moved
+        return replace(self, **arrays)
+
+    def _com_of(self, link: int, first_moment: float, mass: float) -> float:
+        if mass == 0 and first_moment != 0:
+            raise FlexcalError(
+                f"the link '{self.joints[link].link}' has no mass, so it can have no first moment."
+            )
+        return first_moment / mass if mass != 0 else 0.0
+
+    def with_estimate(self, estimate: Estimate) -> RobotModel:
+        """A robot with the values of an estimate that are the robot's own, carrying their joint covariance.
+
+        A rigid joint whose drive stiffness was estimated gets that spring.
+        """
+
+        widened = self.with_estimated_springs(estimate.values)
+        own = tuple(name for name in estimate.parameters.names if name in widened.values)
+        changed = widened.with_values({name: estimate.values[name] for name in own})
+        return replace(changed, posterior=self.posterior.updated(estimate, own))

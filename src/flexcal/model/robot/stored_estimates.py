@@ -1,0 +1,128 @@
+"""Application of stored estimates to a robot."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, cast
+
+import numpy as np
+
+from flexcal.errors import InputError
+from flexcal.estimation import Estimate
+from flexcal.files.formats import Block, read_estimates
+from flexcal.model.parts import Bearings, is_body
+from flexcal.model.robot.attached_payload import holding
+from flexcal.model.robot.parameter_names import unit_in, unit_of
+
+if TYPE_CHECKING:
+    from flexcal.model.robot.robot_model import RobotModel
+
+PAYLOAD_FRAME = "frame"
+"""Of the provenance of the block `payload`: the URDF frame that its values are in."""
+BEARINGS = "option.bearings"
+"""Of the provenance of the blocks `stiffness` and `calibration`: the bearings that they were estimated with."""
+NUISANCE = re.compile(
+    r".*\.(pose_[0-9]+|half_gap|held_inertia|arm_inertia|arm_viscous|arm_coulomb|(drive|bearing_x|bearing_y)\.torque_offset"
+    r"|drive\.gap_torque|drive\.(stiffness|damping)_at_.+)|force_sensor\.[fm][xyz]_offset"
+    r"|sensor\..+\.(sensitivity|delay|position_[xyz]|direction_[12])"
+)
+"""Names of what was estimated for an experiment, and of what the flexible model tells apart: not the robot's own here."""
+
+
+def apply_estimates(model: RobotModel, path: Path, *, without: Block | None = None) -> RobotModel:
+    """`model` with every block of an estimates file but `without`, later blocks last; raises `InputError` as `with_blocks` does."""
+    return with_blocks(model, read_estimates(path, without=without), path)
+
+
+def with_blocks(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
+    """`model` with the estimates of `blocks`, which come from the file `path`.
+
+    A joint whose backlash was estimated counts as declared to have backlash, one whose drive stiffness was estimated as elastic, and a
+    payload that was identified as declared in its frame.
+    Raises `InputError` for a unit that is not the parameter's; for a name that the robot does not have: the file is then of another
+    robot, or robot.yaml has changed since; where robot.yaml declares the payload in another frame; and for an elastic robot where
+    `dynamics` has links that no body can be, as linear least squares may: they give the right torques at the joints, and wrong ones
+    everywhere else. Bearings that robot.yaml does not declare are those of the blocks; raises too where they are others than declared, or
+    not the same in all blocks.
+    """
+    model = _with_bearings(model, blocks, path)
+    if "payload" in blocks:
+        model = _with_payload(model, blocks["payload"], path)
+    for block, estimate in blocks.items():
+        model = model.with_estimated_springs(estimate.values)
+        unknown = [
+            n for n in estimate.parameters.names if n not in model.values and not NUISANCE.fullmatch(n)
+        ]
+        if unknown:
+            raise InputError(
+                f"{path}: the block '{block}' has '{unknown[0]}', which the robot of {model.path} does not have; "
+                "identify again, or give the robot.yaml that belongs to it."
+            )
+        _check_units(model, block, estimate, path)
+        model = _with_backlash_joints(model.with_estimate(estimate), estimate)
+        if block == "dynamics" and model.elastic:
+            _check_bodies(model, estimate, path)
+    return model
+
+
+def _check_units(model: RobotModel, block: Block, estimate: Estimate, path: Path) -> None:
+    for parameter in estimate.parameters:
+        units = (unit_in(model, parameter.name), unit_of(parameter.name))
+        if parameter.name in model.values and parameter.unit not in units:
+            raise InputError(
+                f"{path}: the block '{block}' has '{parameter.name}' in '{parameter.unit}', not in {units[0]}; identify again."
+            )
+
+
+def _with_bearings(model: RobotModel, blocks: Mapping[Block, Estimate], path: Path) -> RobotModel:
+    for block, estimate in blocks.items():
+        if BEARINGS not in estimate.provenance:
+            continue
+        bearings = cast(Bearings, estimate.provenance[BEARINGS])
+        if model.config.bearings is None:
+            model = model.with_bearings(bearings)
+        elif model.bearings != bearings:
+            again = "calibrate" if block == "calibration" else f"identify {block}"
+            raise InputError(
+                f"{path}: the block '{block}' was estimated with `bearings: {bearings}`, but the robot has `bearings: {model.bearings}` "
+                f"by {model.path} or by another block; run 'flexcal {again}' again."
+            )
+    return model
+
+
+def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotModel:
+    """With the identified payload's frame, whose values come with its block."""
+    frame, declared = estimate.provenance.get(PAYLOAD_FRAME, ""), model.nominal_payload
+    if declared is None:
+        values = estimate.values
+        com = np.array([values[f"payload.com_{key}"] for key in "xyz"])
+        return holding(model, frame, values["payload.mass"], com, np.zeros((3, 3)))
+    if declared.frame != frame:
+        raise InputError(
+            f"{path}: the payload was identified in the frame '{frame}', but {model.path} declares it in '{declared.frame}'; run "
+            "'flexcal identify payload' again, or correct the frame."
+        )
+    return model
+
+
+def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
+    links = [joint.link for joint in model.joints if f"{joint.link}.mc_x" in estimate.parameters]
+    broken = [link for link in links if not is_body(estimate.values, link)]
+    if broken:
+        raise InputError(
+            f"{path}: the inertials in the block 'dynamics' are not physically consistent for {', '.join(broken)}, as elastic "
+            "joints require; run 'flexcal identify dynamics' with --estimator sdp."
+        )
+
+
+def _with_backlash_joints(model: RobotModel, estimate: Estimate) -> RobotModel:
+    declared = set(model.config.geometry.backlash)
+    found = [name for name in model.joint_names if f"{name}.backlash" in estimate.parameters]
+    if declared.issuperset(found):
+        return model
+    joints = tuple(name for name in model.joint_names if name in declared.union(found))
+    geometry = replace(model.config.geometry, backlash=joints)
+    return replace(model, config=replace(model.config, geometry=geometry))

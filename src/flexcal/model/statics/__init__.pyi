@@ -1,0 +1,31 @@
+from .deflected_tool import ToolAtRest, carried_mass, points_kinematics, tool_at_rest
+from .equilibrium import (
+    Equilibrium,
+    elastic_axes,
+    gravity_moments,
+    gravity_torque,
+    lateral_slopes,
+    spring_loads,
+    static_equilibrium,
+)
+from .flank import certain_flank
+from .hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_of
+
+__all__ = [
+    "REFERENCE_TWIST",
+    "Equilibrium",
+    "ToolAtRest",
+    "carried_mass",
+    "certain_flank",
+    "elastic_axes",
+    "gravity_moments",
+    "gravity_torque",
+    "lateral_slopes",
+    "points_kinematics",
+    "spring_loads",
+    "static_equilibrium",
+    "tangent_ratio",
+    "tool_at_rest",
+    "twist_by_hardening",
+    "twist_of",
+]

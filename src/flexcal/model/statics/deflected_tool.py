@@ -1,0 +1,100 @@
+"""Position of the tool of the deflected, calibrated robot at rest: the forward map of calibration and compensation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import PointKinematics, point_kinematics
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics.equilibrium import Equilibrium, static_equilibrium
+
+
+@dataclass(frozen=True, eq=False)
+class ToolAtRest:
+    """Targets at a batch of motor positions `q` (N, n), in the robot's base frame: how the arm rests, and where that puts them."""
+
+    model: RobotModel
+    q: np.ndarray
+    rest: Equilibrium
+    kinematics: PointKinematics
+
+    def command_jacobian(self) -> np.ndarray:
+        """∂(position, rotation)/∂q (N, 6, n), m and rad per rad or m, on the same flank: with jacobians only.
+
+        The deflection follows the command (its gravity load changes); what `gravity_compliance` adds to that, some 1e-4, is left out.
+        """
+        by_motion = self.kinematics.motion_jacobian
+        axes = self.rest.axes
+        by_command = by_motion[:, :, :, 2].copy()
+        if len(axes):
+            by_load = np.matmul(by_motion[:, :, axes[:, 0], axes[:, 1]], self.rest.compliance)
+            by_command -= np.matmul(by_load, self.rest.coupling[:, :, ::6])
+        if self.model.transmission.any():
+            orders = np.array(self.model.harmonics)
+            phase = self.q[:, :, None] * orders
+            sine, cosine = np.moveaxis(orders[:, None] * self.model.transmission, 2, 0)
+            by_command *= 1 + (sine * np.cos(phase) - cosine * np.sin(phase)).sum(axis=2)[:, None, :]
+        return by_command
+
+
+def carried_mass(model: RobotModel, payload: np.ndarray | None, samples: int) -> np.ndarray:
+    """Payload (N,), kg, that the robot carries where a file says `payload` (N,): the declared one where it says nothing.
+
+    Where the payload was found to weigh more or less than declared, the values of the file are as much off. Raises `FlexcalError` for a
+    payload without a declaration.
+    """
+    nominal, found = model.nominal_payload, float(model.payload_mass[0])
+    if payload is None:
+        return np.full(samples, found)
+    if payload.any() and nominal is None:
+        raise FlexcalError(
+            f"the poses name a payload but {model.path} declares none; add `payload:` with its centre of mass."
+        )
+    return payload * (found / nominal.mass if nominal is not None and nominal.mass > 0 else 1.0)
+
+
+def tool_at_rest(
+    model: RobotModel,
+    q: np.ndarray,
+    payload: np.ndarray | None,
+    target: np.ndarray,
+    *,
+    flank: np.ndarray | None = None,
+    elastic: bool = True,
+    jacobians: bool = False,
+) -> ToolAtRest:
+    """The points `target` (N,), by name, of a robot whose motors stand at `q` (N, n), rad or m.
+
+    `payload` (N,) as `carried_mass` takes it; `flank` (N, n) fixes the side of the backlash, without it the drive torque at rest decides;
+    without `elastic` the arm is rigid. Raises `FlexcalError` for an unknown point and as `static_equilibrium` does.
+    """
+    masses = carried_mass(model, payload, len(q))
+    rest = static_equilibrium(model, q, masses, flank=flank, elastic=elastic, sensitivities=jacobians)
+    return ToolAtRest(
+        model, q, rest, points_kinematics(model, q, rest.deflection, target, jacobians=jacobians)
+    )
+
+
+def points_kinematics(
+    model: RobotModel, q: np.ndarray, deflection: np.ndarray | None, target: np.ndarray, *, jacobians: bool
+) -> PointKinematics:
+    """`point_kinematics` with a point (N,) of its own in every row."""
+    names = list(dict.fromkeys(target.tolist()))
+    if len(names) < 2:
+        return point_kinematics(model, q, deflection, point=next(iter(names), None), jacobians=jacobians)
+    rows = [np.flatnonzero(target == name) for name in names]
+    moved = [None if deflection is None else deflection[own] for own in rows]
+    parts = [
+        point_kinematics(model, q[own], bent, point=name, jacobians=jacobians)
+        for name, own, bent in zip(names, rows, moved, strict=True)
+    ]
+    order = np.argsort(np.concatenate(rows), kind="stable")
+
+    def joined(field: str) -> np.ndarray:
+        stacked = np.concatenate([getattr(part, field) for part in parts])
+        return stacked[order] if len(stacked) else stacked
+
+    return PointKinematics(**{field.name: joined(field.name) for field in fields(PointKinematics)})

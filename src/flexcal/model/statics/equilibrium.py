@@ -1,0 +1,253 @@
+"""The elastic arm at rest: deflection under gravity with the motors held (Eqs. 10-14), backlash flanks, sensitivities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexcal.errors import FlexcalError
+from flexcal.model.kinematics import joint_batch
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics.hardening import tangent_ratio, twist_of
+
+
+def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Axes of `misalignment_1` and `misalignment_2` (N, n, 2, 2) at `q` (N, n), by their components on the tilt axes x and y.
+
+    The former are fixed to the parent link; the latter turn with the joint, but for `bearings: before`. Zero for prismatic joints.
+    """
+    from flexcal.model.parts import bearing_frame
+
+    result = np.zeros((*q.shape, 2, 2))
+    motion = q + model.geometry[:, 0] if model.bearings == "after" else np.zeros(q.shape)
+    cosine, sine = np.cos(motion), np.sin(motion)
+    for i, joint in enumerate(model.joints):
+        if joint.kind != "revolute":
+            continue
+        frame = model.bearing_frames.get(i)
+        x, y = (joint.normals @ (bearing_frame(joint) if frame is None else frame))[:, :2].T
+        result[:, i, :, 0] = np.outer(cosine[:, i], x) + np.outer(sine[:, i], y)
+        result[:, i, :, 1] = np.outer(cosine[:, i], y) - np.outer(sine[:, i], x)
+    return result
+
+
+_FLANK_PASSES = 5
+_RIGID = 1e17
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """Rest positions of a batch of poses (n joints, d elastic coordinates, E elastic joints).
+
+    `deflection` (samples, n, 3) rad: tilt about x, about y, and twist of the arm beyond the motor, backlash included; `torque`
+    (samples, n) N m of the motor on the arm that holds gravity; `flank` (samples, n) the side of its backlash that the arm rests on,
+    the sign of that torque, 0 where there is none; `axes` (d, 2) joint and component of each elastic coordinate; `compliance`
+    (samples, d, d) rad/(N m), the inverse of spring plus gravity stiffness; `regressor` (samples, d, 4 n): the gravity load on each
+    coordinate by mass and first moment of each link; `coupling` (samples, d, 6 n) the same by offset, misalignments and lengths of every
+    joint. The last three are empty without sensitivities.
+    """
+
+    deflection: np.ndarray
+    torque: np.ndarray
+    flank: np.ndarray
+    axes: np.ndarray
+    compliance: np.ndarray
+    regressor: np.ndarray
+    coupling: np.ndarray
+
+
+def elastic_axes(model: RobotModel) -> list[tuple[int, int]]:
+    """Elastic coordinates from base to tool as (joint, component): 2 twist, 1 tilt about y, 0 tilt about x."""
+    return [(e.index, c) for e in model.elastic for c in e.components]
+
+
+def payload_batch(model: RobotModel, payload: np.ndarray | float | None, samples: int) -> np.ndarray:
+    """Payload mass per pose (samples,), kg: the declared one where None; raises `FlexcalError` without a declared payload."""
+    if payload is None:
+        return np.full(samples, model.payload_mass[0])
+    masses = np.ascontiguousarray(np.broadcast_to(np.asarray(payload, dtype=float), (samples,)))
+    if model.nominal_payload is None and masses.any():
+        raise FlexcalError(
+            f"a payload is given but {model.path} declares none; add `payload:` with its frame and centre of mass."
+        )
+    return masses
+
+
+def _solve(
+    model: RobotModel,
+    axes: list[tuple[int, int]],
+    stiffness: np.ndarray,
+    q: np.ndarray,
+    payload: np.ndarray,
+    *,
+    sensitivities: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Elastic deflection (samples, n, 3), compliance, regressor and coupling of `Equilibrium`."""
+    held = model.payload
+    try:
+        deflection, compliance, regressor, coupling, step = model.tree.equilibrium(
+            axes,
+            np.ascontiguousarray(stiffness, dtype=float),
+            np.ascontiguousarray(model.geometry),
+            np.ascontiguousarray(model.mass),
+            np.ascontiguousarray(model.mass[:, None] * model.com),
+            payload,
+            held.joint if held else -1,
+            np.ascontiguousarray(held.com_in_link if held else np.zeros(3)),
+            model.gravity,
+            q,
+            sensitivities,
+        )
+    except ValueError as problem:
+        raise FlexcalError(
+            f"{model.name}: {problem}; check the stiffnesses in robot.yaml and the payload."
+        ) from problem
+    if step > 1e-9:
+        raise FlexcalError(
+            f"{model.name}: no stable equilibrium was found (last step {step:.1e} rad); check the stiffnesses."
+        )
+    return deflection, compliance, regressor, coupling
+
+
+def gravity_torque(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
+    """Torque (samples, n), N m, that the drives must hold against gravity on the undeflected robot; `payload` (samples,) in kg.
+
+    Found by putting a spring of unbounded stiffness in every joint; prismatic joints read 0.
+    """
+    _, deflection, _, _ = _held_rigidly(model, q, payload, _twists(model), sensitivities=False)
+    return -_RIGID * deflection[:, :, 2]
+
+
+def gravity_moments(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Moments (samples, n, 2), N m, with which joints hold gravity about their axes of `misalignment_1` and `misalignment_2`.
+
+    As `gravity_torque` otherwise: of the undeflected robot, carrying everything beyond the joint; 0 for prismatic joints.
+    """
+    q = joint_batch(model, q)
+    tilts = [(i, component) for i, _ in _twists(model) for component in (1, 0)]
+    _, deflection, _, _ = _held_rigidly(model, q, payload, tilts, sensitivities=False)
+    return np.matmul(lateral_axes(model, q), -_RIGID * deflection[:, :, :2, None])[:, :, :, 0]
+
+
+def lateral_slopes(model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None) -> np.ndarray:
+    """Tilt (samples, n, 2, 2) of every joint by its two lateral compliances, about the tilt axes x and y (last), rad per rad/(N m).
+
+    Minus the moment that holds gravity, about an axis that is fixed to the parent link.
+    """
+    return -gravity_moments(model, q, payload)[:, :, :, None] * lateral_axes(model, joint_batch(model, q))
+
+
+def gravity_regressor(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Derivative (samples, n, 4 n) of `gravity_torque` by mass and first moment of each link, its payload's included."""
+    axes = _twists(model)
+    _, deflection, regressor, _ = _held_rigidly(model, q, payload, axes, sensitivities=True)
+    result = np.zeros((len(deflection), model.n, 4 * model.n))
+    result[:, [joint for joint, _ in axes]] = regressor
+    return result
+
+
+def spring_loads(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Torque (samples, d), N m, with which springs of the undeflected arm hold gravity, `regressor` and `coupling` of `Equilibrium`.
+
+    Those of the deflected arm differ by its angles, some 1e-3 of them, and are twice the work.
+    """
+    loads, _, regressor, coupling = _held_rigidly(model, q, payload, elastic_axes(model), sensitivities=True)
+    return -loads, regressor, coupling
+
+
+def _twists(model: RobotModel) -> list[tuple[int, int]]:
+    return [(i, 2) for i, joint in enumerate(model.joints) if joint.kind == "revolute"]
+
+
+def _held_rigidly(
+    model: RobotModel,
+    q: np.ndarray,
+    payload: np.ndarray | float | None,
+    axes: list[tuple[int, int]],
+    *,
+    sensitivities: bool,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Gravity load (samples, d) N m on springs of unbounded stiffness about the `axes`, their deflection, regressor and coupling."""
+    q = joint_batch(model, q)
+    masses = payload_batch(model, payload, len(q))
+    deflection, _, regressor, coupling = _solve(
+        model, axes, np.full(len(axes), _RIGID), q, masses, sensitivities=sensitivities
+    )
+    joints, components = (list(column) for column in zip(*axes, strict=True)) if axes else ([], [])
+    return _RIGID * deflection[:, joints, components], deflection, regressor, coupling
+
+
+def static_equilibrium(
+    model: RobotModel,
+    q: np.ndarray,
+    payload: np.ndarray | float | None = None,
+    *,
+    flank: np.ndarray | None = None,
+    elastic: bool = True,
+    sensitivities: bool = False,
+) -> Equilibrium:
+    """Rest position of every pose for motors held at `q` (samples, n), to 1e-12 rad.
+
+    `payload` (samples,) or a scalar in kg at the declared payload's centre of mass; None takes the declared mass. `flank` (samples, n)
+    overrides the sign of the drive torque that places the arm in the backlash (q_arm = q_M - τ/c - b sign τ, b half the gap); it is that
+    of the torque at rest itself, but for an arm that hangs within its gap, where either sign would pull it across: there one of the
+    two is taken. Without `elastic` the arm is rigid and only backlash and gravity compliance displace it. Lateral compliance tilts
+    axes without a change of the load on springs, some 1e-3 of it; what drives twist less because they harden is that of the undeflected
+    arm's load. Raises `FlexcalError` where springs cannot carry the arm.
+    """
+    q = joint_batch(model, q)
+    masses = payload_batch(model, payload, len(q))
+    axes = elastic_axes(model) if elastic else []
+    stiffness = np.array([model.stiffness[a] for a in axes])
+    if not (np.isfinite(stiffness) & (stiffness > 0)).all():
+        raise FlexcalError(
+            f"{model.name}: every stiffness must be positive and finite, not {stiffness.min():g} N m/rad."
+        )
+    load = gravity_torque(model, q, masses)
+    free = transmission_error(model, q) - load * model.gravity_compliance
+    loose = model.backlash > 0
+    drives = [k for k, (_, component) in enumerate(axes) if component == 2]
+    sprung = [axes[k][0] for k in drives]
+    hardening = model.hardening[sprung]
+    twist = twist_of(load[:, sprung], stiffness[drives], hardening)
+    free[:, sprung] += load[:, sprung] / stiffness[drives] - twist
+    rest = np.sign(load) if flank is None else flank
+    for last in (False,) * (_FLANK_PASSES - 1) + (True,):
+        slack = free - rest * model.backlash
+        deflection, *derivatives = _solve(
+            model, axes, stiffness, q + slack, masses, sensitivities=sensitivities
+        )
+        torque = load.copy()
+        torque[:, sprung] = -model.stiffness[sprung, 2] * deflection[:, sprung, 2]
+        if flank is not None or last or (np.sign(torque) == rest)[:, loose].all():
+            break
+        rest = np.sign(torque)
+    sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank
+    deflection[:, :, 2] += slack
+    if model.lateral_compliance.any():
+        slopes = lateral_slopes(model, q, masses)
+        deflection[:, :, :2] += np.matmul(model.lateral_compliance[:, None, :], slopes)[:, :, 0]
+    if sensitivities and hardening.any():
+        derivatives[0][:, drives] /= tangent_ratio(twist, hardening)[:, :, None]
+    has_backlash = np.zeros(model.n)
+    has_backlash[list(model.backlash_joints)] = 1.0
+    return Equilibrium(
+        deflection, torque, sign * has_backlash, np.array(axes, dtype=int).reshape(-1, 2), *derivatives
+    )
+
+
+def transmission_error(model: RobotModel, q: np.ndarray) -> np.ndarray:
+    """Harmonic transmission error (samples, n), rad: Σ a_k sin(k q) + b_k cos(k q)."""
+    if not model.transmission.any():
+        return np.zeros(q.shape)
+    phase = q[:, :, None] * np.array(model.harmonics)
+    return (model.transmission[:, :, 0] * np.sin(phase) + model.transmission[:, :, 1] * np.cos(phase)).sum(
+        axis=2
+    )

@@ -1,0 +1,53 @@
+"""Flank of a backlash under gravity, and its certainty."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.model.robot import INERTIALS, RobotModel
+from flexcal.model.statics.equilibrium import gravity_regressor, payload_batch
+
+CERTAIN = 3.0
+"""Standard deviations that the torque on a drive must be away from zero for its sign to be certain."""
+
+
+def certain_flank(
+    model: RobotModel, q: np.ndarray, torque: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Whether the sign of `torque` (samples, n) N m, with which drives hold gravity at `q` (samples, n), is certain, (samples, n)."""
+    return np.abs(torque) > CERTAIN * gravity_torque_std(model, q, payload)
+
+
+def gravity_torque_std(
+    model: RobotModel, q: np.ndarray, payload: np.ndarray | float | None = None
+) -> np.ndarray:
+    """Standard deviation (samples, n), N m, of the gravity torque at `q` (samples, n), to first order.
+
+    From the covariance of masses and centres of mass: that of the model's posterior where they were estimated, else independent ones as
+    `prior:` and the payload's `mass_std` say. `payload` (samples,) or a scalar in kg at the declared payload's centre of mass.
+    Prismatic joints read 0.
+    """
+    masses = payload_batch(model, payload, len(q))
+    regressor = gravity_regressor(model, q, masses).reshape(len(q), model.n, model.n, 4)
+    names: list[str] = []
+    rows: list[np.ndarray] = []
+    declared: list[float] = []
+    for k, joint in enumerate(model.joints):
+        names += [f"{joint.link}.{key}" for key in INERTIALS]
+        rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.com[k])
+        rows += [model.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
+        declared += [model.prior.mass * model.mass[k], *[model.prior.com] * 3]
+    held = model.payload
+    if held is not None and held.mass > 0:
+        own = regressor[:, :, held.joint]
+        names += ["payload.mass", "payload.com_x", "payload.com_y", "payload.com_z"]
+        rows.append((masses / held.mass)[:, None] * (own[:, :, 0] + own[:, :, 1:] @ held.com_in_link))
+        rows += [masses[:, None] * (own[:, :, 1:] @ held.rotation[:, c]) for c in range(3)]
+        declared += [held.mass_std, 0.0, 0.0, 0.0]
+    covariance = np.diag(np.square(declared))
+    known = [i for i, name in enumerate(names) if model.posterior.determines(name)]
+    parameters = model.posterior.parameters.subset([names[i] for i in known])
+    slopes = parameters.natural_slope(parameters.coordinates())
+    covariance[np.ix_(known, known)] = model.posterior.marginal(parameters.names) * np.outer(slopes, slopes)
+    slope = np.stack(rows, axis=2)
+    return np.sqrt(np.sum(np.matmul(slope, covariance) * slope, axis=2))

@@ -1,0 +1,13 @@
+from .description import Description, Frame, locked_joints, read_urdf
+from .elements import read_elements
+from .serial_arm import Arm, find_arm
+
+__all__ = [
+    "Arm",
+    "Description",
+    "Frame",
+    "find_arm",
+    "locked_joints",
+    "read_elements",
+    "read_urdf",
+]

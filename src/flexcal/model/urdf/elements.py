@@ -1,0 +1,102 @@
+"""The elements of a URDF with their line numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+
+from flexcal.errors import InputError
+from flexcal.files.transaction import current
+from flexcal.units import LARGEST
+
+_DEEPEST = 50
+_QUOTED = 60
+"""Letters of an attribute that a message quotes."""
+
+
+@dataclass(frozen=True)
+class Element:
+    """An XML element of the file `path`: its tag, attributes, first `line` and children."""
+
+    path: Path
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Element] = field(default_factory=list)
+
+    def all(self, tag: str) -> Iterator[Element]:
+        """The children of this tag."""
+        return (child for child in self.children if child.tag == tag)
+
+    def find(self, tag: str) -> Element | None:
+        """The first child of this tag."""
+        return next(self.all(tag), None)
+
+    def text(self) -> str:
+        """The element as XML, with attributes and children alone: no text, comments, entities or encoding."""
+        attributes = "".join(f" {name}={quoteattr(value)}" for name, value in self.attributes.items())
+        inside = "".join(child.text() for child in self.children)
+        return f"<{self.tag}{attributes}>{inside}</{self.tag}>" if inside else f"<{self.tag}{attributes}/>"
+
+    def error(self, sentence: str) -> InputError:
+        """An `InputError` that places `sentence` at the element's line."""
+        return InputError(f"{self.path} line {self.line}: {sentence}")
+
+    def numbers(self, attribute: str, count: int, owner: str) -> np.ndarray:
+        """The `count` finite numbers of an attribute; raises `InputError` that names its `owner` where it is missing or holds others."""
+        text = self.attributes.get(attribute)
+        if text is None:
+            raise self.error(f"<{self.tag}> of {owner} lacks the attribute '{attribute}'; add it.")
+        try:
+            values = np.array([float(word) for word in text.split()])
+        except ValueError:
+            values = np.array([np.nan])
+        if len(values) != count or not (np.abs(values) <= LARGEST).all():
+            what = "a number" if count == 1 else f"{count} numbers"
+            quoted = text if len(text) <= _QUOTED else f"{text[:_QUOTED]}…"
+            raise self.error(
+                f'{attribute}="{quoted}" in <{self.tag}> of {owner} is not {what}; write {what} with decimal points.'
+            )
+        return values
+
+
+def read_elements(path: Path) -> Element:
+    """The root element of an XML file; raises `InputError` where it is none, with line and column where it is not well-formed."""
+    parser = expat.ParserCreate()
+    above: list[Element] = []
+    roots: list[Element] = []
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        element = Element(path, tag, attributes, parser.CurrentLineNumber)
+        if len(above) > _DEEPEST:
+            raise element.error(
+                f"elements nest more than {_DEEPEST} deep, so this is no URDF; name the robot's URDF."
+            )
+        (above[-1].children if above else roots).append(element)
+        above.append(element)
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = lambda tag: above.pop()
+    try:
+        content = current(path).read_bytes()
+    except OSError as problem:
+        raise InputError(f"{path} cannot be read ({problem.strerror}); check the file.") from problem
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as problem:
+        if not content.lstrip(b"\xef\xbb\xbf\xff\xfe\x00 \t\r\n").startswith(b"<"):
+            raise InputError(f"{path}: this is no XML, so no URDF; name the robot's URDF.") from problem
+        raise InputError(
+            f"{path} line {problem.lineno}, column {problem.offset + 1}: not well-formed XML "
+            f"({expat.ErrorString(problem.code)}); correct it there."
+        ) from problem
+    except (ValueError, LookupError) as problem:
+        raise InputError(
+            f"{path} line 1: its encoding is not supported ({problem}); save it as UTF-8."
+        ) from problem
+    return roots[0]

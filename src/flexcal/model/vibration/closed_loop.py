@@ -1,0 +1,61 @@
+"""The linearised robot under position control: motion and drive torques due to an added torque."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexcal.model.robot import RobotModel
+from flexcal.model.statics import elastic_axes
+from flexcal.model.vibration.linearisation import Linearisation
+
+
+def closed_loop_motion(
+    system: Linearisation, frequencies_hz: np.ndarray, kp: np.ndarray, kd: np.ndarray
+) -> np.ndarray:
+    """Displacements (L, E + d, E), rad per N m added to each motor, at `frequencies_hz` (L,); gains (E,) of the motors' loops.
+
+    (M s² + D s + K + kp + kd s)⁻¹ B, the gains on the motors' coordinates alone.
+    """
+    s = 2j * np.pi * np.asarray(frequencies_hz, dtype=float)[:, None, None]
+    dynamics = s**2 * system.mass + s * system.damping + system.stiffness
+    motors = range(system.inputs)
+    dynamics[:, motors, motors] += kp + s[:, :, 0] * kd
+    forces = np.eye(len(system.mass), system.inputs)
+    return np.linalg.solve(dynamics, np.broadcast_to(forces, (len(s), *forces.shape)))
+
+
+def drive_pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
+    """Direction (E + d, E) in which each drive's spring is stretched: its twist less its motor."""
+    driven = {joint.index for joint in robot.driven}
+    twists = [
+        k for k, (joint, component) in enumerate(elastic_axes(robot)) if component == 2 and joint in driven
+    ]
+    pull = np.zeros((len(system.mass), system.inputs))
+    pull[range(system.inputs), range(system.inputs)] = -1.0
+    pull[system.inputs + np.array(twists), range(system.inputs)] = 1.0
+    return pull
+
+
+def strain_power(
+    robot: RobotModel, system: Linearisation, frequencies_hz: np.ndarray, kp: np.ndarray, kd: np.ndarray
+) -> np.ndarray:
+    """Mean square (L, E, E) of the torque in each elastic drive's spring by a cosine of 1 N m added to each motor (last)."""
+    stiffness = np.array([joint.stiffness[2] for joint in robot.driven])
+    moved = closed_loop_motion(system, frequencies_hz, kp, kd)
+    return 0.5 * np.abs(stiffness[:, None] * (drive_pull(robot, system).T @ moved)) ** 2
+
+
+def multisine_torque(
+    robot: RobotModel,
+    system: Linearisation,
+    frequencies_hz: np.ndarray,
+    excitation: np.ndarray,
+    kp: np.ndarray,
+    kd: np.ndarray,
+) -> np.ndarray:
+    """Standard deviation (E,) N m of the torque in each elastic drive's spring under multisines of independent phases.
+
+    `excitation` (E, L) N m are the cosine amplitudes added to the motors; otherwise as in `closed_loop_motion`.
+    """
+    power = strain_power(robot, system, frequencies_hz, kp, kd)
+    return np.sqrt(np.sum(power * excitation.T[:, None, :] ** 2, axis=(0, 2)))

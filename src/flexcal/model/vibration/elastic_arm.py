@@ -1,0 +1,158 @@
+"""The arm with its springs as a Pinocchio model: every elastic joint is three revolutes, twist, tilt about y, tilt about x (Eq. 1).
+
+Where the bearings are fixed to the parent link the two tilts come first.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexcal.model.kinematics import joint_placement
+from flexcal.model.parts import Inertia, bearing_frame
+from flexcal.model.robot import SPRINGS, RobotModel
+from flexcal.model.statics import elastic_axes
+
+
+class ElasticArm:
+    """A robot and a payload mass (kg) in Pinocchio, with the arm's own coordinates after the drives.
+
+    `elastic` (d,) are the velocity indices of the elastic coordinates in the order of `elastic_axes`; `model` and `data` are
+    Pinocchio's. Inertias can be exchanged (`set_inertia`), which is what derivatives with respect to them need.
+    """
+
+    def __init__(self, robot: RobotModel, payload: float | None = None) -> None:
+        import pinocchio as pin
+
+        self.robot = robot
+        self.payload = float(robot.payload_mass[0] if payload is None else payload)
+        self.model: Any = pin.Model()
+        self.model.gravity = pin.Motion(robot.gravity, np.zeros(3))
+        self.bodies: list[int] = []
+        self.turns: list[np.ndarray] = []
+        velocity: dict[tuple[int, int], int] = {}
+        components = {e.index: e.components for e in robot.elastic}
+        for i, joint in enumerate(robot.joints):
+            frame = robot.bearing_frames.get(i)
+            frame = bearing_frame(joint) if frame is None else frame
+            position, aligned = joint_placement(robot, i)
+            placement = pin.SE3(aligned @ frame, position)
+            if joint.parent >= 0:
+                placement = pin.SE3(self.turns[joint.parent].T, np.zeros(3)) * placement
+            body = self.bodies[joint.parent] if joint.parent >= 0 else 0
+            motion = pin.JointModelPZ() if joint.kind == "prismatic" else pin.JointModelRZ()
+            kinds = (pin.JointModelRX(), pin.JointModelRY(), motion)
+            for c in components.get(i, (2,)):
+                name = joint.name if c == 2 else f"{joint.name}.{SPRINGS[c]}"
+                body = self.model.addJoint(body, kinds[c], placement, name)
+                velocity[i, c] = self.model.joints[body].idx_v
+                placement = pin.SE3.Identity()
+            self.bodies.append(body)
+            self.turns.append(frame)
+            self.set_inertia(i, robot.inertias[i])
+        self.data: Any = self.model.createData()
+        self.joint_velocity = np.array([velocity[i, 2] for i in range(robot.n)])
+        self.elastic = np.array([velocity[axis] for axis in elastic_axes(robot)], dtype=int)
+
+    def set_inertia(self, joint: int, link: Inertia) -> None:
+        """Give the link of a joint another inertia; the payload is added where it hangs on that link."""
+        import pinocchio as pin
+
+        turn = self.turns[joint]
+        total = pin.Inertia(link.mass, link.com, link.inertia)
+        held = self.robot.payload
+        if held is not None and held.joint == joint and self.payload > 0:
+            carried = held.carried(self.payload)
+            total = total + pin.Inertia(carried.mass, carried.com, carried.inertia)
+        self.model.inertias[self.bodies[joint]] = pin.SE3(turn.T, np.zeros(3)).act(total)
+
+    def configuration(self, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
+        """Pinocchio's configuration (nq,) of motors at `q` (n,) and the arm deflected by `deflection` (n, 3)."""
+        result = np.zeros(self.model.nq)
+        result[self.joint_velocity] = q + self.robot.geometry[:, 0] + deflection[:, 2]
+        for at, (joint, component) in zip(self.elastic, elastic_axes(self.robot), strict=True):
+            if component != 2:
+                result[at] = deflection[joint, component]
+        return result
+
+    def mass_matrix(self, configuration: np.ndarray) -> np.ndarray:
+        """Mass matrix (d, d) of the elastic coordinates, kg m²."""
+        import pinocchio as pin
+
+        full = pin.crba(self.model, self.data, configuration)
+        full = np.triu(full) + np.triu(full, 1).T
+        return full[np.ix_(self.elastic, self.elastic)]
+
+    def gravity_stiffness(self, configuration: np.ndarray) -> np.ndarray:
+        """Gravity stiffness ∂g/∂q (d, d) of the elastic coordinates, N m/rad."""
+        import pinocchio as pin
+
+        full = pin.computeGeneralizedGravityDerivatives(self.model, self.data, configuration)
+        return np.array(full)[np.ix_(self.elastic, self.elastic)]
+
+    def mass_matrix_derivatives(self, configuration: np.ndarray) -> np.ndarray:
+        """∂M/∂q (d, d, d): the last index is the elastic coordinate that moves."""
+        import pinocchio as pin
+
+        rest = np.zeros(self.model.nv)
+        weight = np.array(pin.computeGeneralizedGravityDerivatives(self.model, self.data, configuration))
+        columns = []
+        for at in self.elastic:
+            push = rest.copy()
+            push[at] = 1.0
+            by_q = pin.computeRNEADerivatives(self.model, self.data, configuration, rest, push)[0]
+            columns.append((np.array(by_q) - weight)[np.ix_(self.elastic, self.elastic)])
+        return np.stack(columns, axis=1)
+
+    def gravity_stiffness_derivatives(self, configuration: np.ndarray) -> np.ndarray:
+        """∂²g/∂q² (d, d, d): for k before j before l it is -gᵀ(a_k × (a_j × (a_l × S_l))), S_l the first moment beyond l."""
+        import pinocchio as pin
+
+        pin.centerOfMass(self.model, self.data, configuration, True)
+        d = len(self.elastic)
+        axes, moments = np.empty((d, 3)), np.empty((d, 3))
+        ids = [self._joint_of(at) for at in self.elastic]
+        for k, joint in enumerate(ids):
+            placement = self.data.oMi[joint]
+            unit = {"Z": 2, "Y": 1, "X": 0}[self.model.joints[joint].shortname()[-1]]
+            axes[k] = placement.rotation[:, unit]
+            moments[k] = self.data.mass[joint] * (placement.rotation @ self.data.com[joint])
+        twice = np.cross(axes[:, None], np.cross(axes, moments))
+        chained = -np.einsum("kx,mlx->kml", np.cross(self.robot.gravity, axes), twice)
+        carries = np.array([[near in set(self.model.supports[far]) for far in ids] for near in ids])
+        chained *= carries[:, :, None] & carries[None]
+        near, middle, far = np.sort(np.indices((d, d, d)), axis=0)
+        return chained[near, middle, far]
+
+    def place(self, configuration: np.ndarray, joint: int, xyz: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Where the point `xyz` (3,) m of the link of a joint is in the base frame, and the link's orientation (3, 3) there."""
+        import pinocchio as pin
+
+        pin.forwardKinematics(self.model, self.data, configuration)
+        placement = self.data.oMi[self.bodies[joint]]
+        turn = placement.rotation @ self.turns[joint].T
+        return placement.translation + turn @ xyz, turn
+
+    def elastic_axes_at(self, joint: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Origins (d, 3) m and axes (d, 3) of the elastic coordinates after `place`, base frame, and which carry a joint's link (d,)."""
+        ids = [self._joint_of(at) for at in self.elastic]
+        placements = [self.data.oMi[i] for i in ids]
+        units = [{"Z": 2, "Y": 1, "X": 0}[self.model.joints[i].shortname()[-1]] for i in ids]
+        axes = np.array([p.rotation[:, unit] for p, unit in zip(placements, units, strict=True)])
+        carrying = set(self.model.supports[self.bodies[joint]])
+        return np.array([p.translation for p in placements]), axes, np.array([i in carrying for i in ids])
+
+    def nearer(self) -> np.ndarray:
+        """Whether elastic coordinate k is nearer to the base than l, or the same, (d, d), for coordinates of one branch."""
+        ids = np.array([self._joint_of(at) for at in self.elastic])
+        return ids[:, None] <= ids[None, :]
+
+    def _joint_of(self, velocity: int) -> int:
+        return next(i for i in range(1, self.model.njoints) if self.model.joints[i].idx_v == velocity)
+
+
+def moved_inertia(link: Inertia, mass: float, com: np.ndarray) -> Inertia:
+    """A link with another mass and centre of mass: the inertia about the centre of mass scales with the mass and moves along."""
+    scale = mass / link.mass if link.mass > 0 else 1.0
+    return Inertia(mass, com, link.inertia * scale)

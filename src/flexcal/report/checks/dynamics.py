@@ -1,0 +1,143 @@
+"""The checks behind the verdict on identified dynamics, from results.json."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.report.layout import Check, significant
+
+MUCH_WORSE = 1.5
+"""Held-out error over that in the fit, above which the model overfits or friction has changed."""
+LARGE, TOO_LARGE = 10.0, 30.0
+"""Relative torque errors, per cent, above which the prediction is poor, and above which it fails."""
+JOINT_LARGE = 25.0
+"""Relative torque error of a joint, per cent, above which it is predicted poorly; small torques are mostly friction."""
+_SHOWN = 3
+_SENSOR = 0.1
+"""How far beside 1 the share of the external torques may lie outside its interval: axes turned by half a radian."""
+
+
+def check_unseen_torques(error: Mapping[str, Any], held_out: str) -> Check:
+    """Whether torques outside the fit are predicted; `held_out` says which, empty for none."""
+    question = "Does it predict torques outside the fit?"
+    if not held_out:
+        return Check(
+            question,
+            "Cannot be judged: nothing was held out. Identify again with --hold-out last:0.3, or with --validate and another recording.",
+            "unknown",
+        )
+    unseen, train = error["held_out"], error["train"]
+    answer = (
+        f"The relative torque error is {significant(unseen, 3)} % on {held_out} and {significant(train, 3)} % in the fit. "
+        "The friction terms were chosen without these data."
+    )
+    if unseen > TOO_LARGE:
+        return Check(question, f"{answer} That is too large: the model is not valid there.", "bad")
+    if unseen > MUCH_WORSE * train:
+        return Check(
+            question, f"{answer} That is much larger: friction changed, or the model overfits.", "care"
+        )
+    if unseen > LARGE:
+        return Check(question, f"{answer} That is large; look at the spectra of the residuals.", "care")
+    return Check(question, answer, "good")
+
+
+def check_fit(train: float) -> Check | None:
+    """Whether the torques of the fit itself are explained, by their relative error in per cent; None where they are."""
+    if train <= LARGE:
+        return None
+    return Check(
+        "Does the model explain the torques that it was fitted to?",
+        f"Their relative error is {significant(train, 3)} %, more than {LARGE:.0f} %: friction or loads that the model lacks, "
+        "noisy torques, or positions that are noise below the cut-off. The spectra of the residuals show the frequencies; "
+        "a lower `cutoff_hz:` and more `decimation:` remove noise.",
+        "bad" if train > TOO_LARGE else "care",
+    )
+
+
+def check_joints(per_joint: Mapping[str, float]) -> Check:
+    """Whether the torques of every single joint are predicted."""
+    question = "Is every joint predicted?"
+    worst = max(per_joint, key=lambda joint: per_joint[joint])
+    answer = f"The worst is {worst}: its relative torque error is {significant(per_joint[worst], 3)} %."
+    if per_joint[worst] > JOINT_LARGE:
+        return Check(question, f"{answer} Its torques are small, or its friction model is wrong.", "care")
+    return Check(question, answer, "good")
+
+
+def check_base(results: Mapping[str, Any]) -> Check:
+    """Whether the recordings determine every base parameter of the model."""
+    question = "Do the recordings determine every base parameter?"
+    base, rank = results["base_parameters"], results["rank"]
+    answer = f"{rank} of {len(base)} are determined, by {results['equations']} equations."
+    if rank >= len(base):
+        return Check(question, answer, "good")
+    lost = [row["kept"] for row in base if row["std"] is None]
+    more = f" and {len(lost) - _SHOWN} more" if len(lost) > _SHOWN else ""
+    return Check(
+        question,
+        f"{answer} Not {', '.join(lost[:_SHOWN])}{more}: a motion that excites them is missing.",
+        "care",
+    )
+
+
+def check_bodies(bodiless: list[str]) -> Check:
+    """Whether the inertials of every link are physically consistent."""
+    question = "Are the inertials of every link physically consistent?"
+    if not bodiless:
+        return Check(question, "Yes: all masses and pseudo-inertias are positive.", "good")
+    return Check(
+        question,
+        f"Not {', '.join(bodiless)}. Torques are not affected, but springs and a URDF need consistent inertials: identify with "
+        f"--estimator sdp.",
+        "care",
+    )
+
+
+def check_shown(remarks: list[str]) -> Check:
+    """Whether the recordings determine every declared parameter of the drives."""
+    question = "Do the recordings determine every drive parameter?"
+    if not remarks:
+        return Check(question, "Yes.", "good")
+    more = f"; and {len(remarks) - _SHOWN} more" if len(remarks) > _SHOWN else ""
+    return Check(question, f"Not all: {'; '.join(remarks[:_SHOWN])}{more}.", "care")
+
+
+def check_weight(faults: list[str]) -> Check:
+    """Reservation about torques unlike the links' weight that were accepted."""
+    question = "Do the torques hold the links' weight?"
+    return Check(question, f"No, which was accepted: {faults[0]}.", "care")
+
+
+def check_weight_shares(shares: Mapping[str, Mapping[str, float]]) -> Check:
+    """Reservation about joints, named in `shares`, on which the links weigh far less or more than the URDF says."""
+    told = "; ".join(
+        f"on {joint} {significant(max(0.0, share['share']), 2)} times that (95 % interval {significant(share['low'], 2)} to "
+        f"{significant(share['high'], 2)})"
+        for joint, share in list(shares.items())[:_SHOWN]
+    )
+    return Check(
+        "Do the links weigh what the URDF says?",
+        f"No: {told}. Torques are not affected. Either something else carries the arm (declare springs under `dynamics: joint_springs:`; a "
+        "counterweight belongs in the URDF) or loads it (a tool), or the URDF's masses are guesses (accept that with --accept weight).",
+        "care",
+    )
+
+
+def check_external(share: Mapping[str, float]) -> Check:
+    """Whether the motors feel what the force sensor reads."""
+    question = "Do the motors feel what the force sensor reads?"
+    size = f"{significant(share['share'], 3)} (95 % interval {significant(share['low'], 3)} to {significant(share['high'], 3)})"
+    answer = f"The motor torques show {size} times the measured external torques."
+    if share["high"] < 0:
+        return Check(
+            question, f"{answer} The sign is the other one: correct `wrench:` under `force_sensor:`.", "bad"
+        )
+    if share["low"] - _SENSOR > 1.0 or share["high"] + _SENSOR < 1.0:
+        return Check(question, f"{answer} Check frame, axes, unit and time base of the sensor.", "bad")
+    if share["low"] < 0.5 or share["high"] > 1.5:
+        return Check(
+            question, f"{answer} The external torques are too small to check the sensor by them.", "care"
+        )
+    return Check(question, answer, "good")

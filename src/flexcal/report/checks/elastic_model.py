@@ -1,0 +1,72 @@
+"""Check whether the fitted elastic model explains the measured frequency responses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from flexcal.estimation import Estimate, Misfit
+from flexcal.report.checks.pose_errors import check_residual
+from flexcal.report.layout import Check, spring_label
+
+CODE = "residual_stiffness"
+QUESTION = "Does the elastic model explain the frequency responses?"
+
+
+def check_responses(estimate: Estimate) -> Check:
+    """The check of an estimate of stage 1."""
+    if estimate.misfit is not None and estimate.converged:
+        return check_misfit(estimate.misfit)
+    return check_residual(QUESTION, estimate).named(CODE)
+
+
+def check_misfit(misfit: Misfit | None) -> Check:
+    """The check of the misfit of stage 1, for the stages that use its springs."""
+    if misfit is None:
+        return Check(QUESTION, "Yes, within noise and model error.", "good", CODE)
+    return Check(QUESTION, misfit_sentences(misfit), "bad" if misfit.severe else "care", CODE)
+
+
+def misfit_sentences(misfit: Misfit) -> str:
+    """Pose, band and motor of a misfit, possible causes, and its effect on the intervals."""
+    where = (
+        f"Not in pose {misfit.pose} from {misfit.low_hz:.0f} to {misfit.high_hz:.0f} Hz, most at {_place(misfit.axis)}: the residual "
+        f"is {misfit.peak**0.5:.1f} times its standard deviation there (χ² per degree of freedom is {misfit.reduced_chi2:.2f} "
+        "overall). "
+    )
+    far = ""
+    if misfit.far:
+        springs = ", ".join(spring_label(name) for name in misfit.far)
+        far = f"More than a factor of 3 from robot.yaml: {springs}. "
+    moved = ""
+    if misfit.inertials > 0:
+        moved = (
+            f"Masses and centres of mass moved by {misfit.inertials:.1f} standard deviations of what was known of them (root mean square): "
+            "they take up a part of what the model lacks, and are given without intervals. "
+        )
+    cause = (
+        "The model lacks a mode or has wrong parameters. Possible causes: elasticity of base, tool or payload, wrong bearing axes, "
+        "or a plan.yaml that does not belong to the recordings. "
+    )
+    if misfit.axis.startswith("sensor "):
+        cause = (
+            f"Possible causes: a wrong direction, xyz or frame of the {misfit.axis} under `sensors:`, a loose mount, or a mode that the "
+            "model lacks; a fit without its column tells which. "
+        )
+    if misfit.severe:
+        return f"{where}{far}{cause}{moved}Do not use these springs; their intervals are at least as wide as robot.yaml's tolerance."
+    return f"{where}{far}{cause}{moved}The intervals of all springs were widened accordingly."
+
+
+def misfit_document(misfit: Misfit | None) -> dict[str, Any] | None:
+    """As results.json has it."""
+    return None if misfit is None else dict(vars(misfit)) | {"far": list(misfit.far)}
+
+
+def read_misfit(document: Mapping[str, Any] | None) -> Misfit | None:
+    """The inverse of `misfit_document`."""
+    return None if document is None else Misfit(**{**document, "far": tuple(document["far"])})
+
+
+def _place(output: str) -> str:
+    return f"the {output}" if output.startswith("sensor ") else f"the motor of {output}"

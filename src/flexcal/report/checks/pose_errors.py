@@ -1,0 +1,272 @@
+"""The checks behind the verdict on a calibration, from its results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.verification import Verification
+from flexcal.estimation import Estimate
+from flexcal.report.layout import Check, document_millimetres, millimetres, p_value
+
+CHANCE, MISSING = 1.35, 2.0
+"""Observed over predicted size of errors that chance exceeds once in a hundred robots, and from which the model must lack something.
+
+Errors at all poses come from one draw of the parameters, which counts as about two dozen independent numbers however many poses there are.
+"""
+
+FEW_POSES = 20
+FEW_NUMBERS = 4.0
+"""Independent numbers in the errors at all poses below which their size says little."""
+OVERSTATED = 0.5
+"""Noise over the stated sigma below which the stated one counts as wrong."""
+CLEAR_GAP = 3.0
+
+
+def check_fresh_poses(fitted: ErrorStatistics, fresh: ErrorStatistics) -> Check:
+    """Whether accuracy was checked on enough poses outside the fit, and is as good there."""
+    question = "Was it verified on poses outside the fit?"
+    answer = (
+        f"Yes, on {fresh.poses}: P90 is {millimetres(fresh.p90)} mm there and {millimetres(fitted.p90)} mm on the "
+        f"{fitted.poses} poses of the fit."
+    )
+    if fresh.poses < FEW_POSES:
+        return Check(question, f"{answer} These are few; verify on {FEW_POSES} or more.", "care")
+    if fresh.p90 > 3 * fitted.p90:
+        return Check(
+            question,
+            f"{answer} Errors at fresh poses are much larger: the model overfits or lacks a term.",
+            "care",
+        )
+    return Check(question, answer, "good")
+
+
+def check_unseen(fitted: Sequence[str]) -> Check:
+    """Whether the calibration was fitted to none of the files; `fitted` names those that it was fitted to."""
+    question = "Are the points outside the fit?"
+    if fitted:
+        which = " and ".join(fitted)
+        return Check(
+            question,
+            f"No: it was fitted to {which}, so errors at other poses may be larger; verify on poses outside the fit.",
+            "unknown",
+        )
+    return Check(question, "Yes: none of the files was used for the fit.", "good")
+
+
+def check_enough(poses: int) -> Check:
+    """Whether so many poses are enough for a 90 % value."""
+    question = "Were enough fresh poses measured?"
+    if poses >= FEW_POSES:
+        return Check(question, f"{poses} points; P90 rests on about {max(1, poses // 10)} of them.", "good")
+    return Check(question, f"{poses} points are few; measure {FEW_POSES} or more.", "care")
+
+
+def check_claimed_uncertainty(prediction: Mapping[str, Any] | None) -> Check:
+    """Whether errors at poses outside the fit are as large as predicted; `prediction` is that of results.json, None where there is none."""
+    question = "Are the errors as large as predicted?"
+    if prediction is None:
+        return Check(
+            question,
+            "Cannot be judged: there are no verification poses, or no predicted uncertainty.",
+            "unknown",
+        )
+    ratio, low, high = (prediction[key] for key in ("ratio", "ratio_low", "ratio_high"))
+    numbers = (
+        f"The errors at {prediction['poses']} poses are {ratio:.2f} times the predicted size (95 % interval {low:.2f} to {high:.2f}), and "
+        f"{100 * prediction['inside_95_percent']:.0f} % of them lie within the bound predicted for 95 %."
+    )
+    if prediction["verdict"] == "unknown":
+        return Check(
+            question,
+            f"Cannot be judged: instrument noise of unknown size is part of the errors. {numbers}",
+            "unknown",
+        )
+    if ratio > MISSING and low > 1:
+        return Check(question, f"No, they are much larger: the model lacks a term. {numbers}", "bad")
+    if ratio > CHANCE or low > 1:
+        return Check(question, f"No, they are larger. {numbers}", "care")
+    if prediction["freedom"] < FEW_NUMBERS:
+        return Check(
+            question, f"Cannot be judged: the errors are too strongly correlated. {numbers}", "unknown"
+        )
+    if high < 1:
+        return Check(question, f"They are smaller. {numbers}", "good")
+    return Check(question, f"Yes. {numbers}", "good")
+
+
+def check_error_budget(
+    estimate: Estimate, variances: Mapping[str, float | None], *, hardly_fits: bool
+) -> Check:
+    """Whether the residuals of the geometry are noise of instrument and robot; `variances` is that of results.json."""
+    question = "Are the residuals noise of instrument and robot?"
+    if estimate.status != "converged":
+        return Check(question, f"The fit did not converge: {estimate.message}.", "bad")
+    instrument, stated = variances["instrument_mm"], variances["stated_mm"]
+    robot, model = (float(variances[key] or 0.0) for key in ("robot_mm", "model_mm"))
+    said = "" if instrument is None else f"instrument {instrument:.3f}, "
+    with_ = " (instrument included, because no sigma is stated)" if instrument is None else ""
+    answer = (
+        f"Standard deviation of a coordinate: {said}robot {robot:.3f}{with_}, model error {model:.3f} mm."
+    )
+    if hardly_fits:
+        return Check(question, f"No: the data do not fit this robot. {answer}", "bad")
+    if model > np.hypot(instrument or 0.0, robot):
+        return Check(
+            question,
+            f"No: systematic model errors are larger than the noise. {answer}",
+            "care",
+        )
+    if instrument is not None and stated is not None and instrument < OVERSTATED * stated:
+        return Check(question, f"Yes, but the stated sigma of {stated:.3g} mm is too large. {answer}", "care")
+    return Check(question, f"Yes. {answer}", "good")
+
+
+def check_residual(question: str, estimate: Estimate) -> Check:
+    """Whether the measurement noise explains the residuals."""
+    if estimate.status != "converged":
+        return Check(question, f"The fit did not converge: {estimate.message}.", "bad")
+    value = estimate.reduced_chi2
+    answer = f"χ² per degree of freedom is {value:.2f}; one means that noise explains the residuals."
+    if not np.isfinite(value) or value > 4:
+        return Check(question, f"{answer} Model errors are much larger than the noise.", "bad")
+    if estimate.unexplained:
+        return Check(question, f"{answer} There are small model errors.", "care")
+    if value < 0.4:
+        return Check(question, f"{answer} The stated noise is too large.", "care")
+    return Check(question, answer, "good")
+
+
+def check_drift(drift: Mapping[str, Any]) -> Check:
+    """Whether residuals drift with time; `drift` is the block of results.json."""
+    question = "Did robot or instrument drift during the measurement?"
+    if not drift["certain"]:
+        return Check(question, f"No drift detected (p = {p_value(drift['p'])}).", "good")
+    answer = (
+        f"Residuals drift with time (p = {p_value(drift['p'])}), by {document_millimetres(drift['distance_mm'])} mm from the first "
+        "pose to the last. Let robot and instrument warm up, or measure in random order if place and order are correlated."
+    )
+    return Check(question, answer, "care")
+
+
+def check_rank(parameters: int, rank: int, gap: float) -> Check:
+    """Whether the rank is unambiguous: a `gap` in decades between the parameters that are determined and the others."""
+    question = "Is the rank of the identification clear?"
+    dropped = parameters - rank
+    answer = f"{rank} of {parameters} geometric parameters are determined; "
+    if not dropped:
+        return Check(question, f"{answer}none was dropped.", "good")
+    clear = gap >= CLEAR_GAP
+    answer += (
+        f"the {dropped} others are absorbed by them, with a gap of {gap:.0f} decades between the two groups."
+    )
+    return Check(question, answer if clear else f"{answer} That gap is small.", "good" if clear else "care")
+
+
+def check_springs(estimate: Estimate, stiffness: Sequence[str], damping: Sequence[str]) -> Check:
+    """Whether the data determine every stiffness."""
+    question = "Are all stiffnesses determined by the data?"
+
+    def seen(names: Sequence[str]) -> int:
+        return sum(estimate.interval(name) is not None for name in names)
+
+    answer = f"{seen(stiffness)} of {len(stiffness)} stiffnesses and {seen(damping)} of {len(damping)} dampings are."
+    if seen(stiffness) == len(stiffness):
+        return Check(question, f"{answer} Damping does not affect accuracy at rest.", "good")
+    return Check(
+        question, f"{answer} The others keep the values of robot.yaml; change poses or payload.", "care"
+    )
+
+
+def check_flanks(verification: Verification) -> Check:
+    """Whether the flank of every backlash is certain at every pose."""
+    question = "Is the flank of the backlash certain at every pose?"
+    unclear, all_ = int(verification.ambiguous.sum()), len(verification.ambiguous)
+    if not unclear:
+        return Check(question, f"Yes, at all {all_} verification poses.", "good")
+    largest = float(np.linalg.norm(verification.errors[verification.ambiguous], axis=1).max())
+    answer = (
+        f"Not at {unclear} of {all_}: gravity hardly loads the joint there. The largest error at these poses is "
+        f"{millimetres(largest)} mm, and {millimetres(verification.unambiguous.max)} mm at the others."
+    )
+    return Check(question, answer, "good" if unclear <= 0.1 * all_ else "care")
+
+
+def check_truth(covered: int, total: int) -> Check:
+    """Whether the 95 % intervals contain the truth, where it is known."""
+    question = "Do the 95 % intervals contain the truth?"
+    answer = (
+        f"{covered} of {total} do ({100 * covered / total:.0f} %). Only a simulated robot has a known truth."
+    )
+    share = covered / total
+    return Check(question, answer, "good" if share >= 0.88 else "care" if share >= 0.75 else "bad")
+
+
+def check_left_out(mean: float, left_out: float | None, share: float) -> Check:
+    """Whether the cross-validation error is as small as expected from that of the fit.
+
+    `mean` is the mean error (m) of the fit, `left_out` that of poses left out, `share` the number of parameters over that of measured
+    coordinates. A fit of p parameters to n values of variance σ² has residuals of variance σ² (1 − p/n) and
+    prediction errors of variance σ² (1 + p/n), to first order.
+    """
+    question = "Are poses left out of the fit predicted?"
+    if left_out is None or share >= 1:
+        return Check(
+            question,
+            "Cannot be judged: no pose was left out. Measure fresh poses and run flexcal verify before relying on it.",
+            "unknown",
+        )
+    expected = float(np.sqrt((1 + share) / (1 - share))) * mean
+    answer = (
+        f"In cross-validation the mean error is {millimetres(left_out)} mm; expected from {millimetres(mean)} mm in the fit are "
+        f"{millimetres(expected)} mm."
+    )
+    if left_out > CHANCE * expected:
+        return Check(
+            question,
+            f"{answer} It is {left_out / expected:.2f} times as large: the model overfits or lacks a term.",
+            "care",
+        )
+    return Check(question, answer, "good")
+
+
+def check_outliers(outliers: int, fit: ErrorStatistics) -> Check:
+    """Whether there are outliers: the number of `outliers` of a robust loss, or the largest error relative to P90."""
+    question = "Are there outliers?"
+    if outliers:
+        answer = f"{outliers} of {fit.poses} points have a weight below 0.2 in the robust loss; they are listed below."
+        return Check(question, answer, "good" if outliers <= 0.02 * fit.poses else "care")
+    if fit.max > 4 * fit.p90:
+        return Check(
+            question,
+            f"The largest error, {millimetres(fit.max)} mm, is more than four times P90; check this measurement, or fit with "
+            "--loss cauchy.",
+            "care",
+        )
+    return Check(question, "No.", "good")
+
+
+def check_known_points(uncalibrated: Sequence[str]) -> Check:
+    """Of points `uncalibrated` that no calibration pose measured."""
+    return Check(
+        "Did the calibration measure these points?",
+        f"Not {' and '.join(uncalibrated)}: where it is on the tool is as declared, and an error of that is in these numbers. "
+        "flexcal verify --refit point finds it from these poses.",
+        "care",
+    )
+
+
+def check_moved(proposed: Mapping[str, Any]) -> Check:
+    """Of what would leave less than half of the errors if placed again, as results.json has it under `refit_proposed`."""
+    what = " and ".join(
+        {"station": "instrument", "point": "measured point"}[name] for name in proposed["what"]
+    )
+    return Check(
+        "Are instrument and measured point where they were at the calibration?",
+        f"No: with the {what} placed again the mean error is {proposed['mean_mm']:.3f} mm. "
+        f"flexcal verify --refit {' '.join(proposed['what'])} verifies the geometry alone.",
+        "bad",
+    )

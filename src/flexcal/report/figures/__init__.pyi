@@ -1,0 +1,72 @@
+from .accuracy_map import SHOWN, accuracy_space, accuracy_views, variance_shares
+from .error_distributions import error_distribution, error_histogram, predicted_quantiles
+from .estimated_parameters import (
+    correlation_map,
+    parameter_bars,
+    shown_parameters,
+    singular_values,
+    spring_intervals,
+    term_label,
+    term_scores,
+)
+from .frequency_plan import amplitude_spectrum, planned_arm, poses_against_std, predicted_springs
+from .frequency_responses import bode, response_fit, response_levels, sensor_fit
+from .pose_errors import ErrorSeries, calibration_errors, error_components, pose_courses, verification_errors
+from .pose_plan import joint_positions, plan_space, pose_numbers
+from .residuals import (
+    error_field,
+    loaded_joints,
+    residual_joints,
+    residual_torque,
+    residual_trend,
+    residual_workspace,
+)
+from .robot_arm import arm_poses, links_at
+from .torques import torque_spectra, torque_traces
+from .trajectory_plan import limit_shares, prior_gains, swept_paths
+
+__all__ = [
+    "SHOWN",
+    "ErrorSeries",
+    "accuracy_space",
+    "accuracy_views",
+    "amplitude_spectrum",
+    "arm_poses",
+    "bode",
+    "calibration_errors",
+    "correlation_map",
+    "error_components",
+    "error_distribution",
+    "error_field",
+    "error_histogram",
+    "joint_positions",
+    "limit_shares",
+    "links_at",
+    "loaded_joints",
+    "parameter_bars",
+    "plan_space",
+    "planned_arm",
+    "pose_courses",
+    "pose_numbers",
+    "poses_against_std",
+    "predicted_quantiles",
+    "predicted_springs",
+    "prior_gains",
+    "residual_joints",
+    "residual_torque",
+    "residual_trend",
+    "residual_workspace",
+    "response_fit",
+    "response_levels",
+    "sensor_fit",
+    "shown_parameters",
+    "singular_values",
+    "spring_intervals",
+    "swept_paths",
+    "term_label",
+    "term_scores",
+    "torque_spectra",
+    "torque_traces",
+    "variance_shares",
+    "verification_errors",
+]

@@ -1,0 +1,118 @@
+"""Predicted tool error over the working volume, and its sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.calibration.accuracy import AccuracyMap
+from flexcal.report.figures.robot_arm import space_axes
+from flexcal.report.layout import ELASTIC, GRID, RIGID, canvas, panels, single
+from flexcal.units import MILLIMETRE
+
+COLOURS = [[0, GRID], [0.5, ELASTIC], [1, RIGID]]
+SHOWN = 4000
+"""Points drawn; of more, every so manieth."""
+
+
+def accuracy_space(found: AccuracyMap) -> go.Figure:
+    """Points in the robot's base frame, coloured by the distance (mm) that 95 % of errors stay below."""
+    rows = slice(None, None, max(1, -(-len(found.q) // SHOWN)))
+    at, error = found.position[rows], found.p95[rows] / MILLIMETRE
+    figure = canvas(560, legend=False)
+    figure.add_trace(
+        go.Scatter3d(
+            x=single(at[:, 0]),
+            y=single(at[:, 1]),
+            z=single(at[:, 2]),
+            mode="markers",
+            marker={
+                "size": 3,
+                "color": single(error),
+                "colorscale": COLOURS,
+                "cmin": 0.0,
+                "cmax": float(np.quantile(error, 0.995)),
+                "colorbar": colour_bar(),
+            },
+            text=single(error),
+            hovertemplate="95 % within %{text:.3f} mm<extra></extra>",
+        )
+    )
+    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 10, "b": 0})
+    return figure
+
+
+def colour_bar() -> dict[str, object]:
+    """The bar that says what the colours mean."""
+    return {
+        "title": {"text": "95 % / mm", "side": "top"},
+        "thickness": 12,
+        "len": 0.7,
+        "x": 1,
+        "xanchor": "right",
+    }
+
+
+_CELLS = 30
+"""Along the longer side of a view, with points enough for them."""
+_POINTS = 8
+"""In a cell, on average, at least."""
+_VIEWS = {"from above": (0, 1), "from the side": (0, 2), "from the front": (1, 2)}
+
+
+def accuracy_views(found: AccuracyMap) -> go.Figure:
+    """For each cell of three views of the volume (base frame) the 95 % error in mm, averaged over the poses behind it."""
+    cells = int(np.clip(np.sqrt(len(found.q) / _POINTS), 3, _CELLS))
+    titles = [f"{'xyz'[up]} / m, {view}" for view, (_, up) in _VIEWS.items()]
+    figure = panels(1, 3, 340, titles, legend=False, column_gap=0.1)
+    error = found.p95 / MILLIMETRE
+    largest = 0.0
+    for column, (across, up) in enumerate(_VIEWS.values(), start=1):
+        x, y = found.position[:, across], found.position[:, up]
+        count, x_edges, y_edges = np.histogram2d(x, y, bins=cells)
+        total = np.histogram2d(x, y, bins=[x_edges, y_edges], weights=error)[0]
+        mean = np.divide(total, count, out=np.full(total.shape, np.nan), where=count > 0)
+        largest = max(largest, float(np.nanmax(mean)))
+        figure.add_trace(
+            go.Heatmap(
+                x=single((x_edges[1:] + x_edges[:-1]) / 2),
+                y=single((y_edges[1:] + y_edges[:-1]) / 2),
+                z=single(mean.T),
+                coloraxis="coloraxis",
+                hoverongaps=False,
+                hovertemplate="%{x:.2f}, %{y:.2f} m: 95 % within %{z:.3f} mm<extra></extra>",
+            ),
+            row=1,
+            col=column,
+        )
+        figure.update_xaxes(title_text=f"{'xyz'[across]} / m", row=1, col=column)
+    bar = {"title": {"text": "mm", "side": "top"}, "thickness": 12, "len": 0.8}
+    figure.update_layout(
+        coloraxis={"colorscale": COLOURS, "colorbar": bar, "cmin": 0, "cmax": largest},
+        margin={"l": 56, "r": 60, "t": 30, "b": 46},
+    )
+    return figure
+
+
+def variance_shares(over_all: Mapping[str, float], worst: Mapping[str, float]) -> go.Figure:
+    """Shares of the variance (0 to 1) that knowing a kind of parameter would take away, over all poses and at the worst place."""
+    figure = canvas(90 + 44 * len(over_all))
+    for label, shares, colour in (
+        ("everywhere, on average", over_all, ELASTIC),
+        ("at the worst place", worst, RIGID),
+    ):
+        figure.add_trace(
+            go.Bar(
+                x=[100 * share for share in shares.values()],
+                y=list(shares),
+                orientation="h",
+                name=label,
+                marker={"color": colour},
+                hovertemplate="%{y}: %{x:.1f} %<extra></extra>",
+            )
+        )
+    figure.update_xaxes(title_text="reduction of the variance if known", ticksuffix=" %", range=[0, 100])
+    figure.update_yaxes(autorange="reversed")
+    return figure

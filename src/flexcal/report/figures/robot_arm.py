@@ -1,0 +1,114 @@
+"""The arm at its measured points, in three dimensions, with the errors drawn as exaggerated arrows (Fig. 10 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+import plotly.graph_objects as go
+
+from flexcal.calibration.verification import CALIBRATED, ArmPoses
+from flexcal.model.kinematics import LinkSurface
+from flexcal.model.robot import RobotModel
+from flexcal.report.layout import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID, canvas, single
+from flexcal.units import MILLIMETRE
+
+_FAINT = 0.25
+"""Opacity of the links in all of these but the first."""
+
+_HEAD = 0.35
+"""Length of an arrow's head over that of the arrow."""
+
+
+def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, float]) -> go.Figure:
+    """The links in a few poses, the arm as lines in others, and at each measured point an error vector.
+
+    `labels` are the words for the models of `arms.errors`, `factors` how many times longer than they are their arrows are drawn. The
+    traces of a model carry `meta = {"arrows": label, "exaggeration": factor}`, by which the page chooses and stretches them. Everything is
+    drawn in the robot's base frame.
+    """
+    figure = canvas(620)
+    figure.add_trace(polyline(arms.corners, "arm at other poses", NOMINAL, 2.5, opacity=0.45))
+    for number, vertices in enumerate(arms.surface):
+        figure.add_trace(solid(vertices, arms.triangles, 1.0 if number == 0 else _FAINT, legend=number == 0))
+    tips = arms.tip
+    figure.add_trace(
+        go.Scatter3d(
+            x=single(tips[:, 0]), y=single(tips[:, 1]), z=single(tips[:, 2]),
+            mode="markers", marker={"size": 2.5, "color": NOMINAL}, name="measured point",
+            text=[f"pose {k}" for k in arms.pose], hovertemplate="%{text}<extra></extra>",
+        )
+    )  # fmt: skip
+    for number, (model, label) in enumerate(labels.items()):
+        vectors, factor = arms.errors[model], factors[model]
+        colour = ELASTIC if model == CALIBRATED else RIGID
+        chosen = {"meta": {"arrows": label, "exaggeration": factor}, "visible": number == 0}
+        drawn = factor * vectors
+        ends = tips + drawn
+        figure.add_trace(polyline(np.stack([tips, ends], axis=1), "error", colour, 5.0).update(chosen))
+        sizes = np.linalg.norm(vectors, axis=1) / MILLIMETRE
+        figure.add_trace(
+            go.Cone(
+                x=single(ends[:, 0]), y=single(ends[:, 1]), z=single(ends[:, 2]),
+                u=single(drawn[:, 0]), v=single(drawn[:, 1]), w=single(drawn[:, 2]),
+                anchor="tip", sizemode="raw", sizeref=_HEAD, showscale=False, colorscale=[[0, colour], [1, colour]],
+                lighting={"ambient": 0.9, "diffuse": 0.3},
+                text=[f"pose {k}: {size:.3f} mm" for k, size in zip(arms.pose, sizes, strict=True)],
+                hovertemplate="%{text}<extra></extra>", **chosen,
+            )
+        )  # fmt: skip
+    figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})
+    return figure
+
+
+def space_axes() -> dict[str, Any]:
+    """Axes of a scene in metres, all to one scale."""
+    axis = {
+        "backgroundcolor": "rgba(0,0,0,0)",
+        "gridcolor": GRID,
+        "zerolinecolor": GRID,
+        "color": QUIET,
+        "showspikes": False,
+        "nticks": 5,
+    }
+    return {
+        "aspectmode": "data",
+        "xaxis": axis | {"title": {"text": "x / m"}},
+        "yaxis": axis | {"title": {"text": "y / m"}},
+        "zaxis": axis | {"title": {"text": "z / m"}},
+        "camera": {"eye": {"x": 1.2, "y": 1.2, "z": 0.55}, "center": {"x": 0, "y": 0, "z": -0.12}},
+    }
+
+
+def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity: float = 1.0) -> go.Scatter3d:
+    """Several lines (lines, corners, 3) as one trace, parted by gaps."""
+    parted = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1).reshape(-1, 3)
+    return go.Scatter3d(
+        x=single(parted[:, 0]),
+        y=single(parted[:, 1]),
+        z=single(parted[:, 2]),
+        mode="lines",
+        name=name,
+        line={"color": colour, "width": width},
+        opacity=opacity,
+        hoverinfo="skip",
+    )
+
+
+def solid(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend: bool) -> go.Mesh3d:
+    """The links of the arm (V, 3), (F, 3) as one shaded trace."""
+    numbers = triangles.astype(np.int32)
+    return go.Mesh3d(
+        x=single(vertices[:, 0]), y=single(vertices[:, 1]), z=single(vertices[:, 2]),
+        i=numbers[:, 0], j=numbers[:, 1], k=numbers[:, 2],
+        color=LINKS, opacity=opacity, flatshading=True, name="links", showlegend=legend, hoverinfo="skip",
+        lightposition={"x": 1000, "y": 2000, "z": 4000},
+        lighting={"ambient": 0.8, "diffuse": 0.35, "specular": 0.05},
+    )  # fmt: skip
+
+
+def links_at(model: RobotModel, q: np.ndarray) -> list[go.Mesh3d]:
+    """The links of a robot at joint positions `q` (P, n), one shaded trace a pose."""
+    surface = LinkSurface.of(model)
+    return [solid(vertices, surface.triangles, 1.0, legend=True) for vertices in surface.at(model, q)]

@@ -1,0 +1,95 @@
+"""Rendering of a page to one self-contained HTML file."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from importlib.resources import files
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flexcal.files.transaction import write_text
+from flexcal.report.layout.blocks import FigureBlock, Page
+from flexcal.report.layout.error_axis import ladder
+from flexcal.report.layout.palette import DARK, LIGHT, dark_of
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+_SCRIPTS = ("numbers.js", "flat.js", "report.js")
+_MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
+_WORDS = {"good": "good", "care": "take care", "bad": "not good", "unknown": "not known"}
+
+
+def write_page(path: str | Path, page: Page) -> None:
+    """Write `page` atomically; raises `InputError` where it cannot be written."""
+    write_text(path, page_html(page))
+
+
+def page_html(page: Page) -> str:
+    """The whole document. Nothing in it is loaded from elsewhere."""
+    from plotly.offline import get_plotlyjs
+
+    folder = files("flexcal.report") / "templates"
+    used = bool(page.figures)
+    return (
+        templates()
+        .get_template("report.html.j2")
+        .render(
+            page=page,
+            ladder=ladder(page.verdict.rungs),
+            marks=_MARKS,
+            words=_WORDS,
+            light=LIGHT,
+            dark=DARK,
+            style=(folder / "report.css").read_text("utf-8"),
+            script="\n".join((folder / name).read_text("utf-8") for name in _SCRIPTS),
+            specifications={block.id: figure_json(block) for block in page.figures},
+            dark_colours=script_json(dark_of()),
+            document=script_json(_plain(page.document)),
+            plotly=get_plotlyjs() if used else "",
+        )
+    )
+
+
+def templates() -> Environment:
+    """The templates of pages; a name that is not given to one is an error."""
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    return Environment(
+        loader=PackageLoader("flexcal.report", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=StrictUndefined,
+    )
+
+
+def figure_json(block: FigureBlock) -> str:
+    """Data and layout of a figure, arrays in base64, safe inside a script element; the template that Plotly adds left out."""
+    specification = json.loads(str(block.figure.to_json()))
+    specification["layout"].pop("template", None)
+    selectors = {selector.key: selector.options[0] for selector in block.selectors}
+    if block.slider is not None:
+        specification |= {"stretched_by": block.slider.key, "factors": dict(block.slider.start)}
+    return script_json(specification | {"selected": selectors})
+
+
+def script_json(value: Any) -> str:
+    """Compact JSON that cannot end the script element around it."""
+    text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+    return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
+
+
+def _plain(value: Any) -> Any:
+    """Plain JSON values; what is not finite becomes null."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_plain(item) for item in value]
+    if hasattr(value, "tolist"):
+        return _plain(value.tolist())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value if isinstance(value, (str, int, float, bool, type(None))) else str(value)

@@ -1,0 +1,5 @@
+"""Whole report pages, one module per command."""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,0 +1,215 @@
+"""The report of a calibration on measured poses (`flexcal calibrate`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.calibration.diagnostics import GravityLoads
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.term_selection import considered_terms
+from flexcal.calibration.verification import CALIBRATED, RIGID, ArmPoses, MeasuredPoints
+from flexcal.estimation import Estimate
+from flexcal.report.checks import (
+    Trust,
+    check_bearings,
+    check_drift,
+    check_error_budget,
+    check_left_out,
+    check_misfit,
+    check_outliers,
+    check_rank,
+    read_misfit,
+)
+from flexcal.report.layout import (
+    NOTHING,
+    Check,
+    Page,
+    Section,
+    Table,
+    Text,
+    Verdict,
+    millimetres,
+    ratio,
+    sentences,
+    statistics_cells,
+    write_page,
+)
+from flexcal.report.pages.two_stage import HEADLINES
+from flexcal.report.results import Determined
+from flexcal.report.sections import (
+    BEFORE_NOTE,
+    arm_figure,
+    before_rows,
+    before_rungs,
+    budget_table,
+    error_figures,
+    identifiability_blocks,
+    parameter_figures,
+    parameter_table,
+    provenance_section,
+    residuals_section,
+    rung,
+    terms_section,
+    three_facts,
+)
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class CalibrationStudy:
+    """A calibration on measured poses, as its folder has it.
+
+    `results` is the document of results.json, `estimate` the block of estimates.yaml. `points` are those of the fit; they have errors of
+    the rigid model where it is not the calibrated one. `arms` is the calibrated robot at them.
+    """
+
+    results: Mapping[str, Any]
+    estimate: Estimate
+    points: MeasuredPoints
+    arms: ArmPoses
+    loads: GravityLoads | None = None
+
+
+def determined(results: Mapping[str, Any]) -> Determined:
+    """Parameters of the calibrated model."""
+    return Determined.stored(results["identifiability"]["selected"])
+
+
+def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, calibration_page(study))
+
+
+def calibration_page(study: CalibrationStudy) -> Page:
+    """The page before it becomes HTML."""
+    results, points = study.results, study.points
+    sections, considered = [_accuracy_section(study)], considered_terms(results)
+    kept = tuple(results["identifiability"]["selected"]["kept"])
+    if considered:
+        sections.append(terms_section(considered, results["term_selection_by"]))
+    sections += [
+        residuals_section(
+            results["joints"], points.poses, points.calibrated, study.estimate.outliers, study.loads
+        ),
+        Section(
+            "geometry",
+            "Parameters",
+            "Parameters that the measured points do not determine keep their nominal values; the parameters that absorb them are named "
+            "beside them.",
+            (
+                *identifiability_blocks(determined(results), None),
+                *parameter_figures(study.estimate, kept),
+                parameter_table(study.estimate, kept, None),
+            ),
+        ),
+        provenance_section(results["command"], None, {}, study.estimate.provenance),
+    ]
+    stations = len(points.poses.stations)
+    return Page(
+        title=f"{results['robot']}: calibration report",
+        subtitle=f"Calibration on {len(points.poses)} measured points"
+        + (f" from {stations} stations" if stations > 1 else "")
+        + f" · terms: {', '.join(term.replace('_', ' ') for term in results['terms'])}",
+        verdict=calibration_verdict(study),
+        sections=sections,
+        document=results,
+    )
+
+
+def calibration_verdict(study: CalibrationStudy) -> Verdict:
+    """Accuracy before and after calibration at the measured poses, and the verdict."""
+    before, after = study.points.before, study.points.statistics(CALIBRATED)
+    checks = calibration_checks(study.results, study.estimate, study.points)
+    trust = Trust(checks)
+    rungs = before_rungs(study.points)
+    if RIGID in study.points.errors:
+        rungs.append(rung("rigid geometry", study.points.statistics(RIGID), "rigid"))
+    rungs.append(rung("calibrated", after, "elastic"))
+    return Verdict(
+        trust.status,
+        HEADLINES[trust.status],
+        f"{_was(before)}At the same {after.poses} points the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
+        f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
+        three_facts(before, after, trust, "points of the fit"),
+        tuple(rungs),
+        f"Error of the robot at the {after.poses} measured points",
+        checks,
+    )
+
+
+def _was(before: ErrorStatistics | None) -> str:
+    if before is None:
+        return ""
+    largest = f"{millimetres(before.max)} mm"
+    return f"Before, with instrument and measured point registered by best fit, the robot's own error was up to {largest}. "
+
+
+def _better(before: ErrorStatistics | None, after: ErrorStatistics) -> str:
+    return "" if before is None else f": {ratio(before.p90, after.p90)} better"
+
+
+def calibration_checks(
+    results: Mapping[str, Any], estimate: Estimate, points: MeasuredPoints
+) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
+    found, errors = determined(results), points.statistics(CALIBRATED)
+    validated = results["cross_validation"]
+    left_out = None if validated is None else validated["mean_mm"] * MILLIMETRE
+    share = 1.0 if validated is None else validated["parameters"] / (3 * errors.poses)
+    return (
+        check_left_out(errors.mean, left_out, share).named("left_out", independent=True),
+        check_error_budget(estimate, results["variances"], hardly_fits=results["fit"]["hardly_fits"]).named(
+            "residual"
+        ),
+        check_rank(found.parameters, found.rank, found.gap).named("rank"),
+        check_drift(results["drift"]).named("drift"),
+        check_outliers(len(estimate.outliers), errors).named("outliers"),
+        *check_bearings(results.get("bearings")),
+        *_stage_one_checks(results.get("stage1")),
+    )
+
+
+def _stage_one_checks(stage_one: Mapping[str, Any] | None) -> tuple[Check, ...]:
+    """Whether the springs that the calibration began from explain the frequency responses that they came from."""
+    return () if stage_one is None else (check_misfit(read_misfit(stage_one["misfit"])),)
+
+
+def _accuracy_section(study: CalibrationStudy) -> Section:
+    points, seen = study.points, study.results["identifiability"]
+    ranks = {RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
+    rows = [(*row, NOTHING) for row in before_rows(points)]
+    for model, label in _LABELS.items():
+        if model in points.errors:
+            statistics = points.statistics(model)
+            rows.append((label, str(statistics.poses), *statistics_cells(statistics), ranks[model]))
+    table = Table(
+        "table-accuracy",
+        "Errors at the measured poses",
+        ("model", "points", "mean / mm", "P90 / mm", "max / mm", "determined parameters"),
+        tuple(rows),
+        note=BEFORE_NOTE,
+        strong=(len(rows) - 1,),
+    )
+    remarks, before = study.results["remarks"], points.delivered
+    return Section(
+        "accuracy",
+        "Before and after",
+        "Distances between measured and predicted points. These are the poses of the fit; measure others "
+        "and run flexcal verify.",
+        (
+            table,
+            *([Text((), "Remarks", sentences(remarks))] if remarks else []),
+            budget_table(study.results["variances"]),
+            arm_figure(study.arms, len(points.poses)),
+            *(() if before is None else error_figures(points.poses, before, points.calibrated)),
+        ),
+    )
+
+
+_LABELS = {
+    RIGID: "rigid geometry",
+    CALIBRATED: "calibrated",
+}

@@ -1,0 +1,202 @@
+"""The page beside a plan of poses (`flexcal design poses`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flexcal.design.scene import station_position
+from flexcal.model.kinematics import joint_origins
+from flexcal.model.robot import RobotModel
+from flexcal.report.figures import joint_positions, links_at, plan_space, pose_numbers
+from flexcal.report.layout import (
+    Check,
+    Fact,
+    FigureBlock,
+    Page,
+    Section,
+    Verdict,
+    significant,
+    worst,
+    write_page,
+)
+from flexcal.report.sections import provenance_section
+
+_FEW = 0.2
+"""Share of the poses on the rarer flank of a backlash below which the page warns."""
+
+
+@dataclass(frozen=True, eq=False)
+class PoseStudy:
+    """Poses `q` (N, n) of a plan for a robot, `results` as the verb prints them, and where it will work: points (W, 3) and their box."""
+
+    model: RobotModel
+    q: np.ndarray
+    results: Mapping[str, Any]
+    working: np.ndarray | None = None
+    box: np.ndarray | None = None
+
+
+def write_pose_page(path: Path, study: PoseStudy) -> None:
+    """Write the page of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, pose_page(study))
+
+
+def pose_page(study: PoseStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    checks = pose_checks(results)
+    status = worst(checks)
+    chosen = "tool_error_mm" in results
+    verdict = Verdict(
+        status,
+        f"{len(study.q)} poses to measure" if chosen else f"{len(study.q)} random poses, for a verification",
+        _sentence(results)
+        if chosen
+        else "They cover the joint ranges, are free of collisions and visible to the instrument.",
+        _facts(results) if chosen else (),
+        (),
+        "",
+        checks,
+    )
+    sections = [
+        _space(study),
+        _joints(study),
+        provenance_section(results["command"], results["seed"], {}, results["provenance"]),
+    ]
+    return Page(
+        title=f"{study.model.name}: poses to measure",
+        subtitle=f"Plan {Path(results['plan']).name}, "
+        + ("chosen from given poses" if results["seed"] is None else f"seed {results['seed']}"),
+        verdict=verdict,
+        sections=[_numbers(results), *sections] if chosen else sections,
+        document=results,
+    )
+
+
+def pose_checks(results: Mapping[str, Any]) -> tuple[Check, ...]:
+    """What to look at before measuring."""
+    checks = []
+    for joint, sides in results.get("flanks", {}).items():
+        least, total = min(sides.values()), sum(sides.values())
+        answer = (
+            f"{sides['positive']} poses press {joint} onto one flank, {sides['negative']} onto the other."
+        )
+        good = least >= _FEW * total or "measured" in results
+        checks.append(
+            Check(f"Are both flanks of the backlash of {joint} loaded?", answer, "good" if good else "care")
+        )
+    if (working := results.get("working")) is not None:
+        share = working["reached_share"]
+        answer = f"Of the working volume the robot reaches {100 * share:.0f} %."
+        checks.append(
+            Check("Does the robot reach its working volume?", answer, "good" if share > 0.9 else "care")
+        )
+    if "blocked_moves" in results:
+        blocked = results["blocked_moves"]
+        ways = ", ".join(f"{a} to {b}" for a, b in blocked)
+        answer = (
+            f"There are collisions on the straight joint motion from {ways}: go round there."
+            if blocked
+            else "There are no collisions on them."
+        )
+        checks.append(
+            Check(
+                "Are the moves between the poses free of collisions?", answer, "care" if blocked else "good"
+            )
+        )
+    return tuple(checks)
+
+
+def _sentence(results: Mapping[str, Any]) -> str:
+    if "measured" not in results:
+        return (
+            f"Measured with a tracker, they predict a tool error of {significant(results['tool_error_mm'], 3)} mm from its noise alone; no "
+            f"choice of as many reaches less than {significant(results['least_possible_mm'], 3)} mm."
+        )
+    errors, poses = results["tool_error_mm"], results["poses"]
+    end = "then stop" if results["stop_after"] is not None else "go on after them"
+    return (
+        f"After the {results['measured']} measured poses the predicted tool error is {significant(errors[0], 3)} mm from noise "
+        f"alone; after these {poses} it is {significant(errors[poses], 3)} mm: {end}."
+    )
+
+
+def _facts(results: Mapping[str, Any]) -> tuple[Fact, ...]:
+    where = "over the whole workspace" if results["working"] is None else "over the working volume"
+    if "measured" in results:
+        errors, poses = results["tool_error_mm"], results["poses"]
+        return (
+            Fact("How good is it now?", significant(errors[0], 3), "mm", f"Predicted tool error {where}."),
+            Fact(
+                "How good will it be?",
+                significant(errors[poses], 3),
+                "mm",
+                f"After these {poses} poses, the best first.",
+            ),
+        )
+    error, least = results["tool_error_mm"], results["least_possible_mm"]
+    return (
+        Fact("What accuracy is possible?", significant(error, 3), "mm", f"Root mean square {where}, from noise alone."),
+        Fact("How close to the optimum is it?", f"{100 * (error / least - 1):.0f}", "%", "Upper bound of the excess over the best choice "
+        "of as many poses."),
+        Fact("How long are the moves?", f"{results['moves_s']:.0f}", "s", "At least: all joints at once, none faster than its limit."),
+    )  # fmt: skip
+
+
+def _numbers(results: Mapping[str, Any]) -> Section:
+    errors: dict[str, list[float]]
+    if "measured" in results:
+        numbers = [results["measured"] + k for k in range(len(results["tool_error_mm"]))]
+        errors = {"chosen one after the other": list(results["tool_error_mm"])}
+        errors["no choice is below"] = list(results["least_possible_mm"])
+        wanted, plan = results["wanted_mm"], results["measured"] + results["poses"]
+    else:
+        curve = results["curve"]
+        numbers = [point["poses"] for point in curve]
+        errors = {"chosen one by one": [point["tool_error_mm"] for point in curve]}
+        errors["at random, median"] = [point["random_mm"] for point in curve]
+        wanted, plan = None, results["poses"]
+    block = FigureBlock(
+        "figure-numbers",
+        "Predicted tool error against the number of poses",
+        pose_numbers(numbers, errors, plan, wanted),
+        "Where four times the poses halve the error, further poses only average noise. The dashed line is this plan. From the "
+        "instrument's noise alone, without deflection and repeatability.",
+        f"Predicted tool error in mm against {len(numbers)} numbers of poses.",
+    )
+    return Section("numbers", "Number of poses", "", (block,))
+
+
+def _space(study: PoseStudy) -> Section:
+    corners = joint_origins(study.model, study.q)
+    block = FigureBlock(
+        "figure-space",
+        "The poses in the robot's base frame",
+        plan_space(
+            corners,
+            links_at(study.model, study.q[:1])[0],
+            study.working,
+            study.box,
+            station_position(study.model),
+        ),
+        "The links in the first pose, and the arm as lines in the others; the blue line connects the target positions in the order of "
+        "the plan. Drag to rotate, Ctrl and the wheel to zoom.",
+        f"The arm in {len(study.q)} poses, in three dimensions.",
+    )
+    return Section("space", "Poses in space", "", (block,))
+
+
+def _joints(study: PoseStudy) -> Section:
+    block = FigureBlock(
+        "figure-joints",
+        "Joint positions between their limits",
+        joint_positions(study.model, study.q),
+        "One mark a pose. A joint without limits is drawn over a turn.",
+        f"Positions of {study.model.n} joints in {len(study.q)} poses.",
+    )
+    return Section("joints", "Joint positions", "", (block,))

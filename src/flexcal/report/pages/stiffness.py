@@ -1,0 +1,89 @@
+"""The report of springs and dampers from frequency responses (`flexcal identify stiffness`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.estimation import Estimate
+from flexcal.report.checks import Trust, check_response_bearings, check_responses, check_springs
+from flexcal.report.layout import Block, Check, Page, Section, Status, Text, Verdict, sentences, write_page
+from flexcal.report.results import FittedResponse
+from flexcal.report.sections import provenance_section, response_blocks, spring_table, unseen_springs
+
+_HEADLINES: dict[Status, str] = {
+    "good": "Springs identified, and the numbers can be trusted",
+    "care": "Springs identified, with reservations: read the checks below before relying on them",
+    "bad": "Do not rely on these springs yet",
+    "unknown": "Springs identified; this stage alone has no independent check",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class StiffnessStudy:
+    """What `identify stiffness` left: the document of results.json, the block of estimates.yaml, and the responses by pose."""
+
+    results: Mapping[str, Any]
+    estimate: Estimate
+    responses: tuple[FittedResponse, ...]
+
+
+def springs_of(estimate: Estimate, kind: str) -> tuple[str, ...]:
+    """Names of all stiffnesses or dampings."""
+    return tuple(name for name in estimate.parameters.names if name.endswith(f".{kind}"))
+
+
+def write_stiffness_report(path: str | Path, study: StiffnessStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, stiffness_page(study))
+
+
+def stiffness_page(study: StiffnessStudy) -> Page:
+    """The page before it becomes HTML."""
+    results, estimate = study.results, study.estimate
+    return Page(
+        title=f"{results['robot']}: stiffness report",
+        subtitle="Stiffness and damping of drives and bearings, from frequency responses in "
+        f"{len(study.responses)} {'pose' if len(study.responses) == 1 else 'poses'}",
+        verdict=_verdict(study),
+        sections=(
+            Section("stage1", "Springs and dampers", "", _blocks(study)),
+            provenance_section(results["command"], None, {}, estimate.provenance),
+        ),
+        document=results,
+    )
+
+
+def stiffness_checks(estimate: Estimate, bearings: Mapping[str, Any] | None = None) -> tuple[Check, ...]:
+    """The checks behind the verdict."""
+    return (
+        check_responses(estimate),
+        check_springs(estimate, springs_of(estimate, "stiffness"), springs_of(estimate, "damping")).named(
+            "springs"
+        ),
+        *check_response_bearings(bearings),
+    )
+
+
+def _verdict(study: StiffnessStudy) -> Verdict:
+    checks = stiffness_checks(study.estimate, study.results.get("bearings"))
+    trust = Trust(checks)
+    facts = (trust.fact(),)
+    sentence = "Stiffness and damping were identified from frequency responses; measured positions verify the accuracy of the tool."
+    return Verdict(trust.status, _HEADLINES[trust.status], sentence, facts, (), "", checks)
+
+
+def _blocks(study: StiffnessStudy) -> tuple[Block, ...]:
+    estimate = study.estimate
+    stiffness, damping = springs_of(estimate, "stiffness"), springs_of(estimate, "damping")
+    unseen = unseen_springs(estimate, (*stiffness, *damping))
+    remarks = study.results.get("remarks", ())
+    return (
+        spring_table(estimate, stiffness, "stiffness", None, {}, ""),
+        spring_table(estimate, damping, "damping", None, {}, ""),
+        *((Text((), "Remarks", sentences(remarks)),) if remarks else ()),
+        *((Text((), "Not determined by these data", unseen),) if unseen else ()),
+        *response_blocks(study.responses, estimate),
+    )

@@ -1,0 +1,212 @@
+"""The report of a verification on measured poses (`flexcal verify`)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.calibration.verification import ArmPoses, MeasuredPoints, Verification
+from flexcal.report.checks import (
+    Trust,
+    check_claimed_uncertainty,
+    check_enough,
+    check_flanks,
+    check_known_points,
+    check_moved,
+    check_unseen,
+)
+from flexcal.report.figures import ErrorSeries, error_distribution, predicted_quantiles, verification_errors
+from flexcal.report.layout import (
+    ELASTIC,
+    NOMINAL,
+    Block,
+    Check,
+    FigureBlock,
+    Page,
+    Section,
+    Status,
+    Table,
+    Text,
+    Verdict,
+    millimetres,
+    sentences,
+    statistics_cells,
+    write_page,
+)
+from flexcal.report.sections import (
+    BEFORE_NOTE,
+    arm_figure,
+    before_rows,
+    before_rungs,
+    provenance_section,
+    residual_blocks,
+    rung,
+    three_facts,
+)
+
+_HEADLINES: dict[Status, str] = {
+    "good": "Verified on fresh poses",
+    "care": "Verified, with reservations: read the checks below before relying on the result",
+    "bad": "Less accurate than predicted",
+    "unknown": "Measured; whether the calibration can be trusted cannot be judged",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class VerificationStudy:
+    """Verification of a calibrated robot on measured poses outside the fit, as the folder has it.
+
+    `results` is the document of results.json; `arms` is the calibrated robot at the `points`, which have no nominal errors where there
+    are too few for a registration.
+    """
+
+    results: Mapping[str, Any]
+    points: MeasuredPoints
+    arms: ArmPoses
+
+    @property
+    def verification(self) -> Verification:
+        """Prediction, errors and their predicted standard deviations."""
+        return self.points.verification
+
+
+def write_verification_report(path: str | Path, study: VerificationStudy) -> None:
+    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+    write_page(path, verification_page(study))
+
+
+def verification_page(study: VerificationStudy) -> Page:
+    """The page before it becomes HTML."""
+    results = study.results
+    return Page(
+        title=f"{results['robot']}: verification report",
+        subtitle=f"Accuracy of the calibrated robot at {len(study.points.poses)} measured points"
+        + ("" if results["fitted"] else " outside the fit"),
+        verdict=_verdict(study),
+        sections=(
+            _errors_section(study),
+            _residuals_section(study),
+            provenance_section(results["command"], None, {}, results["provenance"]),
+        ),
+        document=results,
+    )
+
+
+def _verdict(study: VerificationStudy) -> Verdict:
+    result, fitted = study.verification, study.results["fitted"]
+    after = result.all
+    before = study.points.before
+    checks = verification_checks(study.results, study.points)
+    trust = Trust(checks)
+    noun = "points" if fitted else "fresh points"
+    return Verdict(
+        trust.status,
+        _HEADLINES[trust.status],
+        f"At {after.poses} {noun} errors of the calibrated model have a P90 of {millimetres(after.p90)} mm and a maximum of "
+        f"{millimetres(after.max)} mm. The instrument's noise is included.{_refitted(study.results)}",
+        three_facts(before, after, trust, "points"),
+        (*before_rungs(study.points), rung("calibrated", after, "elastic")),
+        f"Error of the robot at {after.poses} {noun}, against the instrument",
+        checks,
+    )
+
+
+def _refitted(results: Mapping[str, Any]) -> str:
+    """What was fitted to the verification's own poses, in a sentence."""
+    refit = results.get("refit")
+    if not refit:
+        return ""
+    words = " and ".join(
+        {"station": "place of the instrument", "point": "measured point"}[w] for w in refit["what"]
+    )
+    return f" Fitted to these points: {words}; errors are leave-one-out errors, so this tests the geometry alone."
+
+
+def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> tuple[Check, ...]:
+    """The checks behind the verdict; `results` is the document of results.json."""
+    found = points.verification
+    flanks = (check_flanks(found).named("flanks"),) if results["backlash"] else ()
+    return (
+        check_unseen(results["fitted"]).named("unseen_poses", independent=True),
+        check_enough(found.all.poses).named("enough_poses"),
+        check_claimed_uncertainty(results["prediction"]).named("claimed_uncertainty", independent=True),
+        *flanks,
+        *(
+            (check_known_points(results["uncalibrated_points"]).named("calibrated_points"),)
+            if results.get("uncalibrated_points")
+            else ()
+        ),
+        *((check_moved(results["refit_proposed"]).named("moved"),) if results.get("refit_proposed") else ()),
+    )
+
+
+def _errors_section(study: VerificationStudy) -> Section:
+    result = study.verification
+    series = [ErrorSeries("calibrated", ELASTIC, result.errors)]
+    refit = study.results.get("refit")
+    label = f"calibrated, {' and '.join(refit['what'])} refitted (leave-one-out)" if refit else "calibrated"
+    rows = before_rows(study.points)
+    if refit and (block := study.results["verification"].get("as_calibrated")):
+        stands = ErrorStatistics.of_millimetres(block)
+        rows.append(("calibrated, nothing refitted", str(stands.poses), *statistics_cells(stands)))
+    rows.append((label, str(result.all.poses), *statistics_cells(result.all)))
+    if study.points.delivered is not None:
+        series.insert(0, ErrorSeries("before, the robot's own", NOMINAL, study.points.delivered))
+    if result.ambiguous.any():
+        certain = result.unambiguous
+        rows.append(("… where the backlash flank is certain", str(certain.poses), *statistics_cells(certain)))
+    poses, remarks = study.points.poses, study.results["remarks"]
+    blocks: list[Block] = [
+        Table(
+            "table-accuracy",
+            "Distances",
+            ("model", "points", "mean / mm", "P90 / mm", "max / mm"),
+            tuple(rows),
+            note=BEFORE_NOTE,
+        ),
+        *([Text((), "Remarks", sentences(remarks))] if remarks else []),
+        arm_figure(study.arms, len(poses)),
+        FigureBlock(
+            "figure-errors",
+            "Error at every point",
+            verification_errors(poses, series, result, None),
+            "Distance between measured and predicted point, on a logarithmic scale.",
+            f"Errors of {result.all.poses} points, up to {millimetres(result.all.max)} mm.",
+        ),
+        FigureBlock(
+            "figure-distribution",
+            "Cumulative distribution of the errors",
+            error_distribution(series, {}),
+            "P90 is where a curve crosses 90 %.",
+            f"Cumulative distribution; P90 is {millimetres(result.all.p90)} mm.",
+        ),
+    ]
+    if study.results["prediction"] is not None:
+        blocks.append(
+            FigureBlock(
+                "figure-predicted",
+                "Observed against predicted errors",
+                predicted_quantiles(result),
+                "The covariance of the parameters and the instrument's noise predict how large errors should be. Points on the dashed "
+                "line: the prediction was right. Above it: errors are larger than predicted. Below: smaller.",
+                "Sorted observed errors against predicted quantiles.",
+            )
+        )
+    return Section(
+        "errors",
+        "Errors at the measured points" if study.results["fitted"] else "Errors at fresh points",
+        "",
+        tuple(blocks),
+    )
+
+
+def _residuals_section(study: VerificationStudy) -> Section:
+    return Section(
+        "residuals",
+        "Errors by joint, time and position",
+        "Errors that depend on a joint, on time or on the position in the working volume indicate a term that the model lacks.",
+        residual_blocks(study.results["joints"], study.points.poses, study.points.calibrated),
+    )

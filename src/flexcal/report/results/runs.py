@@ -1,0 +1,127 @@
+"""Two runs side by side, as their folders have them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from flexcal.calibration.error_model import ErrorStatistics
+from flexcal.estimation import Estimate
+from flexcal.files.formats import BLOCKS, Block
+from flexcal.report.results.run_significance import (
+    MeanDifference,
+    ParameterChanges,
+    mean_difference,
+    parameter_changes,
+)
+from flexcal.units import MILLIMETRE
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """A run and what it left: errors of the calibrated robot (N, 3) m at joint positions `q` (N, n), measured (or true) at `points` (N, 3).
+
+    `before` are the errors of the robot as delivered, where known; `fresh` says that no fit saw the points. `data` are the SHA-256 of the
+    measurements by name, `origin` all that the run says of where it comes from.
+    """
+
+    name: str
+    kind: Literal["calibration", "verification", "demo"]
+    robot: str
+    q: np.ndarray
+    points: np.ndarray
+    errors: np.ndarray
+    fresh: bool
+    before: ErrorStatistics | None = None
+    estimates: Mapping[Block, Estimate] = field(default_factory=dict)
+    data: Mapping[str, str] = field(default_factory=dict)
+    origin: Mapping[str, str] = field(default_factory=dict)
+
+    @property
+    def after(self) -> ErrorStatistics:
+        """Of the calibrated robot."""
+        return ErrorStatistics.of(self.errors)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """Run `second` against run `first`."""
+
+    first: Run
+    second: Run
+
+    @cached_property
+    def difference(self) -> MeanDifference:
+        """Of the mean errors, point by point where the same measurements stand behind both."""
+        first, second = self.first, self.second
+        same = (
+            first.q.shape == second.q.shape
+            and np.allclose(first.q, second.q, rtol=0, atol=1e-9)
+            and np.allclose(first.points, second.points, rtol=0, atol=1e-9)
+        )
+        return mean_difference(first.errors, second.errors, paired=same)
+
+    @cached_property
+    def changes(self) -> dict[Block, ParameterChanges]:
+        """Of the parameters, by the blocks that both runs have."""
+        pair = self.first.estimates, self.second.estimates
+        return {
+            block: parameter_changes(pair[0][block], pair[1][block])
+            for block in BLOCKS
+            if all(block in estimates for estimates in pair)
+        }
+
+    @property
+    def shared(self) -> tuple[str, ...]:
+        """Names of measurements, and of blocks of estimates, that both runs used."""
+        known = set(self.second.data.values())
+        named = tuple(name for name, digest in self.first.data.items() if digest in known)
+        return named or self._common
+
+    @property
+    def _common(self) -> tuple[str, ...]:
+        """How many of the measured points both fitted, in words, whatever files they were in."""
+        first, second = (
+            set(run.estimates["calibration"].measurements if "calibration" in run.estimates else ())
+            for run in (self.first, self.second)
+        )
+        count = len(first & second)
+        return (f"{count} of the same measured points",) if count else ()
+
+    def document(self) -> dict[str, object]:
+        """What machines read; lengths in millimetres, `probability` and scores as `ParameterChanges` has them."""
+        difference = self.difference
+        return {
+            "runs": [run.name for run in (self.first, self.second)],
+            "errors": [run.after.in_millimetres() for run in (self.first, self.second)],
+            "difference_mm": {
+                "mean": difference.value / MILLIMETRE,
+                "low": difference.low / MILLIMETRE,
+                "high": difference.high / MILLIMETRE,
+                "paired": difference.paired,
+                "significant": difference.significant,
+            },
+            "shared": list(self.shared),
+            "parameters": {
+                block: {
+                    "compared": len(found.changes),
+                    "not_comparable": list(found.others),
+                    "probability": found.probability,
+                    "changed": [
+                        {
+                            "name": c.name,
+                            "unit": c.unit,
+                            "estimates": list(c.values),
+                            "std": list(c.std),
+                            "score": c.score,
+                        }
+                        for c in found.beyond
+                    ],
+                }
+                for block, found in self.changes.items()
+            },
+        }

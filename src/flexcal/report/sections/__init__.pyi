@@ -1,0 +1,59 @@
+from .base_parameters import base_parameters_section
+from .first_screen import rung, three_facts
+from .friction import friction_section
+from .geometry import arm_figure, error_figures, geometry_section
+from .headline_numbers import comparison_section
+from .identifiability import identifiability_blocks
+from .learned_residual import learned_section
+from .link_inertials import stage_zero_section
+from .parameters import coverage, parameter_figures, parameter_table
+from .provenance import common_origin, input_files, provenance_section
+from .residuals import residual_blocks, residuals_section
+from .response_levels import levels_block
+from .selected_terms import terms_section
+from .signal_processing import signals_table
+from .springs import hardening_sentence, spring_table, unseen_springs
+from .stiffness import response_blocks, stiffness_section
+from .torques import recording_labels, torque_blocks
+from .uncalibrated import BEFORE, BEFORE_NOTE, before_rows, before_rungs, before_table
+from .uncertainty_budget import budget_table
+from .verification import verification_section
+
+__all__ = [
+    "BEFORE",
+    "BEFORE_NOTE",
+    "arm_figure",
+    "base_parameters_section",
+    "before_rows",
+    "before_rungs",
+    "before_table",
+    "budget_table",
+    "common_origin",
+    "comparison_section",
+    "coverage",
+    "error_figures",
+    "friction_section",
+    "geometry_section",
+    "hardening_sentence",
+    "identifiability_blocks",
+    "input_files",
+    "learned_section",
+    "levels_block",
+    "parameter_figures",
+    "parameter_table",
+    "provenance_section",
+    "recording_labels",
+    "residual_blocks",
+    "residuals_section",
+    "response_blocks",
+    "rung",
+    "signals_table",
+    "spring_table",
+    "stage_zero_section",
+    "stiffness_section",
+    "terms_section",
+    "three_facts",
+    "torque_blocks",
+    "unseen_springs",
+    "verification_section",
+]

@@ -1,0 +1,86 @@
+"""The virtual cell: a robot with a hidden truth that can be excited and measured like a real one."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+import numpy as np
+
+from flexcal.data.plans import MultisinePlan, PosePlan, TrajectoryPlan
+from flexcal.data.poses import PoseSet
+from flexcal.data.recordings import Recording
+from flexcal.errors import FlexcalError
+from flexcal.model.robot import RobotModel
+from flexcal.virtual_cell.config import CellConfig
+from flexcal.virtual_cell.frequency_experiment import recordings
+from flexcal.virtual_cell.pose_measurement import in_instrument, measured_poses, true_poses
+from flexcal.virtual_cell.trajectory_experiment import trajectory_recordings
+
+_TRACKER = 2**32  # keeps the tracker's random numbers apart from those of the recordings
+
+
+class VirtualCell:
+    """A MuJoCo robot with the values of `truth`, its controller and its instruments.
+
+    `controller_model` is the robot that the controller's feed-forward believes in (default: the truth, so that nothing droops). Every
+    output is a function of `seed`, the plan and its seed, whatever the number of `threads` (default: one per core).
+    """
+
+    def __init__(
+        self,
+        truth: RobotModel,
+        config: CellConfig | None = None,
+        seed: int = 0,
+        *,
+        controller_model: RobotModel | None = None,
+        threads: int | None = None,
+    ) -> None:
+        self.truth = truth
+        self.config = CellConfig() if config is None else config
+        self.seed = seed
+        self.controller_model = truth if controller_model is None else controller_model
+        self.threads = threads or os.cpu_count() or 1
+
+    def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
+        """Run a frequency experiment: recordings by pose, realisation, orthogonal experiment, sign (+1, then −1); or trajectories.
+
+        `q` (N, n) are encoder readings and `torque` (N, n) the torque held until the next sample, with sensor noise; joints that are
+        not excited are braked at the pose and read a torque of zero. Raises `FlexcalError` for a joint count that does not fit,
+        an excited drive without rotor inertia, a step that does not resolve the robot, or a loop that diverges.
+        """
+        self._check_width(plan.joint_count)
+        self._check_rotors(plan)
+        if isinstance(plan, TrajectoryPlan):
+            return trajectory_recordings(self.truth, self.controller_model, self.config, plan, self.seed)
+        return recordings(self.truth, self.controller_model, self.config, plan, self.seed, self.threads)
+
+    def measure(self, plan: PosePlan) -> PoseSet:
+        """Go to every pose and measure the first declared point with the tracker of the first station.
+
+        `q` are encoder readings, `torque` is gravity's plus Coulomb friction of random sign and size within its band plus noise,
+        `sigma` the tracker's standard deviation an axis.
+        """
+        self._check_width(plan.joint_count)
+        rng = np.random.default_rng(np.random.SeedSequence(self.seed, spawn_key=(plan.seed, _TRACKER)))
+        return measured_poses(self.truth, self.config, plan, rng)
+
+    def noise_free(self, plan: PosePlan) -> np.ndarray:
+        """True positions (N, 3) m of the point at every pose in the instrument's frame, for verification only."""
+        self._check_width(plan.joint_count)
+        return in_instrument(self.truth, true_poses(self.truth, self.config, plan).point)
+
+    def _check_rotors(self, plan: MultisinePlan | TrajectoryPlan) -> None:
+        moving = range(self.truth.n) if isinstance(plan, TrajectoryPlan) else plan.joints
+        for spring in self.truth.elastic:
+            if spring.index in moving and not self.truth.rotor_inertia[spring.index] > 0:
+                raise FlexcalError(
+                    f"{self.truth.path} gives {spring.name} no positive rotor inertia, and a motor before a drive spring cannot move "
+                    "without one; add `drives: {rotor_inertia: […]}` in kg m² at the joint."
+                )
+
+    def _check_width(self, joints: int) -> None:
+        if joints != self.truth.n:
+            raise FlexcalError(
+                f"the plan's poses have {joints} joints but {self.truth.name} has {self.truth.n}."
+            )

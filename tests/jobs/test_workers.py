@@ -1,0 +1,73 @@
+"""Worker processes do not outlive the process that asked them, nor scratch files the next run."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+PROGRAM = """
+import os, sys, time
+from pathlib import Path
+from joblib import Parallel, delayed
+from flexcal.jobs.logs import scratch_folder
+from flexcal.jobs.logs.worker_processes import WorkerTask, start_workers
+
+def work(folder):
+    Path(folder, f"pid_{os.getpid()}").touch()
+    time.sleep(100)
+
+with scratch_folder() as scratch:
+    Path(sys.argv[1], scratch.name).touch()
+    start_workers(2)
+    Parallel(n_jobs=2)(delayed(WorkerTask(work))(sys.argv[1]) for _ in range(2))
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT])
+def test_workers_end_with_who_asked_them(tmp_path: Path, number: int) -> None:
+    """Ctrl-C comes to all processes of a terminal; a kill to one. Of the workers, nothing is heard."""
+    process = subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(tmp_path)],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+        env=os.environ | {"TMPDIR": str(tmp_path)},
+    )
+    while len(list(tmp_path.glob("pid_*"))) < 2:
+        assert process.poll() is None
+        time.sleep(0.05)
+    (os.killpg if number == signal.SIGINT else os.kill)(process.pid, number)
+    said = process.communicate(timeout=30)[1]
+    for _ in range(600):
+        if not any(alive(int(path.name[4:])) for path in tmp_path.glob("pid_*")):
+            break
+        time.sleep(0.05)
+    else:
+        raise AssertionError("a worker lives on")
+    assert said.count("Traceback") == (number == signal.SIGINT)  # that of the program itself
+
+
+def alive(process: int) -> bool:
+    try:
+        state = Path(f"/proc/{process}/stat").read_text().rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return False
+    return state != "Z"
+
+
+def test_scratch_files_of_a_killed_run_go_with_the_next(tmp_path: Path) -> None:
+    program = "from flexcal.jobs.logs.scratch import scratch_folder\nimport os, signal, sys\n"
+    program += "with scratch_folder() as folder:\n (folder / 'log').touch()\n sys.argv[1] and os.kill(os.getpid(), signal.SIGKILL)\n"
+    (tmp_path / "flexcal_scratch_notes").mkdir()
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    for killed, left in (("yes", 2), ("yes", 2), ("", 1)):
+        subprocess.run([sys.executable, "-c", program, killed], env=environment, check=False)
+        assert len(os.listdir(tmp_path)) == left
+    assert os.listdir(tmp_path) == ["flexcal_scratch_notes"]
