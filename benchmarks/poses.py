@@ -16,10 +16,10 @@ from benchmarks.peers import PeerAbsentError, run_peer
 from flexcal.design.optimality import DOptimal, SpectralCriterion, choose, exchange
 from flexcal.design.poses import (
     base_sensitivity,
+    measurement_order,
     pose_sensitivity,
     random_candidates,
     random_poses,
-    visiting_order,
 )
 from flexcal.design.poses.feasibility import tool_weight
 from flexcal.design.poses.selection import criterion_named
@@ -57,7 +57,7 @@ def many(model: RobotModel) -> list[tuple[str, float, str]]:
         told = f"{rows:.2f} s rows and base parameters, {choice:.2f} s choice; before that {drawing:.1f} s to draw and check them"
         label = f"{POSES} poses of {CANDIDATES}, {name}: limit {SECONDS:g} s"
         results.append((label, SECONDS / (rows + choice), told))
-    ways, _ = best(lambda: visiting_order(checker, q[:POSES]))
+    ways, _ = best(lambda: measurement_order(checker, q[:POSES]))
     return [*results, (f"order of {POSES} poses: limit 1 s", 1 / ways, f"{ways:.2f} s")]
 
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.dynamics import best_times
-from flexcal.design.optimality import ColumnCondition, Criterion, DOptimal
-from flexcal.design.trajectories import TorqueColumns
+from flexcal.design.optimality import ConditionNumberCriterion, Criterion, DOptimal
+from flexcal.design.trajectories import BaseRegressor
 from flexcal.design.trajectories.limit_usage import MotionLimits
 from flexcal.design.trajectories.motion_space import MotionSpace
 from flexcal.model.robot import RobotModel
@@ -22,12 +22,13 @@ COST = 4.0
 def run() -> list[tuple[str, float, str]]:
     """Their time over ours, and limit over measured."""
     model = RobotModel.from_yaml(ROBOT, estimates=False)
-    columns = TorqueColumns.of(model)
+    columns = BaseRegressor.of(model)
     space = MotionSpace.of("fourier", HARMONICS, PERIOD, SAMPLES, MotionLimits.of(model))
     x = 0.3 * np.random.default_rng(1).normal(size=space.shape)
     motion, slopes = space.motion(x), columns.write(space.motion(x))
     found = [
-        _gradient(Excitation(columns, space, criterion), x) for criterion in (DOptimal(), ColumnCondition())
+        _gradient(Excitation(columns, space, criterion), x)
+        for criterion in (DOptimal(), ConditionNumberCriterion())
     ]
     forward, adjoint = best_times(
         lambda: [columns.write(motion) for _ in range(REPEATS)],
@@ -59,7 +60,7 @@ def _gradient(excitation: Excitation, x: np.ndarray) -> tuple[str, float, str]:
 class Excitation:
     """A criterion of the information of a motion on the base parameters, by its coordinates (k, n)."""
 
-    def __init__(self, columns: TorqueColumns, space: MotionSpace, criterion: Criterion) -> None:
+    def __init__(self, columns: BaseRegressor, space: MotionSpace, criterion: Criterion) -> None:
         self.columns, self.space, self.criterion = columns, space, criterion
 
     def value(self, x: np.ndarray) -> float:

@@ -18,8 +18,8 @@ from flexcal.elasticity.identification import MultiStart
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
     ResponseModel,
-    StageOneResidual,
-    stage_one_parameters,
+    ResponseResidual,
+    stiffness_parameters,
 )
 from flexcal.estimation import Problem, solve
 from flexcal.frequency.periodic import FrequencyResponse
@@ -40,9 +40,9 @@ def run() -> list[tuple[str, float, str]]:
     responses = [_measured(truth, q, rng) for q in _poses()[:3]]
 
     start = time.perf_counter()
-    parameters = stage_one_parameters(robot, responses, inertias_known=True).subset(names)
+    parameters = stiffness_parameters(robot, responses, inertias_known=True).subset(names)
     found = MultiStart().find(robot, responses, parameters, np.diag(parameters.prior_std() ** 2), rng)
-    residual = StageOneResidual.of(
+    residual = ResponseResidual.of(
         ResponseModel.of(robot, responses, parameters), responses, CovarianceWeighting()
     )
     fit = solve(

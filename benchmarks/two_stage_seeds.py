@@ -25,7 +25,7 @@ from flexcal.elasticity.response_model import (
     ExperimentEffect,
     ModelError,
     ResponseModel,
-    StageOneResidual,
+    ResponseResidual,
     Tolerances,
 )
 from flexcal.files.formats import read_yaml
@@ -108,7 +108,7 @@ def cramer_rao(run: TwoStageRun) -> np.ndarray:
     estimate, responses = run.stiffness.estimate, run.responses
     x = estimate.parameters.coordinates()
     model = ResponseModel.of(run.informed, responses, estimate.parameters).with_loaded_drives(x, run.plan)
-    residual = StageOneResidual.of(model, responses, CovarianceWeighting())
+    residual = ResponseResidual.of(model, responses, CovarianceWeighting())
     geometry = replace(Tolerances.none(), length=Tolerances.length, angle=Tolerances.angle)
     still = [ExperimentEffect.none(response) for response in responses]
     jacobian = ModelError.of(residual, responses, x, still, geometry).whiten(residual.linearise(x)[1])

@@ -23,7 +23,7 @@ import pytest
 import flexcal
 from flexcal.cli.main import main
 from flexcal.dynamics.drives.gains import gain_name
-from flexcal.elasticity.response_model import stage_one_parameters
+from flexcal.elasticity.response_model import stiffness_parameters
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.frequency.periodic.response import POOLED_LINES, SMALLEST_FREEDOM
 from flexcal.model.robot import ArmSensor, RobotModel, unit_of
@@ -84,7 +84,7 @@ def produced(model: RobotModel) -> dict[str, str]:
     )
     gains = [gain_name(joint) for joint in model.joint_names]
     names = {name: unit_of(name) for name in (*model.values, *gains)}
-    return names | {item.name: item.unit for item in stage_one_parameters(model, [response], gaps=True)}
+    return names | {item.name: item.unit for item in stiffness_parameters(model, [response], gaps=True)}
 
 
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.calibration.accuracy import repeatability
 from flexcal.calibration.accuracy.pose_repeatability import SAME_COMMAND
-from flexcal.calibration.fit import EvenSample
+from flexcal.calibration.fit import StratifiedSample
 from flexcal.data.poses import PoseSet
 
 
@@ -31,7 +31,7 @@ def poses_of(
 
 def test_few_points_are_all_taken() -> None:
     q = np.random.default_rng(0).uniform(-1, 1, (100, 6))
-    assert EvenSample.of(poses_of(q, np.arange(100)), 100) is None
+    assert StratifiedSample.of(poses_of(q, np.arange(100)), 100) is None
 
 
 def test_distinct_poses_keep_visits_whole_and_small_stations() -> None:
@@ -41,13 +41,13 @@ def test_distinct_poses_keep_visits_whole_and_small_stations() -> None:
     pose = np.repeat(np.arange(5000), 2)
     station = np.repeat(np.where(np.arange(5000) < 50, "rare", np.where(np.arange(5000) < 2500, "b", "c")), 2)
     poses = poses_of(q, pose, target=np.tile(["a", "b"], 5000), station=station)
-    found = EvenSample.of(poses, 1000)
+    found = StratifiedSample.of(poses, 1000)
     assert found is not None and found.total == 10_000 and 900 <= len(found.rows) <= 1200
     assert (np.diff(found.rows) > 0).all()
     assert (np.bincount(pose[found.rows], minlength=5000) != 1).all()
     counts = {name: (station[found.rows] == name).sum() for name in ("rare", "b", "c")}
     assert counts["rare"] == 100 and abs(counts["b"] - counts["c"]) < 100
-    again = EvenSample.of(poses, 1000)
+    again = StratifiedSample.of(poses, 1000)
     assert again is not None and np.array_equal(found.rows, again.rows)
 
 
@@ -55,7 +55,7 @@ def test_repeated_visits_are_kept_evenly_in_time() -> None:
     rng = np.random.default_rng(3)
     command = rng.permutation(np.repeat(np.arange(1000), 20))
     poses = poses_of(rng.uniform(-2, 2, (1000, 6))[command], np.arange(20_000))
-    found = EvenSample.of(poses, 4000)
+    found = StratifiedSample.of(poses, 4000)
     assert found is not None
     counts = np.bincount(command[found.rows], minlength=1000)
     assert (counts > 0).sum() == 400 and set(counts) == {0, 10}
@@ -84,9 +84,9 @@ def test_a_payload_measured_at_every_pose_is_no_stratum() -> None:
     """As from a load cell; a declared set of payloads is one."""
     rng = np.random.default_rng(5)
     poses = poses_of(rng.uniform(-2, 2, (50_000, 6)), np.arange(50_000))
-    measured = EvenSample.of(replace(poses, payload=rng.normal(5.0, 0.1, 50_000)), 1000)
+    measured = StratifiedSample.of(replace(poses, payload=rng.normal(5.0, 0.1, 50_000)), 1000)
     assert measured is not None and len(measured.rows) == 1000
-    changed = EvenSample.of(replace(poses, payload=np.where(np.arange(50_000) < 500, 5.0, 0.0)), 1000)
+    changed = StratifiedSample.of(replace(poses, payload=np.where(np.arange(50_000) < 500, 5.0, 0.0)), 1000)
     assert changed is not None and (changed.rows < 500).sum() == 100
 
 
@@ -95,6 +95,6 @@ def test_many_stations_take_no_more_visits_than_others() -> None:
     command = np.tile(np.arange(2000), 20)
     station = np.array([f"s{k}" for k in range(40)])[command % 40]
     poses = poses_of(rng.uniform(-2, 2, (2000, 6))[command], np.arange(40_000), station=station)
-    found = EvenSample.of(poses, 4000)
+    found = StratifiedSample.of(poses, 4000)
     assert found is not None and len(found.rows) <= 4400
     assert len(np.unique(station[found.rows])) == 40

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.calibration.diagnostics import moved_far
+from flexcal.calibration.diagnostics import implausible_shifts
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import Calibration, ElasticPrior, calibrate
 from flexcal.calibration.measurement import predict
@@ -293,12 +293,12 @@ def test_stations_and_measurements_that_are_not_known_are_named(
 def test_a_fit_that_turned_an_axis_round_is_remarked(ur5: RobotModel, examples: Path) -> None:
     """A column with the wrong sign can be fitted perfectly, by an axis that points the other way."""
     poses = read_poses(examples / "ur5_tracker" / "grid.csv", ur5).subset(slice(0, None, 8))
-    assert not moved_far(calibrate(ur5, poses, terms=("kinematic",)))
+    assert not implausible_shifts(calibrate(ur5, poses, terms=("kinematic",)))
     wrong = poses.q * np.array([1, 1, 1, -1, 1, 1])
     found = calibrate(ur5, replace(poses, q=wrong), terms=("kinematic",))
     assert found.errors.max < 0.3e-3
-    assert moved_far(found)[0].name.startswith("wrist_1_joint.misalignment")
-    assert abs(abs(moved_far(found)[0].value) - np.pi) < 0.02
+    assert implausible_shifts(found)[0].name.startswith("wrist_1_joint.misalignment")
+    assert abs(abs(implausible_shifts(found)[0].value) - np.pi) < 0.02
 
 
 def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, tx90l: RobotModel) -> None:
@@ -307,6 +307,6 @@ def test_a_spring_far_from_what_stage_one_said_is_remarked(simulate: Callable, t
     sure = replace(tx90l.config, prior=replace(tx90l.config.prior, mass=1e-3, com=1e-4))
     known = replace(tx90l, config=sure).with_values(elastic)
     stiffer = known.with_values({name: 1.5 * known.value(name)})
-    assert not moved_far(calibrate(known.with_estimate(stage_one(known, 0.02)), simulated.poses))
-    far = moved_far(calibrate(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses))
+    assert not implausible_shifts(calibrate(known.with_estimate(stage_one(known, 0.02)), simulated.poses))
+    far = implausible_shifts(calibrate(stiffer.with_estimate(stage_one(stiffer, 0.02)), simulated.poses))
     assert far[0].name == name and far[0].start > 1.2 * far[0].value

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.calibration.error_model import order_folds, single_poses
+from flexcal.calibration.error_model import order_folds, repeated_pose_numbers
 from flexcal.calibration.term_selection.leave_out_errors import left_out
 
 
@@ -43,5 +43,5 @@ def test_a_column_that_one_pose_alone_sees_is_held_there(rng: np.random.Generato
 
 def test_poses_that_repeat_are_one() -> None:
     q = np.array([[0.0, 1.0], [0.001, 0.999], [0.5, 1.0], [0.0, 1.0]])
-    number = single_poses(q)
+    number = repeated_pose_numbers(q)
     assert number[0] == number[1] == number[3] != number[2]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from flexcal.calibration.accuracy import PoseDrift, common_way, drift_of_poses, repeatability
+from flexcal.calibration.accuracy import PoseDrift, common_displacement, pose_drifts, repeatability
 from flexcal.data.poses import PoseSet
 
 MM = 1e-3
@@ -27,7 +27,7 @@ def visits(points: np.ndarray, time: np.ndarray | None) -> PoseSet:
 
 def drifts(points: np.ndarray, time: np.ndarray | None) -> list[PoseDrift]:
     poses = visits(points, time)
-    return drift_of_poses(poses, repeatability(poses))
+    return pose_drifts(poses, repeatability(poses))
 
 
 def test_a_pose_that_goes_sideways_and_repeats_worse() -> None:
@@ -56,7 +56,7 @@ def test_what_all_poses_do_together() -> None:
     moved = np.zeros((20, 2, 3))
     moved[10:] = MM * np.array([[2.0, 1, 0], [2, -1, 0]])
     found = drifts(scatter + moved, np.arange(40.0))
-    np.testing.assert_allclose(common_way(found), (2 * MM, 1 * MM), atol=2e-6)
+    np.testing.assert_allclose(common_displacement(found), (2 * MM, 1 * MM), atol=2e-6)
     assert all(drift.certain for drift in found)
 
 
@@ -84,9 +84,7 @@ def test_chance_is_as_often_as_it_says() -> None:
     poses = visits(points, np.arange(23 * 2000.0))
     rows = np.arange(23 * 2000).reshape(23, 2000).T
     pattern = repeatability(poses.subset(rows[0]))[0]
-    chances = np.array(
-        [d.chance for d in drift_of_poses(poses, [replace(pattern, rows=own) for own in rows])]
-    )
+    chances = np.array([d.chance for d in pose_drifts(poses, [replace(pattern, rows=own) for own in rows])])
     for level in (0.05, 0.3, 0.7):
         spread = np.sqrt(level * (1 - level) / 2000)
         assert abs((chances < level).mean() - level) < 3.5 * spread

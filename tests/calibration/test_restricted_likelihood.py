@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from flexcal.calibration.error_model import ErrorCells, LinearFit, Scatter
+from flexcal.calibration.error_model import ErrorGroups, LinearFit, Scatter
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
 
@@ -24,7 +24,7 @@ NONE_AGAIN = np.arange(30)
 def drawn(visits: np.ndarray, command: np.ndarray = ALL_AGAIN) -> LinearFit:
     """A fit of seven parameters, two of them with a prior, to 30 points with all kinds of shared errors."""
     rng = np.random.default_rng(4)
-    cells = ErrorCells(visits, np.arange(30) // 6, (7 * np.arange(30)) % 4, command)
+    cells = ErrorGroups(visits, np.arange(30) // 6, (7 * np.arange(30)) % 4, command)
     sigma = rng.uniform(1e-5, 3e-5, (30, 3))
     parts = (rng.normal(size=(30, 3, k)) for k in (5, 2, 3, 4))
     free, tied, turns, waves = parts
@@ -105,7 +105,7 @@ def test_components_are_those_of_a_search_without_derivatives() -> None:
     fit = drawn(ONE_POINT)
     rng = np.random.default_rng(5)
     wandering = 5e-5 * rng.normal(size=(4, 3))[fit.cells.blocks["order"]]
-    fit = replace(fit, residual=fit.residual + wandering, cells=ErrorCells(ONE_POINT, order=fit.cells.order))
+    fit = replace(fit, residual=fit.residual + wandering, cells=ErrorGroups(ONE_POINT, order=fit.cells.order))
     fit = replace(fit, waves=np.zeros((30, 3, 0)))
     sums = PointSums.of(fit)
 

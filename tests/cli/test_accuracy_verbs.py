@@ -40,9 +40,9 @@ def calibrated(examples: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     nominal = read_poses(folder / "random.csv", model)
     commands = pl.read_csv(folder / "commands.csv")
     rng = np.random.default_rng(3)
-    rows_of = np.tile(np.arange(20), 3)
-    again = nominal.subset(rows_of)
-    q = commands.select(Q).to_numpy()[rows_of]
+    parameter_rows = np.tile(np.arange(20), 3)
+    again = nominal.subset(parameter_rows)
+    q = commands.select(Q).to_numpy()[parameter_rows]
     after = replace(again, q=q, sigma=np.full((60, 3), SIGMA), sigma_given=True)
     seen = predict(model, after).position + SIGMA * rng.standard_normal((60, 3))
     write_poses(folder / "after.csv", replace(after, position=seen))

@@ -134,19 +134,19 @@ def test_import_offers_the_place_of_the_point(run, tmp_path: Path) -> None:
 
 def test_points_in_blocks_and_in_quotes(tmp_path: Path) -> None:
     from flexcal.errors import InputError
-    from flexcal.jobs.setup import write_point_place
+    from flexcal.jobs.setup import write_point_position
 
     robot = StrangerArm().write(tmp_path)
     robot.write_text(
         'robot: arm.urdf\npoints:\n  a: {frame: tool0, xyz: [1, 2, 3]}  # a: xyz: [9, 9, 9]\n  "b":\n    frame: tool0  # xyz: [0, 0, 0]\n'
         "    xyz: [0.1, 0.2,\n          0.3]\ngravity: [0, 0, -9.81]\n"
     )
-    write_point_place(robot, "b", np.array([0.5, 0.25, -0.125]))
+    write_point_position(robot, "b", np.array([0.5, 0.25, -0.125]))
     assert (
         "xyz: [0.500000, 0.250000, -0.125000]\ngravity" in robot.read_text()
         and "[1, 2, 3]" in robot.read_text()
     )
-    write_point_place(robot, "a", np.array([0.5, 0.25, -0.125]))
+    write_point_position(robot, "a", np.array([0.5, 0.25, -0.125]))
     assert (
         "  a: {frame: tool0, xyz: [0.500000, 0.250000, -0.125000]}  # a: xyz: [9, 9, 9]" in robot.read_text()
     )
@@ -155,7 +155,7 @@ def test_points_in_blocks_and_in_quotes(tmp_path: Path) -> None:
     )
     text = robot.read_text()
     with pytest.raises(InputError, match="by hand"):
-        write_point_place(robot, "a", np.zeros(3))
+        write_point_position(robot, "a", np.zeros(3))
     assert robot.read_text() == text
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from cli_files import FLEXCAL, read_csv, snapshot, write_csv
 
-from flexcal.calibration.fit import EvenSample
+from flexcal.calibration.fit import StratifiedSample
 from flexcal.data.poses import PoseSet, write_poses
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.files.formats import read_estimates, write_estimates
@@ -205,7 +205,7 @@ def test_a_column_with_the_wrong_sign_is_remarked(run, ur5_folder: Path, some: P
     """The fit may look perfect; an axis that turned round does not."""
     robot, arguments = ur5_folder / "robot.yaml", ("--terms", "kinematic", "--json")
     right = run("calibrate", robot, some, *arguments).document
-    assert not right["fit"]["hardly_fits"] and "look for a column" not in " ".join(right["remarks"])
+    assert not right["fit"]["is_implausible"] and "look for a column" not in " ".join(right["remarks"])
     header, rows = read_csv(some)
     rows[:, header.index("q4")] *= -1
     write_csv(some, header, rows)
@@ -347,15 +347,15 @@ def test_of_very_many_points_an_even_sample_is_fitted_and_all_are_judged(
     """The errors at all points are those that a verification of every point finds."""
     robot, grid = ur5_folder / "robot.yaml", ur5_folder / "grid.csv"
     rows = len(grid.read_text().splitlines()) - 1
-    taken = EvenSample.of
-    monkeypatch.setattr(EvenSample, "of", lambda poses: taken(poses, 200))
+    taken = StratifiedSample.of
+    monkeypatch.setattr(StratifiedSample, "of", lambda poses: taken(poses, 200))
     outcome = run("calibrate", robot, grid, "--terms", "kinematic", "--json")
     found = outcome.document
     assert found["sample"]["points"] == found["sample"]["all"]["poses"] == rows
     assert found["sample"]["taken"] == found["calibration"]["selected"]["poses"] == 200
     assert f"of {rows} points 200 were fitted" in " ".join(found["remarks"])
     sampled = run("verify", robot, grid, "--json").document
-    monkeypatch.setattr(EvenSample, "of", lambda poses: None)
+    monkeypatch.setattr(StratifiedSample, "of", lambda poses: None)
     every = run("verify", robot, grid, "--json").document
     for errors in (found["sample"]["all"], sampled["verification"]["measured"]):
         assert errors == pytest.approx(every["verification"]["measured"], rel=1e-9)

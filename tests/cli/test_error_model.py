@@ -11,7 +11,7 @@ import pytest
 from scipy.optimize import least_squares
 from stranger_arm import PANDA, SIX, StrangerArm
 
-from flexcal.calibration.diagnostics import hardly_fits
+from flexcal.calibration.diagnostics import is_implausible
 from flexcal.calibration.fit import Calibration, calibrate
 from flexcal.calibration.verification import error_scale, verify, verify_jointly
 from flexcal.data.poses import PoseSet, read_poses
@@ -269,7 +269,7 @@ def alarms(folder: Path, seed: int) -> tuple[bool, bool]:
     xyz = case.arm.measured(q, case.rng, case.rng.uniform(5e-5, 2e-4))
     sigma = (None, 5e-6, 2e-5)[seed % 3]
     wrong = case.calibrated(*spoiled(WRONG[seed % len(WRONG)], q, xyz, case.rng), sigma)
-    return hardly_fits(case.calibrated(q, xyz, sigma)), hardly_fits(wrong)
+    return is_implausible(case.calibrated(q, xyz, sigma)), is_implausible(wrong)
 
 
 def test_wrong_data_are_told_from_noise(tmp_path: Path) -> None:

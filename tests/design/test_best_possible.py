@@ -2,7 +2,7 @@ from itertools import combinations
 
 import numpy as np
 
-from flexcal.design.optimality import TraceOptimal, exchange, least_trace
+from flexcal.design.optimality import TraceOptimal, exchange, trace_lower_bound
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 
 WEIGHT = np.diag([1.0, 5.0, 0.2]) + 0.1
@@ -19,7 +19,7 @@ def test_no_set_is_below_it(rng):
         for _ in range(5):
             sensitivity = _sensitivity(rng, 9, prior)
             counts = np.array([2, 3, 4, 6])
-            least = least_trace(sensitivity, criterion, counts)
+            least = trace_lower_bound(sensitivity, criterion, counts)
             for count, bound in zip(counts, least, strict=True):
                 sets = (
                     sensitivity.jacobian[list(c)].reshape(-1, 3) for c in combinations(range(9), int(count))
@@ -34,5 +34,5 @@ def test_it_is_nearly_reached_by_many_of_many(rng):
     like = sensitivity.jacobian / np.linalg.norm(sensitivity.jacobian / [1, 3, 10], axis=2, keepdims=True)
     sensitivity = Sensitivity(like, sensitivity.parameters, sensitivity.prior_information)
     reached = np.exp(-2 * exchange(sensitivity, 60, criterion).merit)
-    (least,) = least_trace(sensitivity, criterion, np.array([60]))
+    (least,) = trace_lower_bound(sensitivity, criterion, np.array([60]))
     assert 0.85 * reached < least <= reached

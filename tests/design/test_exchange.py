@@ -71,7 +71,7 @@ def test_updates_against_recomputation(criterion, rows, rng):
             assert np.exp(-2 * before) - np.exp(-2 * fresh.merit) == pytest.approx(gains[new])
     fresh.rebuild(members)
     if isinstance(criterion, TraceOptimal):
-        np.testing.assert_allclose(state.spread_blocks, fresh.spread_blocks, atol=1e-12)
+        np.testing.assert_allclose(state.weighted_blocks, fresh.weighted_blocks, atol=1e-12)
 
 
 def test_growing_keeps_its_digits_without_a_prior(rng):

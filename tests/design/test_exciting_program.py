@@ -12,14 +12,14 @@ from flexcal.design.optimality import condition_number
 from flexcal.design.scene import Clearance, CollisionChecker
 from flexcal.design.trajectories import (
     NEAR,
-    TorqueColumns,
+    BaseRegressor,
     TrajectoryCriterion,
     design_trajectories,
     sequence,
 )
 from flexcal.design.trajectories.criterion import torque_goal
-from flexcal.design.trajectories.excitation_problem import ExcitingProgram
-from flexcal.design.trajectories.feasible_start import feasible_places, feasible_swing
+from flexcal.design.trajectories.excitation_problem import ExcitationProblem
+from flexcal.design.trajectories.feasible_start import feasible_postures, feasible_start_motion
 from flexcal.design.trajectories.limit_usage import MotionLimits
 from flexcal.design.trajectories.motion_space import MotionSpace
 from flexcal.errors import FlexcalError
@@ -30,14 +30,14 @@ from flexcal.model.robot.config import BoxConfig, LimitsConfig
 
 def program(
     model: RobotModel, criterion: TrajectoryCriterion = "condition", **space: object
-) -> ExcitingProgram:
-    columns = TorqueColumns.of(model, None if criterion == "c" else 0.0)
+) -> ExcitationProblem:
+    columns = BaseRegressor.of(model, None if criterion == "c" else 0.0)
     limits = MotionLimits.of(model)
     of = ("payload.mass", "link_3.com_x") if criterion == "c" else ()
     goal = torque_goal(columns, criterion, of, np.ones(columns.rank), 400.0)
     motions = MotionSpace.of("fourier", 5, 10.0, 100, limits, **space)
     clearance = Clearance(CollisionChecker(model), NEAR)
-    return ExcitingProgram(motions, columns, goal, np.full(model.n, 0.01), limits, clearance)
+    return ExcitationProblem(motions, columns, goal, np.full(model.n, 0.01), limits, clearance)
 
 
 def slope(f: Callable[[np.ndarray], float], x: np.ndarray, way: np.ndarray, step: float) -> float:
@@ -46,8 +46,8 @@ def slope(f: Callable[[np.ndarray], float], x: np.ndarray, way: np.ndarray, step
     return float(np.array(odd) @ [45, -9, 1]) / (60 * step)
 
 
-def begin(problem: ExcitingProgram, seed: int) -> np.ndarray:
-    return feasible_swing(problem, feasible_places(problem), np.random.default_rng(seed))
+def begin(problem: ExcitationProblem, seed: int) -> np.ndarray:
+    return feasible_start_motion(problem, feasible_postures(problem), np.random.default_rng(seed))
 
 
 @pytest.mark.parametrize("criterion", ["condition", "D", "E", "A", "posterior", "c"])
@@ -157,7 +157,7 @@ def test_splines_from_rest_at_a_start_and_stages_whose_joints_stand(tx90l: Robot
     np.testing.assert_allclose(q[:2], [start, start], atol=1e-9)
     np.testing.assert_allclose([dq[:2], ddq[:2]], 0.0, atol=1e-9)
     assert np.abs(dq[2]).min() > 1e-3
-    stages = sequence(TorqueColumns.of(tx90l), "axes")
+    stages = sequence(BaseRegressor.of(tx90l), "axes")
     assert [stage.moving for stage in stages] == [(3, 4, 5), (0, 1, 2, 3, 4, 5)]
     staged = design_trajectories(tx90l, criterion="D", sequence=stages, payload=0.0, starts=1, steps=8)
     speed = np.abs(staged.plan.motion(0, np.linspace(0, 10, 50))[1]).max(axis=0)

@@ -14,13 +14,13 @@ from flexcal.design.frequency import (
     flat_multisine,
     payload_placements,
     shaped,
-    share_at_rest,
+    static_amplitude_share,
     stiffness_curve,
     within_preload,
 )
 from flexcal.design.frequency.amplitude_spectrum import MOST, ROOM
-from flexcal.design.frequency.backlash_limit import CREST, gap_load, share
-from flexcal.design.frequency.candidates import ExcitablePoses
+from flexcal.design.frequency.backlash_limit import CREST, backlash_load, share
+from flexcal.design.frequency.candidates import FrequencyPoseCandidates
 from flexcal.design.frequency.multisines import DROOP, EXCITATION
 from flexcal.design.frequency.response_jacobian import thinned
 from flexcal.design.frequency.spring_precision import spring_criterion
@@ -36,7 +36,7 @@ from flexcal.frequency.periodic import (
 )
 from flexcal.model.kinematics import joint_ranges
 from flexcal.model.statics import gravity_torque
-from flexcal.model.vibration import closed_loop_motion, drive_pull, linearise
+from flexcal.model.vibration import closed_loop_motion, drive_stretch, linearise
 
 
 @pytest.fixture(scope="module")
@@ -67,19 +67,21 @@ def test_candidates_have_room_and_touch_nothing_and_are_preloaded(tx90l, plan, c
         assert not CollisionChecker(tx90l).collides(q + side * swing).any()
     for pose in q:
         one = replace(plan, poses=pose[None])
-        assert share_at_rest(tx90l, one) >= 1 - 1e-9
-        assert share(gap_load(tx90l, pose, plan), plan.amplitude) >= 1
+        assert static_amplitude_share(tx90l, one) >= 1 - 1e-9
+        assert share(backlash_load(tx90l, pose, plan), plan.amplitude) >= 1
 
 
 def test_the_limit_of_a_gap_is_gravity_over_its_crest(tx90l, plan):
     """Without reference motion three standard deviations of the drive's torque, from a time series, meet gravity."""
     q = np.radians([0, 60.1, -105, 79.6, 67.5, 0])
     still = replace(plan, reference_amplitude=0.0, poses=q[None])
-    allowed = share(gap_load(tx90l, q, still), still.amplitude)
+    allowed = share(backlash_load(tx90l, q, still), still.amplitude)
     system = linearise(tx90l, q)
     moved = closed_loop_motion(system, still.frequencies_hz, still.kp[:3], still.kd[:3])
     strain = (
-        tx90l.stiffness[:3, 2][:, None] * (drive_pull(tx90l, system).T @ moved) @ multisine_spectra(still, 0)
+        tx90l.stiffness[:3, 2][:, None]
+        * (drive_stretch(tx90l, system).T @ moved)
+        @ multisine_spectra(still, 0)
     )
     torque = synthesise(strain, still.lines, 4096)  # (samples, drives, experiments)
     held = np.abs(gravity_torque(tx90l, q[None]))[0, 1:3]
@@ -113,7 +115,7 @@ def test_shaped_amplitudes_keep_all_limits_and_tell_more(tx90l, plan, choice, am
         swing = np.sqrt(np.sum(np.abs(moved) ** 2 * found.amplitude.T[:, None] ** 2, axis=(0, 2)) / 2 / 3)
         assert np.all(CREST * swing < DROOP / 2)
     for q in choice.poses:
-        assert share(gap_load(tx90l, q, found), found.amplitude) >= 1 - 1e-9
+        assert share(backlash_load(tx90l, q, found), found.amplitude) >= 1 - 1e-9
     over = found.amplitude / flat.plan.amplitude
     assert over.max() <= MOST + 1e-9
     np.testing.assert_array_equal(found.detection_lines, plan.detection_lines)
@@ -169,7 +171,7 @@ def test_too_few_poses_name_the_spring(tx90l, plan):
 def test_no_room_for_the_motion_names_the_joint(tx90l, plan):
     wide = replace(plan, reference_amplitude=np.radians(200))
     with pytest.raises(FlexcalError, match=r"limits of joint_1 leave less room than the 202°"):
-        ExcitablePoses(CollisionChecker(tx90l), wide)
+        FrequencyPoseCandidates(CollisionChecker(tx90l), wide)
 
 
 def test_no_preload_anywhere_says_what_threw_poses_out(tx90l, plan):
@@ -177,7 +179,7 @@ def test_no_preload_anywhere_says_what_threw_poses_out(tx90l, plan):
     with pytest.raises(
         FlexcalError, match=r"only 0 of the wanted 3 can be excited: gravity preload threw out \d+, collision"
     ):
-        ExcitablePoses(CollisionChecker(tx90l), strong).random(3, np.random.default_rng(0))
+        FrequencyPoseCandidates(CollisionChecker(tx90l), strong).random(3, np.random.default_rng(0))
 
 
 def test_a_given_pose_that_does_not_load_a_gap_is_named(tx90l, plan):

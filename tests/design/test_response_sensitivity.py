@@ -15,7 +15,7 @@ from flexcal.design.frequency import (
     largest_stiffness_std,
 )
 from flexcal.design.frequency.response_jacobian import (
-    friction_in,
+    friction_disturbance,
     pose_response,
     response_parameters,
     thinned,
@@ -174,7 +174,7 @@ def test_more_realisations_reach_a_wanted_std_or_it_is_said_what_is_reached(plan
 
 
 def test_the_plan_must_excite_the_elastic_joints(tx90l, plan):
-    friction = friction_in(tx90l, POSES[0], plan)
+    friction = friction_disturbance(tx90l, POSES[0], plan)
     other = replace(plan, joints=(0, 1), amplitude=plan.amplitude[:2])
     with pytest.raises(FlexcalError, match="exactly the elastic joints"):
         pose_response(tx90l, POSES[0], other, response_parameters(tx90l, plan), friction)

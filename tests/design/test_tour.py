@@ -3,7 +3,7 @@ from itertools import permutations
 import numpy as np
 import pytest
 
-from flexcal.design.poses.travelling_salesman import short_tour
+from flexcal.design.poses.travelling_salesman import shortest_path
 
 
 def _length(cost, order):
@@ -18,7 +18,7 @@ def test_few_places_against_every_order(count, rng):
         if number % 2:  # not even a metric
             cost = np.triu(rng.uniform(0, 1, (count, count)), 1)
             cost += cost.T
-        order = short_tour(cost)
+        order = shortest_path(cost)
         assert sorted(order) == list(range(count))
         least = min(_length(cost, np.array(way)) for way in permutations(range(count)))
         assert _length(cost, order) == pytest.approx(least, abs=1e-12)
@@ -26,7 +26,7 @@ def test_few_places_against_every_order(count, rng):
 
 def test_places_on_a_line_are_taken_from_one_end_to_the_other(rng):
     places = rng.uniform(0, 1, 60)
-    order = short_tour(np.abs(places[:, None] - places))
+    order = shortest_path(np.abs(places[:, None] - places))
     assert np.all(np.diff(places[order]) > 0) or np.all(np.diff(places[order]) < 0)
 
 
@@ -36,7 +36,7 @@ def test_many_places_near_the_expected_shortest_way(rng):
     for _ in range(4):
         places = rng.uniform(0, 1, (60, 2))
         cost = np.linalg.norm(places[:, None] - places, axis=2)
-        lengths.append(_length(cost, short_tour(cost)))
+        lengths.append(_length(cost, shortest_path(cost)))
     assert np.mean(lengths) < 1.1 * 0.7124 * np.sqrt(60)
 
 
@@ -44,6 +44,6 @@ def test_a_given_order_is_only_improved(rng):
     places = rng.uniform(0, 1, (30, 2))
     cost = np.linalg.norm(places[:, None] - places, axis=2)
     start = rng.permutation(30)
-    assert _length(cost, short_tour(cost, start)) < _length(cost, start)
-    best = short_tour(cost)
-    assert _length(cost, short_tour(cost, best)) <= _length(cost, best) + 1e-12
+    assert _length(cost, shortest_path(cost, start)) < _length(cost, start)
+    best = shortest_path(cost)
+    assert _length(cost, shortest_path(cost, best)) <= _length(cost, best) + 1e-12

@@ -3,7 +3,7 @@ from itertools import pairwise, permutations
 import numpy as np
 import pytest
 
-from flexcal.design.poses import visiting_order
+from flexcal.design.poses import measurement_order
 from flexcal.design.poses.ordering import blocked, move_seconds
 from flexcal.design.scene import CollisionChecker
 from flexcal.model.robot import RobotModel
@@ -65,7 +65,7 @@ def test_the_order_against_every_order(checker):
     assert not checker.collides(POSES).any()
     seconds = move_seconds(checker, POSES)
     touching = np.array([[blocked(checker, a, b) for b in POSES] for a in POSES])
-    found = visiting_order(checker, POSES)
+    found = measurement_order(checker, POSES)
     assert sorted(found.order) == list(range(6))
     ways = [np.array(way) for way in permutations(range(6))]
     least = min((touching[w[:-1], w[1:]].sum(), seconds[w[:-1], w[1:]].sum()) for w in ways)
@@ -81,7 +81,7 @@ def test_the_tx90l_moves_half_as_long(tx90l, rng):
 
     checker = CollisionChecker(tx90l)
     q = random_candidates(checker, 30, rng)
-    found = visiting_order(checker, q)
+    found = measurement_order(checker, q)
     seconds = move_seconds(checker, q)
     assert found.seconds.sum() < 0.6 * seconds[np.arange(29), np.arange(1, 30)].sum()
     assert not found.blocked.any()

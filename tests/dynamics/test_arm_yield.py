@@ -7,15 +7,15 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.data.recordings import Decimation, read_recording
-from flexcal.dynamics.payload import ArmYield
-from flexcal.dynamics.payload.equations import in_link
-from flexcal.dynamics.payload.rigid_body import of_frame
+from flexcal.dynamics.payload import FlexibilityCorrection
+from flexcal.dynamics.payload.equations import payload_to_link_frame
+from flexcal.dynamics.payload.rigid_body import link_frame_from_payload
 from flexcal.dynamics.signals import Motion
 from flexcal.jobs.experiments import measure
 from flexcal.jobs.experiments.measurement import VIRTUAL
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques import inertial_parameters, torque_regressor
-from flexcal.model.vibration import yielding_torque
+from flexcal.model.vibration import flexible_joint_torque
 from flexcal.virtual_cell import write_truth
 
 LAST = slice(50, 60)
@@ -31,9 +31,9 @@ def test_the_yield_of_springs(tx90l: RobotModel, sines: Callable[[int, float], M
     """None where they are stiff; else what exact derivatives give along a periodic motion, away from the ends of the recording."""
     motion = calm(sines(1000, 100.0))
     stiff = replace(tx90l, stiffness=1e7 * tx90l.stiffness)
-    assert np.abs(ArmYield.of(stiff, motion, ()).shift).max() < 1e-3
+    assert np.abs(FlexibilityCorrection.of(stiff, motion, ()).shift).max() < 1e-3
     states = motion.q, motion.dq, motion.ddq
-    found = ArmYield.of(tx90l, motion, ())
+    found = FlexibilityCorrection.of(tx90l, motion, ())
     omega = 2j * np.pi * 0.1 * np.arange(501)[:, None]
 
     def derivatives(bent: np.ndarray) -> np.ndarray:
@@ -42,7 +42,7 @@ def test_the_yield_of_springs(tx90l: RobotModel, sines: Callable[[int, float], M
         )
 
     exact, rigid = (
-        yielding_torque(robot, *states, derivatives, passes=n) for robot, n in ((tx90l, 3), (tx90l, 1))
+        flexible_joint_torque(robot, *states, derivatives, passes=n) for robot, n in ((tx90l, 3), (tx90l, 1))
     )
     exact -= rigid
     inside = (found.time > 1.0) & (found.time < 9.0)
@@ -56,7 +56,9 @@ def loaded_parameters(model: RobotModel) -> np.ndarray:
     """Of all links, the payload on the last."""
     held, heavy = model.payload, inertial_parameters(model)
     assert held is not None
-    heavy[LAST] += in_link(held) @ of_frame(np.concatenate([[held.mass], held.com, held.moments]))
+    heavy[LAST] += payload_to_link_frame(held) @ link_frame_from_payload(
+        np.concatenate([[held.mass], held.com, held.moments])
+    )
     return heavy
 
 
@@ -97,7 +99,7 @@ def test_the_yield_is_that_of_the_virtual_cell(tx90l: RobotModel, examples: Path
     rows = Decimation(640)
 
     def missed(model: RobotModel) -> np.ndarray:
-        found = ArmYield.of(model, motion, ())
+        found = FlexibilityCorrection.of(model, motion, ())
         columns = {c.joint: c.values for c in found.columns(model, motion, {})}
         return np.linalg.norm(rows.apply(seen.T - np.array([columns[i] for i in range(6)])), axis=1)[:3]
 
@@ -112,9 +114,9 @@ def test_slopes_by_springs_and_geometry(tx90l: RobotModel, sines: Callable[[int,
     """A stiffer drive and a turned axis, as much as they change the torques."""
     motion = calm(sines(500, 100.0))
     sources = ("joint_2.drive.stiffness", "joint_3.offset")
-    found = ArmYield.of(tx90l, motion, sources)
+    found = FlexibilityCorrection.of(tx90l, motion, sources)
     stiffer = tx90l.with_values({sources[0]: 1.01 * tx90l.value(sources[0])})
-    change = ArmYield.of(stiffer, motion, ()).shift - found.shift
+    change = FlexibilityCorrection.of(stiffer, motion, ()).shift - found.shift
     np.testing.assert_allclose(change, np.log(1.01) * found.slopes[:, :, 0], atol=0.02 * np.abs(change).max())
     turned = tx90l.with_values({sources[1]: 1e-3}), tx90l
     heavy = loaded_parameters(tx90l)

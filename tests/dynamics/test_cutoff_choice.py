@@ -14,7 +14,7 @@ from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
 from flexcal.dynamics.regression import observe
 from flexcal.dynamics.signals import JointLog, Motion
-from flexcal.jobs.logs import treatment_of
+from flexcal.jobs.logs import choose_preprocessing
 from flexcal.model.robot import RobotModel
 
 RATE, SECONDS, TOP_HZ = 1000, 20, 3.0
@@ -131,7 +131,7 @@ def ratios(folder: Path, seed: int, position_noise: float, torque_noise: float) 
     deviations of the best fit."""
     arm = Arm(folder, seed)
     model = arm.write(folder, position_noise, torque_noise)
-    treatment = treatment_of(model, [folder / "log.parquet"])
+    treatment = choose_preprocessing(model, [folder / "log.parquet"])
     arm.new_motion()
     own = arm.error(model, folder, treatment.cutoff_hz, treatment.decimation)
     others = [
@@ -164,5 +164,5 @@ def test_torques_and_base_parameters_of_many_logs(
 
 
 def test_positions_without_noise_keep_the_cutoff_of_their_spectrum(tmp_path: Path) -> None:
-    treatment = treatment_of(Arm(tmp_path, 5).write(tmp_path, 0.0, 0.1), [tmp_path / "log.parquet"])
+    treatment = choose_preprocessing(Arm(tmp_path, 5).write(tmp_path, 0.0, 0.1), [tmp_path / "log.parquet"])
     assert treatment.choice is None and treatment.cutoff_hz > 20

@@ -14,7 +14,7 @@ from flexcal.dynamics.friction import Presliding, WarmUp
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.dynamics.regression import observe
 from flexcal.dynamics.signals import Motion, Window
-from flexcal.dynamics.simulation import forward_steps
+from flexcal.dynamics.simulation import discretise_motion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model.robot import RobotModel
@@ -142,8 +142,8 @@ def test_a_window_begins_with_what_friction_remembers(tx40: RobotModel, swing: M
     """Columns of steps inside a window are those that all steps have there."""
     observation = Observation(tx40, (WarmUp(20.0), Presliding((0.02,) * 6)))
     slowest = np.zeros(6)
-    whole = list(forward_steps(observation, swing, Window(), slowest))
-    late = list(forward_steps(observation, swing, Window(start=5.0, end=8.0), slowest))
+    whole = list(discretise_motion(observation, swing, Window(), slowest))
+    late = list(discretise_motion(observation, swing, Window(start=5.0, end=8.0), slowest))
     time, again = (np.concatenate([steps.middle.time for steps in parts]) for parts in (whole, late))
     columns, found = (np.concatenate([steps.columns for steps in parts]) for parts in (whole, late))
     inside = (time > 5.0) & (time < 7.995)

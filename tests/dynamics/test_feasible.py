@@ -22,7 +22,7 @@ from flexcal.dynamics.regression import RegressionData, observe
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
 from flexcal.export import write_urdf
-from flexcal.model.parts import PSEUDO_INERTIA, is_body, pseudo_inertia
+from flexcal.model.parts import PSEUDO_INERTIA, is_physically_consistent, pseudo_inertia
 from flexcal.model.robot import RobotModel
 
 NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
@@ -103,7 +103,7 @@ def with_torques(data: RegressionData, parameters: np.ndarray) -> RegressionData
 
 
 def bodies(model: RobotModel, estimate: Estimate) -> list[bool]:
-    return [is_body(estimate.values, joint.link) for joint in model.joints]
+    return [is_physically_consistent(estimate.values, joint.link) for joint in model.joints]
 
 
 def base_values(data: RegressionData, parameters: np.ndarray) -> np.ndarray:

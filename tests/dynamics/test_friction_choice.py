@@ -8,7 +8,14 @@ import pytest
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
-from flexcal.dynamics.friction import Candidate, LoadCoulomb, SublinearViscous, Trial, WarmUp, select_friction
+from flexcal.dynamics.friction import (
+    Candidate,
+    LoadCoulomb,
+    SelectionStep,
+    SublinearViscous,
+    WarmUp,
+    select_friction,
+)
 from flexcal.dynamics.friction.stepwise import FrictionChoice
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, DriveTerm, Observation
 from flexcal.dynamics.regression import (
@@ -159,13 +166,13 @@ def test_rivals_predict_as_well() -> None:
     """As many terms nearly so, or one more really so, whatever its significance; neither fewer nor two more."""
     chosen = Candidate("cable_stiffness", "", SublinearViscous())
     trials = (
-        Trial((), 0.2),
-        Trial(("cable_stiffness",), 0.100),
-        Trial(("warm_up",), 0.1009),
-        Trial(("stribeck",), 0.1011),
-        Trial(("cable_stiffness", "stribeck"), 0.0995),
-        Trial(("cable_stiffness", "warm_up"), 0.09, 0.2),
-        Trial(("cable_stiffness", "presliding"), 0.1001),
+        SelectionStep((), 0.2),
+        SelectionStep(("cable_stiffness",), 0.100),
+        SelectionStep(("warm_up",), 0.1009),
+        SelectionStep(("stribeck",), 0.1011),
+        SelectionStep(("cable_stiffness", "stribeck"), 0.0995),
+        SelectionStep(("cable_stiffness", "warm_up"), 0.09, 0.2),
+        SelectionStep(("cable_stiffness", "presliding"), 0.1001),
     )
     rivals = FrictionChoice((chosen,), trials).rivals
     assert rivals == (

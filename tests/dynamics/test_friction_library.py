@@ -15,7 +15,7 @@ from flexcal.dynamics.friction import (
     SublinearViscous,
     WarmUp,
 )
-from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, variants
+from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, candidate_shapes
 from flexcal.dynamics.friction.terms import dahl
 from flexcal.dynamics.inverse_model import CLASSIC, DriveTerm, Observation
 from flexcal.dynamics.regression import blocks as rows
@@ -100,7 +100,7 @@ def test_the_load_is_that_of_the_links(tx40: RobotModel, motion: Motion) -> None
 def library(model: RobotModel) -> tuple[DriveTerm, ...]:
     inertials = inertial_parameters(model).ravel()
     scale = Scale(np.ones(model.n), np.ones(model.n), 10.0, inertials)
-    return (AsymmetricCoulomb(), *(variants(name, scale)[-1].term for name in LIBRARY))
+    return (AsymmetricCoulomb(), *(candidate_shapes(name, scale)[-1].term for name in LIBRARY))
 
 
 def test_every_term_has_a_column_for_every_joint_and_a_place_in_the_robot(tx40: RobotModel) -> None:

@@ -8,13 +8,13 @@ import pytest
 
 from flexcal.data.recordings import Decimation, Recording, read_recording, write_recording
 from flexcal.dynamics.estimators import weighted_least_squares
-from flexcal.dynamics.estimators.column_noise import NoisyLog
+from flexcal.dynamics.estimators.column_noise import PerturbedLog
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.dynamics.regression import ExperimentSystem, observe, rows
 from flexcal.dynamics.signals import JointLog, Motion, Window, joint_log
 from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics.remarks import dynamics_remarks
-from flexcal.jobs.logs import LogPart, Treatment, log_systems, read_logs
+from flexcal.jobs.logs import LogSegment, Treatment, assemble_log_systems, read_logs
 from flexcal.jobs.logs.regression_systems import split
 from flexcal.progress import silent
 
@@ -62,8 +62,8 @@ def systems(logs: list[Path], observation: Observation, scratch: Path, jobs: int
     for log in read_logs(logs, observation.model, treatment, scratch, jobs=jobs):
         early, late = split(log, treatment, 0.3)
         assert late is not None
-        parts += [LogPart(log, early), LogPart(log, late)]
-    return log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
+        parts += [LogSegment(log, early), LogSegment(log, late)]
+    return assemble_log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
 
 
 def check_equal(found: list[ExperimentSystem], expected: list[ExperimentSystem]) -> None:
@@ -162,7 +162,7 @@ def test_a_joint_that_never_moves(swing: Motion, observation: Observation, tmp_p
     motion = Motion.joined(log.blocks())
     assert not motion.dq[:, 1].any() and not motion.ddq[:, 1].any()
     assert np.ptp(motion.q[:, 1]) == 0 and abs(motion.q[0, 1] - 0.4) < 1e-5
-    noisy = Motion.joined(NoisyLog(log, observation.model, np.full(6, 1e-4), 1).blocks())
+    noisy = Motion.joined(PerturbedLog(log, observation.model, np.full(6, 1e-4), 1).blocks())
     assert not noisy.dq[:, 1].any() and np.ptp(noisy.q[:, 1]) == 0
     data = observe(observation, BaseParameters.of(observation), [log], Decimation(2))
     assert data.silent == ("joint_2.rotor_inertia", "joint_2.viscous", "joint_2.coulomb")

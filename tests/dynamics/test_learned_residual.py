@@ -13,7 +13,7 @@ from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
 from flexcal.dynamics.regression import RegressionData, experiment_system
 from flexcal.dynamics.residual import (
-    BlockErrors,
+    CrossValidatedErrors,
     GaussianProcess,
     LearnedResidual,
     learn_residual,
@@ -59,7 +59,7 @@ def with_extra(motion: Motion) -> Motion:
 
 def learned(
     arm: Observation, motion: Motion, truth: np.ndarray | None = None
-) -> tuple[LearnedResidual, BlockErrors, Estimate]:
+) -> tuple[LearnedResidual, CrossValidatedErrors, Estimate]:
     """From all rows of a motion, after weighted least squares, or with the true parameters (p,)."""
     base = BaseParameters.of(arm)
     systems = [experiment_system(arm, motion, Decimation(1), Window(), mask_standstill=True)]

@@ -11,7 +11,7 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.diagnostics import essential_parameters
 from flexcal.dynamics.estimators import ordinary_least_squares, weighted_least_squares
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import RegressionData, Triangle, observe
+from flexcal.dynamics.regression import RegressionData, TriangularFactor, observe
 from flexcal.dynamics.regression import blocks as rows
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.errors import FlexcalError
@@ -165,7 +165,7 @@ def test_a_triangle_is_its_system(rng: np.random.Generator) -> None:
     """Residual, noise and rank as a dense solution gives them; two triangles added are the two systems stacked."""
     w, y = rng.normal(size=(50, 4)), rng.normal(size=50)
     w[:, 3] = w[:, 0] - 2 * w[:, 1]
-    triangle = Triangle.of(w[:30], y[:30]) + Triangle.of(w[30:], y[30:])
+    triangle = TriangularFactor.of(w[:30], y[:30]) + TriangularFactor.of(w[30:], y[30:])
     x = np.array([1.0, -2.0, 0.5, 3.0])
     assert triangle.residual(x) == pytest.approx(np.linalg.norm(y - w @ x), rel=1e-13)
     left = y - w @ np.linalg.lstsq(w, y, rcond=None)[0]
@@ -183,9 +183,9 @@ def test_triangles_solve_as_extended_precision_does(rng: np.random.Generator) ->
     )
     w = left * np.logspace(0, -6, size) @ right
     y = w @ rng.normal(size=size) + 1e-9 * rng.normal(size=rows)
-    triangle = Triangle.of(w[:50], y[:50])
+    triangle = TriangularFactor.of(w[:50], y[:50])
     for start in range(50, rows, 50):
-        triangle = triangle + Triangle.of(w[start : start + 50], y[start : start + 50])
+        triangle = triangle + TriangularFactor.of(w[start : start + 50], y[start : start + 50])
     found = np.linalg.solve(triangle.matrix[:size], triangle.right[:size])
     table = np.column_stack([w, y]).astype(np.longdouble)
     for k in range(size):

@@ -15,8 +15,13 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
 from flexcal.dynamics.payload import PayloadEquations, PayloadFit, RobotPrior, identify_payload
-from flexcal.dynamics.payload.equations import in_link
-from flexcal.dynamics.payload.rigid_body import nearest_body, of_body, of_frame, told_moments
+from flexcal.dynamics.payload.equations import payload_to_link_frame
+from flexcal.dynamics.payload.rigid_body import (
+    identified_moments,
+    link_frame_from_payload,
+    nearest_body,
+    payload_from_link_frame,
+)
 from flexcal.dynamics.regression import observe
 from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
@@ -45,7 +50,7 @@ def loaded(arm: Observation, truth: np.ndarray) -> np.ndarray:
     held = arm.model.payload
     assert held is not None
     values = truth.copy()
-    values[LAST] += in_link(held) @ of_frame(BODY)
+    values[LAST] += payload_to_link_frame(held) @ link_frame_from_payload(BODY)
     return values
 
 
@@ -119,7 +124,9 @@ def test_the_columns_are_those_of_pinocchio(tx40: RobotModel, motion: Motion) ->
     model = held_by(tx40)
     assert model.payload is not None
     held = replace(model.payload, rotation=turn, translation=np.array([0.05, -0.02, 0.1]))
-    columns = torque_regressor(tx40, motion.q, motion.dq, motion.ddq)[:, :, LAST] @ in_link(held)
+    columns = torque_regressor(tx40, motion.q, motion.dq, motion.ddq)[:, :, LAST] @ payload_to_link_frame(
+        held
+    )
     engine = pin.buildModelFromUrdf(str(tx40.urdf))
     heavier = engine.copy()
     body = pin.Inertia(BODY[0], BODY[1:4], moments_matrix(BODY[4:]))
@@ -129,7 +136,7 @@ def test_the_columns_are_those_of_pinocchio(tx40: RobotModel, motion: Motion) ->
     for k in range(len(motion)):
         state = motion.q[k], motion.dq[k], motion.ddq[k]
         expected = pin.rnea(heavier, data[1], *state) - pin.rnea(engine, data[0], *state)
-        np.testing.assert_allclose(columns[k] @ of_frame(BODY), expected, atol=1e-10)
+        np.testing.assert_allclose(columns[k] @ link_frame_from_payload(BODY), expected, atol=1e-10)
 
 
 def moments_matrix(moments: np.ndarray) -> np.ndarray:
@@ -215,7 +222,7 @@ def test_intervals_cover(tmp_path: Path) -> None:
 
 def test_ten_numbers_become_a_body(rng: np.random.Generator) -> None:
     """The nearest one in the norm of the covariance; numbers that are a body's stay."""
-    inside = of_frame(BODY)
+    inside = link_frame_from_payload(BODY)
     root = np.diag(rng.uniform(0.5, 2.0, 10))
     assert nearest_body(inside, root, np.zeros((10, 0))).rise == 0.0
     outside = inside.copy()
@@ -230,14 +237,14 @@ def test_ten_numbers_become_a_body(rng: np.random.Generator) -> None:
 
 
 def test_body_and_frame_are_each_others_reverse() -> None:
-    np.testing.assert_allclose(of_body(of_frame(BODY)), BODY, atol=1e-15)
+    np.testing.assert_allclose(payload_from_link_frame(link_frame_from_payload(BODY)), BODY, atol=1e-15)
 
 
 def test_moments_are_told_together() -> None:
     narrow = np.full(6, 1e-3)
-    assert told_moments(BODY, narrow).all()
+    assert identified_moments(BODY, narrow).all()
     wide = narrow.copy()
     wide[1] = 0.03
-    assert list(told_moments(BODY, wide)) == [True, False, True, True, True, True]
+    assert list(identified_moments(BODY, wide)) == [True, False, True, True, True, True]
     wide[0] = 0.05
-    assert not told_moments(BODY, wide).any()
+    assert not identified_moments(BODY, wide).any()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexcal.dynamics.inertials.bayesian_fit import noise
-from flexcal.dynamics.inertials.linearised_equations import TrajectoryRows
+from flexcal.dynamics.inertials.linearised_equations import LinearisedEquations
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Parameter, Parameters
 
@@ -27,7 +27,7 @@ def level(residual: np.ndarray) -> np.ndarray:
     estimate = Estimate(parameters, covariance, 1, (), (True,), 0.0, 0.0, 1, "converged", "", 1)
     jacobian = np.zeros((*residual.shape, 1))
     jacobian[:, 0, :, 0] = 1.0
-    rows = TrajectoryRows(parameters, np.ones_like(residual), residual, jacobian)
+    rows = LinearisedEquations(parameters, np.ones_like(residual), residual, jacobian)
     return noise(rows, estimate, np.ones(residual.shape[1:]))
 
 
@@ -56,6 +56,6 @@ def test_levels_follow_the_spectrum() -> None:
 def test_too_few_lines_are_said() -> None:
     parameters = Parameters([Parameter("offset", "N m", 0.0)])
     estimate = Estimate(parameters, np.eye(1), 1, (), (True,), 0.0, 0.0, 1, "converged", "", 1)
-    rows = TrajectoryRows(parameters, np.ones((1, 3, 1)), np.ones((1, 3, 1)), np.ones((1, 3, 1, 1)))
+    rows = LinearisedEquations(parameters, np.ones((1, 3, 1)), np.ones((1, 3, 1)), np.ones((1, 3, 1, 1)))
     with pytest.raises(FlexcalError, match="too few lines"):
         noise(rows, estimate, np.ones((3, 1)))

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from flexcal.data.recordings import Decimation
-from flexcal.dynamics.drives import attenuation
+from flexcal.dynamics.drives import stiffness_attenuation
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import (
     BaseParameters,
     Coulomb,
+    DriveBacklash,
     DriveSpring,
     Observation,
-    Play,
     RotorInertia,
     Viscous,
 )
@@ -99,7 +99,7 @@ def test_the_equations_are_those_of_the_thesis(observation: Observation, swing: 
 def test_noise_on_the_arm_side_lowers_the_stiffness_by_what_is_said(
     observation: Observation, swing: Motion
 ) -> None:
-    """Forty recordings whose only error is the arm's encoder: the mean stiffness is low by the share that `attenuation` names."""
+    """Forty recordings whose only error is the arm's encoder: the mean stiffness is low by the share that `stiffness_attenuation` names."""
     rng = np.random.default_rng(5)
     low, said = [], []
     for _ in range(40):
@@ -108,7 +108,7 @@ def test_noise_on_the_arm_side_lowers_the_stiffness_by_what_is_said(
         data = equations(observation, replace(swing, arm=noisy))
         found = weighted_least_squares(data)
         low.append(1 - found.values["hinge.drive.stiffness"] / K)
-        said.append(attenuation(data, found)["hinge.drive.stiffness"])
+        said.append(stiffness_attenuation(data, found)["hinge.drive.stiffness"])
     error = np.std(low) / np.sqrt(len(low))
     assert np.mean(low) > 10 * error, (np.mean(low), error)
     assert np.mean(said) == pytest.approx(np.mean(low), abs=3 * error + 0.1 * np.mean(low))
@@ -117,12 +117,14 @@ def test_noise_on_the_arm_side_lowers_the_stiffness_by_what_is_said(
 def test_a_gap_seen_from_one_side_is_told_from_nothing(observation: Observation, swing: Motion) -> None:
     """The offset takes it up by name, the stiffness loses nothing, and no gap is assumed for a next pass."""
     (spring,) = observation.springs
-    onesided = replace(observation, springs=(replace(spring, play=Play(-1.0, 0.0)),))
+    onesided = replace(observation, springs=(replace(spring, play=DriveBacklash(-1.0, 0.0)),))
     found = weighted_least_squares(equations(onesided, swing))
     (hidden,) = (entry for entry in found.dropped if entry.name == "hinge.drive.gap_torque")
     assert hidden.absorbed_by == (("hinge.drive.torque_offset", pytest.approx(1.0)),)
     assert found.values["hinge.drive.stiffness"] == pytest.approx(K, rel=1e-8)
-    assert spring.with_play(observation.model, found.values).play == Play(pytest.approx(OFFSET / K), 0.0)
+    assert spring.with_backlash(observation.model, found.values).play == DriveBacklash(
+        pytest.approx(OFFSET / K), 0.0
+    )
 
 
 def test_a_motion_without_arm_side_is_refused(observation: Observation, swing: Motion) -> None:

@@ -10,9 +10,9 @@ from recovery import NOISE, covered, driven, errors, recorded
 from flexcal.data.recordings import Decimation, Recording, write_recording
 from flexcal.dynamics.estimators import (
     Unknowns,
-    column_errors,
     noise_levels,
-    noisy_logs,
+    perturbed_logs,
+    regressor_errors,
     total_least_squares,
     weighted_least_squares,
     weighted_system,
@@ -44,7 +44,7 @@ def fitted(
     """Total and plain."""
     data = observe(observation, base, [motion], Decimation(1))
     return total_least_squares(
-        data, column_errors(recorded(observation, base, motion), [noisy])
+        data, regressor_errors(recorded(observation, base, motion), [noisy])
     ), weighted_least_squares(data)
 
 
@@ -109,7 +109,7 @@ def unwhitened(data: RegressionData) -> Estimate:
 def test_signs_and_constants_are_exact(
     observation: Observation, base: BaseParameters, clean: Motion, rng: np.random.Generator
 ) -> None:
-    wrong = column_errors(recorded(observation, base, clean), [spoilt(clean, rng)])
+    wrong = regressor_errors(recorded(observation, base, clean), [spoilt(clean, rng)])
     for s in wrong.subsystems:
         size = np.linalg.norm(s.triangle.matrix, axis=0)
         names = [observation.names[m] for m in s.members]
@@ -129,11 +129,11 @@ def test_the_noise_of_a_log_is_read_from_it(
     write_recording(path, Recording(1 / 200, swing.q + std * rng.normal(size=swing.q.shape), torque))
     log = JointLog.read(path, observation.model, 10.0, tmp_path)
     np.testing.assert_allclose(position_noise(log, observation.model), std, rtol=0.1)
-    (noisy,) = noisy_logs(recorded(observation, base, log))
+    (noisy,) = perturbed_logs(recorded(observation, base, log))
     added = Motion.joined(noisy.blocks()).q - Motion.joined(log.blocks()).q
     again = Motion.joined(noisy.blocks()).q - Motion.joined(log.blocks()).q
     np.testing.assert_array_equal(added, again)
     passed = np.std(added, axis=0) / std  # a low-pass at 10 of 100 Hz leaves about a tenth of the power
     assert np.all((passed > 0.2) & (passed < 0.4))
     with pytest.raises(FlexcalError, match="positions as they were logged"):
-        noisy_logs(recorded(observation, base, swing))
+        perturbed_logs(recorded(observation, base, swing))

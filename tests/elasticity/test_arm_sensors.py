@@ -13,10 +13,10 @@ from flexcal.elasticity.identification.fit import ResponseData, fit_responses
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
     ResponseModel,
-    StageOneResidual,
+    ResponseResidual,
     Tolerances,
     check_sensors,
-    stage_one_parameters,
+    stiffness_parameters,
 )
 from flexcal.elasticity.time_periodic import ReferenceMotion, reference_shift
 from flexcal.errors import FlexcalError, InputError
@@ -202,9 +202,9 @@ def test_readings_along_a_very_slow_motion_average_the_frozen_ones(sensing: Robo
 def test_jacobian_is_that_of_finite_differences(sensing: RobotModel, poses, drawn, sensed, rng) -> None:
     truth = drawn(sensing, rng, inertias=True)
     responses = sensed(truth, poses["default"][:2], ("hand", "beam", "probe"), 0.1, rng, step=48)
-    parameters = stage_one_parameters(sensing, responses)
+    parameters = stiffness_parameters(sensing, responses)
     model = ResponseModel.of(sensing, responses, parameters)
-    residual = StageOneResidual.of(model, responses, CovarianceWeighting())
+    residual = ResponseResidual.of(model, responses, CovarianceWeighting())
     unit = np.array([{"s": 1e-3, "m": 0.1}.get(unit, 1.0) for unit in parameters.units])
     x = parameters.coordinates() + 0.05 * unit * rng.standard_normal(len(parameters))
     rows, jacobian = residual.linearise(x)
@@ -327,7 +327,7 @@ def test_estimates_with_sensors_are_read_by_other_verbs(
     sensing: RobotModel, poses, sensed, tmp_path: Path
 ) -> None:
     responses = sensed(sensing, poses["default"][:1], ("hand", "beam"), 0.01)
-    parameters = stage_one_parameters(sensing, responses)
+    parameters = stiffness_parameters(sensing, responses)
     count = len(parameters)
     estimate = Estimate(
         parameters, 1e-4 * np.eye(count), count, (), (True,) * count, 0.0, 0.0, 1, "converged", "", 1
@@ -341,7 +341,7 @@ def test_a_sensor_that_is_not_declared_is_refused(
 ) -> None:
     responses = sensed(sensing, poses["default"][:1], ("hand",), 0.01)
     with pytest.raises(FlexcalError, match=r"sensor hand, which .* does not declare"):
-        stage_one_parameters(tx90l, responses)
+        stiffness_parameters(tx90l, responses)
 
 
 def test_a_direction_of_zeros_is_refused(sensing: RobotModel, tmp_path: Path) -> None:

@@ -11,9 +11,9 @@ from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.identification import MultiStart, PopulationSearch, identify_stiffness
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
-    PaperWeighting,
+    ResonanceWeighting,
     ResponseModel,
-    StageOneResidual,
+    ResponseResidual,
     Tolerances,
     UniformWeighting,
 )
@@ -155,7 +155,7 @@ def test_reference_motion_is_part_of_the_model(stiff, poses, synthesise, rng):
     assert abs(fits[1].values[name] - stiff.value(name)) > 3 * std
 
 
-@pytest.mark.parametrize("weighting", [UniformWeighting(), PaperWeighting()])
+@pytest.mark.parametrize("weighting", [UniformWeighting(), ResonanceWeighting()])
 def test_other_weightings_find_the_springs_too(stiff, poses, synthesise, drawn, rng, weighting):
     truth = drawn(stiff, rng, inertias=False)
     responses = synthesise(truth, poses["default"][:3], noise=1e-3, rng=rng, step=8)
@@ -190,7 +190,7 @@ def squared_errors(model, poses, synthesise, drawn, seeds, *, inertias):
 
 def cramer_rao(model, truth, responses, parameters):
     """Standard deviations (p,) that the information at the truth and the priors allow."""
-    residual = StageOneResidual.of(
+    residual = ResponseResidual.of(
         ResponseModel.of(model, responses, parameters), responses, CovarianceWeighting()
     )
     values = {name: truth.values[name] for name in parameters.names if name in truth.values}

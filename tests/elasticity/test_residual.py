@@ -9,24 +9,24 @@ import pytest
 
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
-    PaperWeighting,
+    ResonanceWeighting,
     ResponseModel,
-    StageOneResidual,
+    ResponseResidual,
     UniformWeighting,
-    stage_one_parameters,
+    stiffness_parameters,
 )
 from flexcal.elasticity.response_model.residual import PoseResidual
 from flexcal.elasticity.response_model.weighting import extrema
 from flexcal.errors import FlexcalError
 
 
-@pytest.mark.parametrize("weighting", [CovarianceWeighting(), UniformWeighting(), PaperWeighting()])
+@pytest.mark.parametrize("weighting", [CovarianceWeighting(), UniformWeighting(), ResonanceWeighting()])
 def test_jacobian_is_that_of_finite_differences(tx90l, poses, synthesise, drawn, weighting, rng):
     responses = synthesise(
         drawn(tx90l, rng, inertias=True), poses["default"][:2], noise=0.1, rng=rng, step=24
     )
-    parameters = stage_one_parameters(tx90l, responses)
-    residual = StageOneResidual.of(ResponseModel.of(tx90l, responses, parameters), responses, weighting)
+    parameters = stiffness_parameters(tx90l, responses)
+    residual = ResponseResidual.of(ResponseModel.of(tx90l, responses, parameters), responses, weighting)
     assert not residual.poses[0].logarithmic.all()
     assert residual.poses[0].logarithmic.any()
     unit = np.array([{"s": 1e-3, "m": 0.1}.get(unit, 1.0) for unit in parameters.units])
@@ -88,7 +88,7 @@ def test_phase_wraps_do_not_matter(tx90l, poses, synthesise):
 
 def test_paper_weighting_stresses_poles_and_zeros(tx90l, poses, synthesise):
     response = synthesise(tx90l, poses["default"][:1], noise=1e-2, step=1)[0]
-    factor = PaperWeighting().factor(response, response.covariance)
+    factor = ResonanceWeighting().factor(response, response.covariance)
     weight = factor[:, 0, 0] / factor[:, 0, 0].min()
     assert weight.max() == pytest.approx(3.0, rel=1e-3)
     curve = np.log(np.abs(response.response[:, 0, 0]))
@@ -105,6 +105,6 @@ def test_extrema_alternate_and_ignore_ripple():
 def test_unfit_responses_are_refused(tx90l, ur5, poses, synthesise):
     responses = synthesise(tx90l, poses["default"][:1], noise=1e-2, step=40)
     with pytest.raises(FlexcalError, match="no elastic joint"):
-        stage_one_parameters(ur5, responses)
+        stiffness_parameters(ur5, responses)
     with pytest.raises(FlexcalError, match="no frequency response"):
-        stage_one_parameters(tx90l, [])
+        stiffness_parameters(tx90l, [])

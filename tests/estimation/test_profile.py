@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.elasticity.identification.profile_std import profile_stretch
-from flexcal.estimation import Parameter, Parameters, Problem, profile_rise, solve
+from flexcal.elasticity.identification.profile_std import profile_std_ratio
+from flexcal.estimation import Parameter, Parameters, Problem, profile_cost_increase, solve
 
 TRUE = 2e5
 
@@ -20,7 +20,7 @@ def test_rise_of_a_linear_problem(rng):
     x = fitted.parameters.coordinates()
     x[1] += 0.7
     variance = np.linalg.inv(design.T @ design + np.eye(3) / 4)[1, 1]
-    assert profile_rise(problem, fitted, x, [1]) == pytest.approx(0.5 * 0.7**2 / variance, rel=1e-9)
+    assert profile_cost_increase(problem, fitted, x, [1]) == pytest.approx(0.5 * 0.7**2 / variance, rel=1e-9)
 
 
 def stiffness_problem(residual):
@@ -43,7 +43,7 @@ def stiffness_problem(residual):
 def test_response_linear_in_the_compliance_is_not_widened():
     std = 0.2
     problem = stiffness_problem(lambda k: ((1 / k - 1) / std, -1 / (k**2 * std)))
-    np.testing.assert_allclose(profile_stretch(problem, solve(problem)), 1.0, rtol=1e-6)
+    np.testing.assert_allclose(profile_std_ratio(problem, solve(problem)), 1.0, rtol=1e-6)
 
 
 @pytest.mark.parametrize("depth", [0.5, 1.0, 2.0])
@@ -62,4 +62,4 @@ def test_a_narrow_shallow_dip_is_widened(depth):
     at_twice = residual(2.0)[0] ** 2 / (1 + 0.3**2)
     expected = max(1.0, 0.5 / (curved * np.sqrt(at_twice)))
     assert expected > 1.3
-    np.testing.assert_allclose(profile_stretch(problem, fitted), [expected, 1.0], rtol=1e-5)
+    np.testing.assert_allclose(profile_std_ratio(problem, fitted), [expected, 1.0], rtol=1e-5)

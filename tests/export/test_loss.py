@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.export import measure_loss, render_mjcf, render_sdf, render_urdf, write_urdf
+from flexcal.export import measure_export_error, render_mjcf, render_sdf, render_urdf, write_urdf
 from flexcal.export.mjcf_file import mjcf_tool
 from flexcal.export.representation_error import AT_REST, random_poses
 from flexcal.export.sdf import sdf_tool
@@ -24,7 +24,9 @@ def test_backlash_of_one_joint_is_its_lever_times_the_gap(tx90l: RobotModel) -> 
     gap = 1e-4
     rigid = replace(tx90l, bearing_frames={})
     model = rigid.with_values({"joint_2.backlash": gap})
-    loss = measure_loss(model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST)
+    loss = measure_export_error(
+        model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST
+    )
     q, within = random_poses(model, None, np.random.default_rng(0))
     tool = point_kinematics(model, q)
     lever = np.linalg.norm(tool.geometry_jacobian[:, :3, 6], axis=1)
@@ -56,7 +58,9 @@ def test_a_transmission_error_is_its_lever_times_the_wave(tx90l: RobotModel) -> 
     wave = 1e-4
     rigid = replace(tx90l, bearing_frames={})
     model = rigid.with_values({"joint_3.transmission_2_sin": wave, "joint_1.length_x": 1e-3})
-    loss = measure_loss(model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST)
+    loss = measure_export_error(
+        model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST
+    )
     q, _ = random_poses(model, None, np.random.default_rng(0))
     lever = np.linalg.norm(point_kinematics(model, q).geometry_jacobian[:, :3, 12], axis=1)
     expected = wave * np.abs(np.sin(2 * q[:, 2])) * lever
@@ -67,7 +71,9 @@ def test_a_transmission_error_is_its_lever_times_the_wave(tx90l: RobotModel) -> 
 def test_lateral_compliance_is_named_with_what_it_costs(tx90l: RobotModel) -> None:
     rigid = replace(tx90l, bearing_frames={})
     model = rigid.with_values({"joint_1.gravity_compliance_1": 1e-6, "joint_1.gravity_compliance_2": 1e-6})
-    loss = measure_loss(model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST)
+    loss = measure_export_error(
+        model, lambda q: point_kinematics(model, q, jacobians=False).position, AT_REST
+    )
     q, _ = random_poses(model, None, np.random.default_rng(0))
     jacobian = point_kinematics(model, q).geometry_jacobian[:, :3, 1:3]
     moved = np.matmul(jacobian, 1e-6 * gravity_moments(model, q)[:, 0, :, None])[:, :, 0]
@@ -86,6 +92,6 @@ def test_the_file_is_what_is_measured(tx90l: RobotModel, form: str) -> None:
     }[form]
     text = render(rigid).text
     assert "0.478" in text
-    loss = measure_loss(rigid, read(rigid, text.replace("0.478", "0.479", 1)), ())
+    loss = measure_export_error(rigid, read(rigid, text.replace("0.478", "0.479", 1)), ())
     assert loss.error is not None and loss.terms == ()
     assert loss.error.mean == pytest.approx(1e-3) and loss.error.max == pytest.approx(1e-3)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from flexcal.estimation import Parameter, Parameters
-from flexcal.export import measure_loss, render_offsets
+from flexcal.export import measure_export_error, render_offsets
 from flexcal.export.offset_fit import fit_offsets
 from flexcal.export.offset_table import offsets_of
 from flexcal.export.representation_error import random_poses, tool_positions
@@ -62,7 +62,7 @@ def test_base_and_tool_help(tx90l: RobotModel, erroneous) -> None:
     errors = []
     for keep in (True, False):
         rendered = render_offsets(model, tx90l, keep_frames=keep)
-        loss = measure_loss(model, rendered.tool, rendered.cannot_carry, absorb=rendered.absorb)
+        loss = measure_export_error(model, rendered.tool, rendered.unrepresented, absorb=rendered.absorb)
         assert loss.error is not None and [t.name for t in loss.terms] == [
             "axis misalignments and lengths",
             "elastic deflection",

@@ -18,7 +18,7 @@ from flexcal.data.tables import open_table
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml, read_yaml_file
 from flexcal.files.formats.estimates_file import StoredEstimates
-from flexcal.files.structuring import MisfitError, structure
+from flexcal.files.structuring import StructureError, structure
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.importing.readers import read_foreign
 from flexcal.jobs.result_files import read_results
@@ -115,7 +115,7 @@ def ends_well(read, *arguments) -> None:
 def test_any_data(cls: type, data: object) -> None:
     try:
         structure(data, cls)
-    except MisfitError as problem:
+    except StructureError as problem:
         assert problem.failures
 
 

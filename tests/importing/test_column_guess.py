@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.importing.columns import guess_columns, reasons_of
+from flexcal.importing.columns import guess_columns, reasons_unused
 from flexcal.importing.tables import parse_name
 from flexcal.model.robot import RobotModel
 
@@ -82,7 +82,7 @@ def test_headers_that_people_use(ur5, made, rng, header, expected) -> None:
 )
 def test_what_is_left_out_says_why(ur5, made, rng, header, words) -> None:
     guess = guess_columns(made({name: rng.uniform(-2, 2, 30) for name in header}), ur5)
-    assert any(words in reason for reason in reasons_of(guess.left_out))
+    assert any(words in reason for reason in reasons_unused(guess.left_out))
 
 
 def test_units_by_magnitude_and_by_name(ur5, made, rng) -> None:

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.importing.columns import PlacedColumns, check_nominal
+from flexcal.importing.columns import ColumnAssignment, check_nominal
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import rpy_rotation
 
-PLACED = PlacedColumns.plain("q", tuple(f"J{i}" for i in range(1, 7)), ("deg",) * 6, "")
+PLACED = ColumnAssignment.plain("q", tuple(f"J{i}" for i in range(1, 7)), ("deg",) * 6, "")
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import pytest
 
-from flexcal.importing.columns import guess_columns, reasons_of
+from flexcal.importing.columns import guess_columns, reasons_unused
 
 VECTORS = [
     "target_q",
@@ -56,7 +56,7 @@ def test_a_log(ur5, made, rng: np.random.Generator) -> None:
         "t": ("timestamp", "s"), "q": ("actual_q_0", "rad"), "dq": ("actual_qd_0", "rad/s")
     }  # fmt: skip
     assert all("Universal Robots" in placed.why for placed in guess.placed.values())
-    reasons = reasons_of(guess.left_out)
+    reasons = reasons_unused(guess.left_out)
     for columns, words in [
         ("actual_current_0 … actual_current_5", "--map 'tau1=GAIN*actual_current_0[A]'"),
         ("target_moment_0 … target_moment_5", "computed by the controller's model, not measured"),
@@ -81,7 +81,7 @@ def test_poses_one_by_one(ur5, made, rng: np.random.Generator) -> None:
     assert "not measured" in guess.placed["xyz"].why
     tracked = guess_columns(made({**columns, **{f"{a} [mm]": rng.uniform(0, 900, 40) for a in "XYZ"}}), ur5)
     assert first_columns(tracked)["xyz"] == ("X [mm]", "mm")
-    assert any("X [mm] … are taken as xyz" in reason for reason in reasons_of(tracked.left_out))
+    assert any("X [mm] … are taken as xyz" in reason for reason in reasons_unused(tracked.left_out))
 
 
 def test_degrees_and_seven_joints(ur5, made, rng: np.random.Generator) -> None:

@@ -11,13 +11,13 @@ import pytest
 from two_links import GAINS, swings, two_links
 
 from flexcal.data.recordings import Decimation
-from flexcal.dynamics.diagnostics import WeightShare, weight_shares
+from flexcal.dynamics.diagnostics import GravityRatio, weight_shares
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.friction.terms import Cables
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
 from flexcal.dynamics.regression import observe
 from flexcal.dynamics.signals import Motion
-from flexcal.jobs.dynamics.remarks import undeclared_springs
+from flexcal.jobs.dynamics.remarks import undeclared_spring_remarks
 from flexcal.report.checks import check_weight_shares
 
 
@@ -41,7 +41,7 @@ def fitted(arm: Observation, motion: Motion) -> tuple:
     return data, weighted_least_squares(data)
 
 
-def shares(arm: Observation, motion: Motion) -> dict[str, WeightShare]:
+def shares(arm: Observation, motion: Motion) -> dict[str, GravityRatio]:
     return weight_shares(*fitted(arm, motion))
 
 
@@ -61,7 +61,7 @@ def test_the_weight_that_something_else_carries_is_named(tmp_path: Path) -> None
 
 
 def springs(arm: Observation, motion: Motion) -> Sequence[str]:
-    return list(undeclared_springs(*fitted(arm, motion)))
+    return list(undeclared_spring_remarks(*fitted(arm, motion)))
 
 
 def test_a_spring_that_is_not_declared_is_named(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from flexcal.model.robot import RobotModel
-from flexcal.model.statics import static_equilibrium, tangent_ratio, twist_by_hardening, twist_of
+from flexcal.model.statics import static_equilibrium, tangent_ratio, twist_by_hardening, twist_from_torque
 from flexcal.model.vibration import linearise
 
 POSE = np.array([0.4, 1.0, -0.3, 0.7, -0.5, 0.2])
@@ -25,14 +25,14 @@ def hard(tx90l: RobotModel) -> RobotModel:
 @pytest.mark.parametrize("torque", [-400.0, -3.0, 0.0, 250.0])
 def test_a_twist_carries_its_torque(torque: float, hardening: float) -> None:
     stiffness = 2e5
-    found = float(twist_of(np.array([torque]), np.array([stiffness]), np.array([hardening]))[0])
+    found = float(twist_from_torque(np.array([torque]), np.array([stiffness]), np.array([hardening]))[0])
     expected = brentq(lambda x: stiffness * (x + hardening * 1e6 * x**3) - torque, -0.01, 0.01, xtol=1e-16)
     assert found == pytest.approx(expected, abs=1e-14)
 
 
 def test_the_twist_falls_with_the_hardening() -> None:
-    at = [twist_of(np.array([250.0]), np.array([2e5]), np.array([a])) for a in (0.299, 0.301)]
-    middle = twist_of(np.array([250.0]), np.array([2e5]), np.array([0.3]))
+    at = [twist_from_torque(np.array([250.0]), np.array([2e5]), np.array([a])) for a in (0.299, 0.301)]
+    middle = twist_from_torque(np.array([250.0]), np.array([2e5]), np.array([0.3]))
     assert (at[1] - at[0]) / 2e-3 == pytest.approx(twist_by_hardening(middle, np.array([0.3])), rel=1e-4)
 
 

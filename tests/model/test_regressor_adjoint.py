@@ -54,7 +54,9 @@ def test_with_inertials_for_weights_it_is_pinocchios(robot: RobotModel, rng: np.
 
 
 def test_it_is_the_derivative_of_the_regressor(robot: RobotModel, rng: np.random.Generator) -> None:
-    """By differences that are exact: W is a trigonometric polynomial of an angle, a quadratic one of a slide and of q̇, and linear in q̈."""
+    """By differences that are exact: W is a trigonometric polynomial of an angle, a quadratic one of a slide and of q̇, and linear in
+    q̈.
+    """
     robot = bent(robot, rng)
     motion = rng.normal(size=(3, 5, robot.n))
     weights = rng.normal(size=(5, robot.n, 10 * robot.n))

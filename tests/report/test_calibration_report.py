@@ -12,7 +12,7 @@ import pytest
 from outline import Outline
 from scipy.spatial.transform import Rotation
 
-from flexcal.calibration.term_selection import ConsideredTerm, considered_document
+from flexcal.calibration.term_selection import TermComparison, considered_document
 from flexcal.calibration.verification import CALIBRATED
 from flexcal.errors import InputError
 from flexcal.jobs.accuracy import verify_robot
@@ -49,10 +49,10 @@ def fit(folder: Path) -> RobotCalibration:
 def study(fit: RobotCalibration, folder: Path) -> CalibrationStudy:
     final, nan = fit.selected.terms, float("nan")
     rows = [
-        ConsideredTerm(None, ("kinematic",), 1.1e-4, 1.2e-4, 1e-4, 3e-4, 0.0, True, ""),
-        ConsideredTerm("gravity_compliance", final, 1e-4, 1.05e-4, 9e-5, 3e-4, -50.0, True, "it gains"),
-        ConsideredTerm("transmission_1", (*final, "transmission_1"), 1e-4, 1.06e-4, 9e-5, 3e-4, 3.0, False, "it does not gain"),
-        ConsideredTerm("backlash", (*final, "backlash"), nan, nan, nan, nan, nan, False, "one flank only"),
+        TermComparison(None, ("kinematic",), 1.1e-4, 1.2e-4, 1e-4, 3e-4, 0.0, True, ""),
+        TermComparison("gravity_compliance", final, 1e-4, 1.05e-4, 9e-5, 3e-4, -50.0, True, "it gains"),
+        TermComparison("transmission_1", (*final, "transmission_1"), 1e-4, 1.06e-4, 9e-5, 3e-4, 3.0, False, "it does not gain"),
+        TermComparison("backlash", (*final, "backlash"), nan, nan, nan, nan, nan, False, "one flank only"),
     ]  # fmt: skip
     stored = calibration_study(folder / "fit")
     tried = [considered_document(row) for row in rows]

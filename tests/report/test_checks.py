@@ -72,12 +72,12 @@ def test_the_ratio_decides_with_its_interval(
 def test_the_error_budget_is_judged(study: TwoStageStudy) -> None:
     good = {"instrument_mm": 0.02, "robot_mm": 0.03, "model_mm": 0.01, "stated_mm": 0.02}
 
-    def judged(changes: dict[str, float | None], *, hardly_fits: bool = False) -> str:
-        return check_error_budget(study.geometry, good | changes, hardly_fits=hardly_fits).status
+    def judged(changes: dict[str, float | None], *, is_implausible: bool = False) -> str:
+        return check_error_budget(study.geometry, good | changes, is_implausible=is_implausible).status
 
     assert judged({}) == "good" and judged({"instrument_mm": None, "stated_mm": None}) == "good"
     assert judged({"model_mm": 0.05}) == "care" and judged({"stated_mm": 0.2}) == "care"
-    assert judged({}, hardly_fits=True) == "bad"
+    assert judged({}, is_implausible=True) == "bad"
 
 
 def test_few_or_much_worse_fresh_poses_are_flagged(study: TwoStageStudy) -> None:

@@ -14,10 +14,12 @@ from flexcal.cli.main import main
 from flexcal.jobs.pages import customer_report
 from flexcal.jobs.result_files import read_results
 from flexcal.report.pages.customer import uncertainty_rows
-from flexcal.report.results import Particulars
+from flexcal.report.results import MeasurementDetails
 
 CHROMIUM = next((p for p in map(shutil.which, ("chromium", "chromium-browser", "google-chrome")) if p), None)
-GIVEN = Particulars(robot_serial="R-17", instrument="tracker T", instrument_serial="T-9", operator="A. Meier")
+GIVEN = MeasurementDetails(
+    robot_serial="R-17", instrument="tracker T", instrument_serial="T-9", operator="A. Meier"
+)
 
 
 @pytest.fixture(scope="module")

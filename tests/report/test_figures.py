@@ -10,7 +10,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from flexcal.calibration.verification.arm_poses import skeletons
+from flexcal.calibration.verification.arm_poses import joint_polylines
 from flexcal.model.kinematics import joint_origins
 from flexcal.model.robot import RobotModel
 from flexcal.report.figures import (
@@ -34,7 +34,7 @@ def test_skeletons_go_through_the_joints(tx90l: RobotModel, study: TwoStageStudy
     poses = study.points.poses
     lengths = {f"{joint}.length_{k}": 0.01 for joint in tx90l.joint_names for k in "xyz"}
     robot = tx90l.with_values({name: 0.0 for name in lengths})
-    corners = skeletons(robot, poses)
+    corners = joint_polylines(robot, poses)
     np.testing.assert_allclose(corners, joint_origins(robot, poses.q), atol=1e-12)
 
 

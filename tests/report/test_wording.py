@@ -9,7 +9,7 @@ import pytest
 from flexcal.report.layout import (
     NOTHING,
     Check,
-    Rung,
+    ErrorRange,
     Table,
     millimetres,
     percent,
@@ -48,9 +48,9 @@ def test_percent_and_ratio() -> None:
 
 def test_ladder_places_are_logarithmic() -> None:
     rungs = (
-        Rung("a", 1e-5, 1e-4, 1e-3, "elastic"),
-        Rung("b", math.nan, 1e-3, 1e-2, "published"),
-        Rung("nothing", math.nan, math.nan, math.nan, "floor"),
+        ErrorRange("a", 1e-5, 1e-4, 1e-3, "elastic"),
+        ErrorRange("b", math.nan, 1e-3, 1e-2, "published"),
+        ErrorRange("nothing", math.nan, math.nan, math.nan, "floor"),
     )
     steps = ladder(rungs).steps
     assert [s.rung.label for s in steps] == ["a", "b"]
@@ -63,7 +63,7 @@ def test_ladder_places_are_logarithmic() -> None:
 
 
 def test_ladder_without_numbers_is_empty() -> None:
-    assert ladder((Rung("a", math.nan, math.nan, math.nan, "floor"),)).steps == ()
+    assert ladder((ErrorRange("a", math.nan, math.nan, math.nan, "floor"),)).steps == ()
 
 
 def test_cells_span_what_belongs_to_them() -> None:

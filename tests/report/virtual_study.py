@@ -16,7 +16,7 @@ from flexcal.calibration.verification import (
     MeasuredPoints,
     arms_at,
     errors_before,
-    robot_before,
+    uncalibrated_model,
     verify,
     verify_jointly,
 )
@@ -27,7 +27,13 @@ from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.export import write_urdf
 from flexcal.files.formats import Block, write_estimates
 from flexcal.frequency.periodic import FrequencyResponse
-from flexcal.jobs.result_files import write_arm, write_fitted, write_points, write_results, write_verification
+from flexcal.jobs.result_files import (
+    write_arm,
+    write_fitted_responses,
+    write_points,
+    write_results,
+    write_verification,
+)
 from flexcal.jobs.two_stage import TwoStageRun
 from flexcal.jobs.two_stage.document import two_stage_document
 from flexcal.model.robot import GEOMETRY, SPRINGS, RobotModel, spring_names
@@ -187,7 +193,7 @@ def simulate_run(nominal: RobotModel, seed: int = 1) -> TwoStageRun:
     took = time.perf_counter() - started
     seen, covariance = verify_jointly(calibrated.model, noisy)
     floor = 2.0e-5 * rng.normal(size=exact.position.shape)
-    placed = robot_before(nominal, calibrated.poses)
+    placed = uncalibrated_model(nominal, calibrated.poses)
     assert placed.registered is not None and placed.own is not None
     return TwoStageRun(
         nominal=nominal,
@@ -227,7 +233,7 @@ def leave_run(folder: Path, run: TwoStageRun) -> None:
         origin = {"program": "flexcal 1", "input.of_both": 64 * "b", f"input.of_{block}": 64 * block[0]}
         write_estimates(folder / "estimates.yaml", block, replace(estimate, provenance=origin))
     write_plan(folder / "frequency_plan.yaml", run.plan)
-    write_fitted(folder, fitted_responses(run.stiffness, run.nominal))
+    write_fitted_responses(folder, fitted_responses(run.stiffness, run.nominal))
     write_verification(folder / "verification.csv", run)
     points = MeasuredPoints(fit.poses, errors_before(run.before) | {CALIBRATED: fit.residuals}, fit.ambiguous)
     write_points(folder, points)

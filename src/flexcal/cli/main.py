@@ -13,12 +13,12 @@ from collections.abc import Sequence
 from contextlib import redirect_stderr, suppress
 from importlib import import_module
 
-from flexcal.cli.arguments.invocation import keep_command_line
+from flexcal.cli.arguments.invocation import record_command_line
 from flexcal.cli.arguments.verb_table import Verb, find_verb, overview, unknown_verb
-from flexcal.cli.terminal.encoding import show_near_letters
+from flexcal.cli.terminal.encoding import substitute_unencodable
 from flexcal.cli.terminal.escaping import sentence
-from flexcal.cli.terminal.standard_streams import held_output, provide_streams
-from flexcal.cli.terminal.stop_signals import Stopping, stoppable
+from flexcal.cli.terminal.standard_streams import buffered_output, replace_closed_streams
+from flexcal.cli.terminal.stop_signals import StopSignal, raise_on_stop_signals
 from flexcal.errors import FlexcalError
 
 FAILED = 2
@@ -31,17 +31,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0: done; 2: an input or argument that cannot be used, one sentence on standard error; 130: interrupted, 143 and 129: stopped by SIGTERM
     or SIGHUP, one sentence too.
     """
-    provide_streams()
+    replace_closed_streams()
     given = list(sys.argv[1:] if arguments is None else arguments)
     # matrices here are small: threads of the linear algebra library cost more than they give
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     # what a verb imports and reads stays until its end: looking through it for cycles every 700 objects finds none
     gc.set_threshold(100_000)
     atexit.register(gc.freeze)  # nor does it at exit, which took a tenth of a second
-    show_near_letters()
-    with stoppable() as stopping:
+    substitute_unencodable()
+    with raise_on_stop_signals() as stopping:
         try:
-            with held_output():
+            with buffered_output():
                 return _run(given)
         except BaseException as problem:
             told, status = _told(problem, stopping)
@@ -50,7 +50,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             return status
 
 
-def _told(problem: BaseException, stopping: Stopping) -> tuple[str, int]:
+def _told(problem: BaseException, stopping: StopSignal) -> tuple[str, int]:
     """What to say of an exception in a sentence, and the exit status; raises it again where it is none that is expected."""
     if stopping.number is not None:  # an extension module that is interrupted raises what it likes
         return stopping.sentence, stopping.status
@@ -80,7 +80,7 @@ def _folder_is_there() -> bool:
 
 
 def _run(arguments: list[str]) -> int:
-    keep_command_line(arguments)
+    record_command_line(arguments)
     if not arguments or arguments[0] in ("-h", "--help", "help"):
         print(overview())
         return 0
@@ -109,7 +109,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
     from flexcal.cli.arguments.parse_errors import refusal, refuse_unknown_options
-    from flexcal.cli.folders.overwrite_protection import outputs, settle_inputs
+    from flexcal.cli.folders.overwrite_protection import complete_interrupted_runs, outputs
 
     command = getattr(import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
     refuse_unknown_options(verb, arguments)
@@ -127,7 +127,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
         if stop.code == 0:  # --help
             return 0
         raise refusal(verb, said.getvalue()) from None
-    settle_inputs(parsed)
+    complete_interrupted_runs(parsed)
     with outputs(verb.name, parsed.out, verb.leaves, page=verb.page, beside=verb.beside):
         parsed.run()
     return 0

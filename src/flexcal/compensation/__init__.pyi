@@ -1,4 +1,4 @@
-from .desired_poses import wanted_pose
+from .desired_poses import desired_pose
 from .start_postures import best_posture
 from .target_commands import Compensation, compensate
 
@@ -6,5 +6,5 @@ __all__ = [
     "Compensation",
     "best_posture",
     "compensate",
-    "wanted_pose",
+    "desired_pose",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.compensation.tool_target import Aim
+from flexcal.compensation.tool_target import ToolPoseTarget
 from flexcal.data.poses import ToolTargets
 from flexcal.errors import FlexcalError
 from flexcal.model.parts import vector_rotation
@@ -14,7 +14,7 @@ from flexcal.model.statics import points_kinematics
 _POSE = 6
 
 
-def wanted_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> Aim:
+def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -> ToolPoseTarget:
     """Position and, where it counts, rotation of every target in the base frame.
 
     Points and orientations are those of the file, else those that the `nominal` robot takes at the file's joint positions. A point alone
@@ -36,7 +36,7 @@ def wanted_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) ->
         position = at.position if position is None else position
         rotation = at.orientation if rotation is None else rotation
     assert position is not None
-    return Aim(targets.target, position, None if short else rotation)
+    return ToolPoseTarget(targets.target, position, None if short else rotation)
 
 
 def joints_before(model: RobotModel, target: str) -> int:

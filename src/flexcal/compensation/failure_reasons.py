@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.compensation.newton_search import Commands
-from flexcal.compensation.tool_target import Aim
+from flexcal.compensation.tool_target import ToolPoseTarget
 from flexcal.model.kinematics import joint_limits
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
@@ -23,7 +23,7 @@ def given_past_limit(model: RobotModel, q: np.ndarray) -> np.ndarray:
     return reasons
 
 
-def nominal_reasons(model: RobotModel, aim: Aim, nearest: np.ndarray) -> list[str]:
+def nominal_reasons(model: RobotModel, aim: ToolPoseTarget, nearest: np.ndarray) -> list[str]:
     """What keeps the nominal robot from K aims: `nearest` (K, n) is as near as it comes within its limits."""
     residual, _ = aim.nominal(model, nearest)
     return [
@@ -32,7 +32,9 @@ def nominal_reasons(model: RobotModel, aim: Aim, nearest: np.ndarray) -> list[st
     ]
 
 
-def real_reasons(model: RobotModel, aim: Aim, nominal: np.ndarray, commands: Commands) -> list[str]:
+def real_reasons(
+    model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, commands: Commands
+) -> list[str]:
     """What keeps the real robot from K aims that the nominal one takes at `nominal` (K, n): `commands` that were not found.
 
     The two robots differ by millimetres, so it is a limit, or a singularity that asks for much motion to make up for little.
@@ -95,7 +97,7 @@ def _named(model: RobotModel, joints: list[int]) -> str:
     return " and ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
-def _weakest_motion(model: RobotModel, aim: Aim, q: np.ndarray) -> np.ndarray:
+def _weakest_motion(model: RobotModel, aim: ToolPoseTarget, q: np.ndarray) -> np.ndarray:
     """The joint motions (K, n) of unit length that move the nominal tool least, of those that can move it."""
     _, jacobian = aim.nominal(model, q)
     return np.linalg.svd(jacobian * aim.weight(model)[:, None], full_matrices=False)[2][:, -1]

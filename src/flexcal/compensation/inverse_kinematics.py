@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexcal.compensation.tool_target import Aim
+from flexcal.compensation.tool_target import ToolPoseTarget
 from flexcal.model.kinematics import damped_step, joint_limits
 from flexcal.model.robot import RobotModel
 
@@ -23,7 +23,9 @@ _FAR, NEAR = 1e-1, 1e-3
 """Dampings relative to the reach: to start with where the aim may be anywhere, and where it is near."""
 
 
-def inverse_kinematics(model: RobotModel, aim: Aim, start: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def inverse_kinematics(
+    model: RobotModel, aim: ToolPoseTarget, start: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
     """Joint positions (N, n) at which the undeflected robot takes every aim, or comes nearest to it; and whether it does (N,).
 
     As `nearest_positions` finds them from `start` (N, n).
@@ -35,7 +37,7 @@ def inverse_kinematics(model: RobotModel, aim: Aim, start: np.ndarray) -> tuple[
 
 
 def nearest_positions(
-    model: RobotModel, aim: Aim, start: np.ndarray, first_damping: float, forward: Forward
+    model: RobotModel, aim: ToolPoseTarget, start: np.ndarray, first_damping: float, forward: Forward
 ) -> tuple[np.ndarray, np.ndarray]:
     """Joint positions (N, n) within the limits at which the residuals (N, m) of `forward` are least, and these residuals.
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from flexcal.compensation.inverse_kinematics import NEAR, nearest_positions
-from flexcal.compensation.tool_target import Aim
+from flexcal.compensation.tool_target import ToolPoseTarget
 from flexcal.model.kinematics import damped_step, joint_limits
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import ToolAtRest, tool_at_rest
@@ -25,7 +25,8 @@ _DAMPING = 1e-7
 class Commands:
     """Motor positions `q` (N, n) after the last step; `found` (N,): with them the tool is at its aim, within all limits.
 
-    `before` and `after` (N, m): aim minus tool, as `Aim.residual` has it, at the nominal command and at `q`; `torque` (N, n) N m at rest.
+    `before` and `after` (N, m): aim minus tool, as `ToolPoseTarget.residual` has it, at the nominal command and at `q`; `torque` (N, n) N
+    m at rest.
     """
 
     q: np.ndarray
@@ -39,7 +40,9 @@ class Commands:
         return Commands(**{field.name: getattr(self, field.name)[rows] for field in fields(self)})
 
 
-def find_commands(model: RobotModel, aim: Aim, nominal: np.ndarray, payload: np.ndarray | None) -> Commands:
+def solve_commands(
+    model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, payload: np.ndarray | None
+) -> Commands:
     """Commands of least change from `nominal` (N, n) that bring the deflected robot to `aim`, carrying `payload` (N,) kg.
 
     q ← q₀ + J⁺ (r + J (q − q₀)), the Gauss-Newton step to the solution nearest to q₀; for six joints and a full pose it is Newton's.
@@ -61,7 +64,9 @@ def find_commands(model: RobotModel, aim: Aim, nominal: np.ndarray, payload: np.
 class _Search:
     """Where the search stands for all rows; `rows` are the numbers of those still under way."""
 
-    def __init__(self, model: RobotModel, aim: Aim, nominal: np.ndarray, payload: np.ndarray | None) -> None:
+    def __init__(
+        self, model: RobotModel, aim: ToolPoseTarget, nominal: np.ndarray, payload: np.ndarray | None
+    ) -> None:
         self.model, self.aim, self.nominal, self.payload = model, aim, nominal, payload
         self.lower, self.upper = joint_limits(model)
         self.weight = aim.weight(model)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
-from flexcal.compensation.tool_target import Aim
-from flexcal.model.kinematics import even_configurations, joint_ranges, point_kinematics
+from flexcal.compensation.tool_target import ToolPoseTarget
+from flexcal.model.kinematics import joint_ranges, low_discrepancy_configurations, point_kinematics
 from flexcal.model.robot import RobotModel
 
 _POSTURES = 256
@@ -19,7 +19,7 @@ def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
     That is: the smallest singular value of its Jacobian, rotations being weighted by the reach, times the share of its range that the
     nearest limit leaves a joint, is the largest. An arm that cannot turn its tool every way is judged by positions alone.
     """
-    postures = even_configurations(model, _POSTURES)
+    postures = low_discrepancy_configurations(model, _POSTURES)
     jacobian = point_kinematics(model, postures, point=target).motion_jacobian[:, :, :, 2]
     whole = np.linalg.svd(jacobian * np.repeat([1.0, model.reach], 3)[:, None], compute_uv=False)[:, -1]
     if model.n < 6 or not whole.max() > 0:
@@ -29,8 +29,8 @@ def best_posture(model: RobotModel, target: str | None = None) -> np.ndarray:
     return postures[int(np.argmax(whole * room))]
 
 
-def from_postures(
-    model: RobotModel, aim: Aim, start: np.ndarray
+def inverse_kinematics_from_postures(
+    model: RobotModel, aim: ToolPoseTarget, start: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Inverse kinematics (N, n) from `start` (n,); whether it gets there (N,), and from another posture only (N,).
 
@@ -38,7 +38,7 @@ def from_postures(
     """
     q, reached = inverse_kinematics(model, aim, np.tile(start, (len(aim.position), 1)))
     first = reached.copy()
-    others = even_configurations(model, _OTHER_STARTS)
+    others = low_discrepancy_configurations(model, _OTHER_STARTS)
     for other in others[np.argsort(np.linalg.norm(others - start, axis=1))]:
         rows = np.flatnonzero(~reached)
         if not len(rows):

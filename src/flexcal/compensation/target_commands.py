@@ -6,11 +6,11 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from flexcal.compensation.desired_poses import wanted_pose
+from flexcal.compensation.desired_poses import desired_pose
 from flexcal.compensation.failure_reasons import given_past_limit, nominal_reasons, real_reasons
 from flexcal.compensation.inverse_kinematics import inverse_kinematics
-from flexcal.compensation.newton_search import find_commands
-from flexcal.compensation.start_postures import best_posture, from_postures
+from flexcal.compensation.newton_search import solve_commands
+from flexcal.compensation.start_postures import best_posture, inverse_kinematics_from_postures
 from flexcal.data.poses import ToolTargets
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, certain_flank
@@ -54,7 +54,7 @@ def compensate(
     """Commands with which the calibrated `model` puts its tool where `targets` say; `nominal` is the robot before calibration.
 
     The nominal inverse kinematics starts from the targets' own joint positions, else from `start` (n,), and Newton's method on `model` from
-    there, so that the arm keeps its configuration. What the tool is to keep beside its position is in `wanted_pose`. Raises `FlexcalError`
+    there, so that the arm keeps its configuration. What the tool is to keep beside its position is in `desired_pose`. Raises `FlexcalError`
     for an unknown target or station, and as `tool_at_rest` does; a target that cannot be reached is no error, but gets a reason.
     """
     if targets.q is None and start is None:
@@ -73,13 +73,13 @@ def _solve(
 ) -> Compensation:
     """`compensate` for a block of rows."""
     size = len(targets)
-    aim = wanted_pose(model, nominal, targets)
+    aim = desired_pose(model, nominal, targets)
     elsewhere = np.zeros(size, dtype=bool)
     if targets.q is not None:
         known, reached = inverse_kinematics(nominal, aim, targets.q)
     else:
         assert start is not None
-        known, reached, elsewhere = from_postures(nominal, aim, start)
+        known, reached, elsewhere = inverse_kinematics_from_postures(nominal, aim, start)
     q, before = np.full((size, model.n), np.nan), np.full(size, np.nan)
     unambiguous, reason = np.zeros(size, dtype=bool), np.full(size, "", dtype=object)
     if targets.q is not None:
@@ -87,7 +87,7 @@ def _solve(
     lost = np.flatnonzero(~reached & (reason == ""))
     reason[lost] = nominal_reasons(nominal, aim.subset(lost), known[lost])
     rows = np.flatnonzero(reason == "")
-    commands = find_commands(
+    commands = solve_commands(
         model,
         aim.subset(rows),
         known[rows],

@@ -16,7 +16,7 @@ _NEAR = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Aim:
+class ToolPoseTarget:
     """Where N points, by name, are to be in the base frame: `position` (N, 3) m and, where it counts, `rotation` (N, 3, 3).
 
     Residuals and Jacobians have m rows: three for the position, and three more for the rotation.
@@ -35,13 +35,13 @@ class Aim:
         """Factors (m,) that make lengths of all rows: a rotation counts as the motion of a point as far away as the robot reaches."""
         return np.repeat([1.0, model.reach], 3)[: self.rows]
 
-    def subset(self, rows: np.ndarray | slice) -> Aim:
+    def subset(self, rows: np.ndarray | slice) -> ToolPoseTarget:
         """The rows with these indices, or where this mask is true."""
         turn = None if self.rotation is None else self.rotation[rows]
-        return Aim(self.target[rows], self.position[rows], turn)
+        return ToolPoseTarget(self.target[rows], self.position[rows], turn)
 
     def residual(self, at: PointKinematics) -> np.ndarray:
-        """Aim minus pose (N, m): m, then the rotation vector in base axes from the one to the other, rad."""
+        """Target minus pose (N, m): m, then the rotation vector in base axes from the one to the other, rad."""
         away = self.position - at.position
         if self.rotation is None:
             return away

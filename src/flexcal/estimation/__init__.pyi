@@ -7,11 +7,11 @@ from .loss import Cauchy, Huber, Loss, Squares, loss_named
 from .misfit import Misfit
 from .parameter import Parameter, Parameters
 from .problem import Problem
-from .profile_likelihood import profile_rise
+from .profile_likelihood import profile_cost_increase
 from .sensitivity import Sensitivity
 from .solver import solve
 from .student_t import student_quantile
-from .uncertainty import LOG_STD_LIMIT, known_to_a_factor_of_two
+from .uncertainty import LOG_STD_LIMIT, is_log_identified
 from .vuong_test import vuong_statistic
 
 __all__ = [
@@ -34,12 +34,12 @@ __all__ = [
     "analyse",
     "distance_probability",
     "distance_quantile",
-    "known_to_a_factor_of_two",
+    "is_log_identified",
     "loss_named",
     "mean_distance",
     "name_direction",
     "principal_variances",
-    "profile_rise",
+    "profile_cost_increase",
     "solve",
     "student_quantile",
     "vuong_statistic",

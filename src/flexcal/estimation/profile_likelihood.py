@@ -13,7 +13,7 @@ from flexcal.estimation.objective import Objective
 from flexcal.estimation.problem import Problem
 
 
-def profile_rise(problem: Problem, fitted: Estimate, x: np.ndarray, held: Sequence[int]) -> float:
+def profile_cost_increase(problem: Problem, fitted: Estimate, x: np.ndarray, held: Sequence[int]) -> float:
     """Rise of the cost above that of `fitted` where the parameters `held` stay as in `x` (p,) and the others are fitted from there.
 
     Twice the rise is χ² with as many degrees of freedom as are held, at their true values (Wilks 1938).

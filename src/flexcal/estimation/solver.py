@@ -15,7 +15,7 @@ from flexcal.estimation.loss import OUTLIER_WEIGHT, Loss, Squares, loss_named
 from flexcal.estimation.objective import Objective
 from flexcal.estimation.parameter import Parameters
 from flexcal.estimation.problem import Problem
-from flexcal.estimation.uncertainty import known_to_a_factor_of_two, sandwich, uncertainty
+from flexcal.estimation.uncertainty import is_log_identified, sandwich, uncertainty
 
 _SAME_OPTIMUM = 1e-3
 
@@ -130,6 +130,4 @@ def _refitted(
 
 def _identifiable(parameters: Parameters, found: Identifiability, covariance: np.ndarray) -> tuple[bool, ...]:
     kept = set(found.kept)
-    return tuple(
-        i in kept and known for i, known in enumerate(known_to_a_factor_of_two(parameters, covariance))
-    )
+    return tuple(i in kept and known for i, known in enumerate(is_log_identified(parameters, covariance)))

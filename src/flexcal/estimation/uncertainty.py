@@ -54,7 +54,7 @@ def uncertainty(
     )
 
 
-def known_to_a_factor_of_two(parameters: Parameters, covariance: np.ndarray) -> tuple[bool, ...]:
+def is_log_identified(parameters: Parameters, covariance: np.ndarray) -> tuple[bool, ...]:
     """For every parameter whether `covariance` (p, p) leaves it known to a factor of two, `LOG_STD_LIMIT`; always so on a linear scale."""
     stds = np.sqrt(np.diag(covariance))
     return tuple(

@@ -4,20 +4,20 @@ from .mjcf_file import render_mjcf, write_mjcf
 from .mujoco_spec import mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
-from .representation_error import Distances, Loss, LostTerm, measure_loss
+from .representation_error import Distances, Loss, UnrepresentedTerm, measure_export_error
 from .sdf import render_sdf
 from .universal_robots import render_kinematics
 from .urdf import render_urdf, write_urdf
-from .written_file import Exported, Rendered, write_rendered
+from .written_file import ExportedFile, RenderedModel, write_rendered
 
 __all__ = [
     "Convention",
     "Distances",
-    "Exported",
+    "ExportedFile",
     "Loss",
-    "LostTerm",
-    "Rendered",
-    "measure_loss",
+    "RenderedModel",
+    "UnrepresentedTerm",
+    "measure_export_error",
     "mjcf_spec",
     "render_dh",
     "render_json",

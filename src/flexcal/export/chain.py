@@ -6,7 +6,7 @@ from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
 
 
-def chain_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:
+def path_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:
     """Name of a target (default: the first) and indices of the joints that move it, from the base on.
 
     Raises `FlexcalError` for an unknown point, and for a robot without any, to which the `format_name` could lead.

@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.export.chain import chain_to
+from flexcal.export.chain import path_to
 from flexcal.export.dh_parameters import (
     NEARLY_PARALLEL,
     DhChain,
@@ -20,9 +20,9 @@ from flexcal.export.dh_parameters import (
     slides_moved,
 )
 from flexcal.export.representation_error import AT_REST, ToolMap
-from flexcal.export.transforms import X, Y, Z, from_six, shifted, six_numbers, turned
-from flexcal.export.written_file import Rendered
-from flexcal.model.robot import RobotModel, posterior_spread
+from flexcal.export.transforms import X, Y, Z, from_xyz_rpy, shifted, turned, xyz_rpy
+from flexcal.export.written_file import RenderedModel
+from flexcal.model.robot import RobotModel, propagated_covariance_root
 
 Convention = Literal["standard", "modified"]
 Row = tuple[str, str, dict[str, float]]
@@ -61,14 +61,14 @@ def render_dh(
     point: str | None = None,
     four_parameters: bool = False,
     unseen: RobotModel | None = None,
-) -> Rendered:
+) -> RenderedModel:
     """The chain that moves a target as a CSV table in a convention: joint, parameter, nominal, calibrated, difference; base and tool too.
 
     beta stands for d between axes that are nominally within 1° of parallel (Hayati, Mirmirani 1985); with `four_parameters` it is never
     used. `unseen` is the robot with only that in its posterior which the measured points leave open: parameters of which that is the
     larger part are marked as not determined. Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    target, chain = chain_to(model, point, "Denavit-Hartenberg parameters")
+    target, chain = path_to(model, point, "Denavit-Hartenberg parameters")
     straight = chain_axes(nominal, target, chain)
     before = dh_chain(straight, hayati=not four_parameters)
     kinds = [model.joints[i].kind for i in chain]
@@ -81,11 +81,11 @@ def render_dh(
     after = calibrated(model)
     old, new = (_rows(dh, names, convention) for dh in (before, after))
 
-    def rows_of(changed: RobotModel) -> list[Row]:
+    def parameter_rows(changed: RobotModel) -> list[Row]:
         return _rows(calibrated(changed), names, convention)
 
-    std = _std(model, new, rows_of)
-    open_ = [{}] * len(new) if unseen is None else _undetermined(std, _std(unseen, new, rows_of))
+    std = _std(model, new, parameter_rows)
+    open_ = [{}] * len(new) if unseen is None else _undetermined(std, _std(unseen, new, parameter_rows))
     text = _csv(old, new, std, open_)
     left = [name for i, name in enumerate(model.joint_names) if i not in chain]
     remarks = _remarks(before, after, [name for name, _ in names], four_parameters)
@@ -115,7 +115,7 @@ def render_dh(
         )
         for (name, kind, was), (_, _, now), spread, keys in zip(old, new, std, open_, strict=True)
     )
-    return Rendered(
+    return RenderedModel(
         text,
         _tool_map(text, convention, list(chain)),
         AT_REST,
@@ -145,7 +145,7 @@ def dh_transforms(
     rows: dict[tuple[str, str], dict[str, float]] = {}
     for row in csv.DictReader(line for line in text.splitlines() if not line.startswith("#")):
         rows.setdefault((row["joint"], row["type"]), {})[row["parameter"]] = float(row[column])
-    base, tool = (from_six(rows[name, "fixed"]) for name in ("base", "tool"))
+    base, tool = (from_xyz_rpy(rows[name, "fixed"]) for name in ("base", "tool"))
     joints = [(kind, row) for (_, kind), row in rows.items() if kind != "fixed"]
 
     def frames(q: np.ndarray) -> np.ndarray:
@@ -170,26 +170,26 @@ def _rows(chain: DhChain, names: list[tuple[str, str]], convention: Convention) 
     own = {key: getattr(chain, key) for key in _ORDER[convention]}
     if convention == "modified":
         own |= {key: np.concatenate([[0.0], own[key][:-1]]) for key in ("a", "alpha", "beta")}
-    rows: list[Row] = [("base", "fixed", six_numbers(chain.base))]
+    rows: list[Row] = [("base", "fixed", xyz_rpy(chain.base))]
     rows += [
         (name, kind, {key: float(values[k]) + 0.0 for key, values in own.items()})
         for k, (name, kind) in enumerate(names)
     ]
-    return [*rows, ("tool", "fixed", six_numbers(chain.tool))]
+    return [*rows, ("tool", "fixed", xyz_rpy(chain.tool))]
 
 
 def _std(
-    model: RobotModel, rows: list[Row], rows_of: Callable[[RobotModel], list[Row]]
+    model: RobotModel, rows: list[Row], parameter_rows: Callable[[RobotModel], list[Row]]
 ) -> list[dict[str, float] | None]:
     """Standard deviations of the joints' `rows`; None for base and tool, and where nothing was estimated."""
 
     def change(changed: RobotModel) -> np.ndarray:
         found = []
-        for (_, _, now), (_, _, was) in zip(rows_of(changed)[1:-1], rows[1:-1], strict=True):
+        for (_, _, now), (_, _, was) in zip(parameter_rows(changed)[1:-1], rows[1:-1], strict=True):
             found += [_difference(key, now[key], was[key]) for key in was]
         return np.array(found)
 
-    spread = np.linalg.norm(posterior_spread(model, change), axis=1)
+    spread = np.linalg.norm(propagated_covariance_root(model, change), axis=1)
     if not spread.any():
         return [None] * len(rows)
     values = iter(spread.tolist())

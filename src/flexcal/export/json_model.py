@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.export.representation_error import ToolMap, tool_positions
 from flexcal.export.transforms import transform
-from flexcal.export.written_file import Rendered
+from flexcal.export.written_file import RenderedModel
 from flexcal.model.kinematics import bearing_placement, link_placement, point_placement
 from flexcal.model.parts import rotation_wxyz, vector_rotation
 from flexcal.model.robot import LATERAL, RobotModel, unit_in
@@ -18,7 +18,7 @@ FORMAT = "flexcal robot"
 VERSION = 1
 
 
-def render_json(model: RobotModel, nominal: RobotModel) -> Rendered:
+def render_json(model: RobotModel, nominal: RobotModel) -> RenderedModel:
     """The robot as a JSON document (docs/file-formats.md); read back, its `parameters` make the calibrated robot of the nominal one."""
     joints = model.joints
     names = [None if joint.parent < 0 else joints[joint.parent].name for joint in joints]
@@ -38,7 +38,7 @@ def render_json(model: RobotModel, nominal: RobotModel) -> Rendered:
         "parameters": {name: _quantity(model, name) for name in model.values},
     }
     text = json.dumps(document, indent=1, allow_nan=False) + "\n"
-    return Rendered(text, _tool_map(text, nominal) if model.points else np.zeros_like, (), None)
+    return RenderedModel(text, _tool_map(text, nominal) if model.points else np.zeros_like, (), None)
 
 
 def _tool_map(text: str, nominal: RobotModel) -> ToolMap:

@@ -18,7 +18,7 @@ from flexcal.export.representation_error import (
     TRANSMISSION,
     ToolMap,
 )
-from flexcal.export.written_file import Exported, Rendered, write_rendered
+from flexcal.export.written_file import ExportedFile, RenderedModel, write_rendered
 from flexcal.model.robot import SPRINGS, RobotModel
 
 if TYPE_CHECKING:
@@ -30,12 +30,12 @@ _AT_REST = 1e-12
 """rad: a correction of the springs after which the arm counts as at rest."""
 
 
-def write_mjcf(model: RobotModel, path: str | Path) -> Exported:
+def write_mjcf(model: RobotModel, path: str | Path) -> ExportedFile:
     """Write the robot as MJCF with elastic joints and measure what it lost; see `render_mjcf`."""
     return write_rendered(model, path, render_mjcf(model))
 
 
-def render_mjcf(model: RobotModel) -> Rendered:
+def render_mjcf(model: RobotModel) -> RenderedModel:
     """The robot as MJCF: the joints of `mjcf_spec`, all free, with the declared payload; numbers to their last digit.
 
     Raises `FlexcalError` where MuJoCo cannot build the robot, as with links that have no mass.
@@ -71,7 +71,7 @@ def render_mjcf(model: RobotModel) -> Rendered:
         about += (
             f"Springs: {', '.join(springs)}; q of a drive spring is what the arm turns beyond its motor.",
         )
-    return Rendered(
+    return RenderedModel(
         text,
         mjcf_tool(model, text),
         (BACKLASH, GRAVITY_COMPLIANCE, HARDENING, LATERAL_COMPLIANCE, TRANSMISSION),

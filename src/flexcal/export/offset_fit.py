@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.export.representation_error import Distances, random_poses, tool_positions
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import rotation_vector, vector_rotation
-from flexcal.model.robot import RobotModel, posterior_spread
+from flexcal.model.robot import RobotModel, propagated_covariance_root
 
 _STEPS = 8
 _SMALL = 1e-8
@@ -90,7 +90,9 @@ def _fit(
     fitted = _solve(nominal, q, wanted, point, free)
     still = _solve(nominal, q, wanted, point, free & (np.arange(n + 9) >= n))
     columns = _columns(nominal, q, fitted, point, free)
-    spread = posterior_spread(model, lambda m: tool_positions(m, q, point=point, flank=flank)[0].ravel())
+    spread = propagated_covariance_root(
+        model, lambda m: tool_positions(m, q, point=point, flank=flank)[0].ravel()
+    )
     rows = np.vstack([columns, _rest_rows(n, len(q))])
     response = _least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
     std = np.linalg.norm(response, axis=1)
@@ -109,7 +111,7 @@ def offset_tool(nominal: RobotModel, q: np.ndarray, parameters: np.ndarray, poin
     return position @ vector_rotation(moved[3:]).T + moved[:3]
 
 
-def what_offsets_leave(
+def error_after_offsets(
     nominal: RobotModel, q: np.ndarray, moved: np.ndarray, point: str, *, keep_frames: bool
 ) -> np.ndarray:
     """What the best offsets, to first order, leave of tool displacements `moved` (N, 3) at `q` (N, n)."""

@@ -8,11 +8,11 @@ from io import StringIO
 
 import numpy as np
 
-from flexcal.export.chain import chain_to
-from flexcal.export.offset_fit import OffsetFit, fit_offsets, offset_tool, what_offsets_leave
+from flexcal.export.chain import path_to
+from flexcal.export.offset_fit import OffsetFit, error_after_offsets, fit_offsets, offset_tool
 from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
-from flexcal.export.transforms import SIX, from_six, six_numbers, transform
-from flexcal.export.written_file import Rendered
+from flexcal.export.transforms import SIX, from_xyz_rpy, transform, xyz_rpy
+from flexcal.export.written_file import RenderedModel
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE, MILLIMETRE
@@ -29,12 +29,12 @@ def render_offsets(
     point: str | None = None,
     keep_frames: bool = False,
     undetermined: Collection[int] = (),
-) -> Rendered:
+) -> RenderedModel:
     """The best joint offsets as a CSV table, with base and tool that go with them unless `keep_frames`; zero for the joints `undetermined`.
 
     Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    target, chain = chain_to(model, point, "Joint offsets")
+    target, chain = path_to(model, point, "Joint offsets")
     fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined)
     text = _csv(model, fit, chain, keep_frames=keep_frames)
     placed = "as it is" if keep_frames else "with base and tool placed by best fit"
@@ -85,7 +85,7 @@ def render_offsets(
         }
         for i in chain
     }
-    return Rendered(
+    return RenderedModel(
         text,
         _tool_map(text, nominal, target),
         (GEOMETRY, *AT_REST),
@@ -106,7 +106,7 @@ def render_offsets(
             "tool": None if keep_frames else dict(zip("xyz", fit.tool.tolist(), strict=True)),
         },
         point=target,
-        absorb=lambda q, moved: what_offsets_leave(nominal, q, moved, target, keep_frames=keep_frames),
+        absorb=lambda q, moved: error_after_offsets(nominal, q, moved, target, keep_frames=keep_frames),
     )
 
 
@@ -123,7 +123,7 @@ def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
             found[nominal.n + 6 + "xyz".index(row["parameter"])] = value
         else:
             pose[row["parameter"]] = value
-    base = from_six(pose)
+    base = from_xyz_rpy(pose)
     found[nominal.n : nominal.n + 3] = base[:3, 3]
     found[nominal.n + 3 : nominal.n + 6] = rotation_vector(base[:3, :3])
     return found
@@ -135,7 +135,7 @@ def _tool_map(text: str, nominal: RobotModel, point: str) -> ToolMap:
 
 
 def _base_numbers(base: np.ndarray) -> dict[str, float]:
-    return six_numbers(transform(base[:3], vector_rotation(base[3:])))
+    return xyz_rpy(transform(base[:3], vector_rotation(base[3:])))
 
 
 def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_frames: bool) -> str:

@@ -63,7 +63,7 @@ class Distances:
 
 
 @dataclass(frozen=True)
-class LostTerm:
+class UnrepresentedTerm:
     """A term that a format cannot represent, and the tool error where it alone is left out (None: there is no tool)."""
 
     name: str
@@ -77,7 +77,7 @@ class Loss:
     `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg.
     """
 
-    terms: tuple[LostTerm, ...]
+    terms: tuple[UnrepresentedTerm, ...]
     error: Distances | None
     poses: int
     within: str
@@ -110,7 +110,7 @@ class Loss:
         )
 
 
-def measure_loss(
+def measure_export_error(
     model: RobotModel,
     tool: ToolMap,
     terms: Sequence[str],
@@ -126,13 +126,13 @@ def measure_loss(
     present = [term for term in terms if _leave_out(model, term) is not model]
     payload = float(model.payload_mass[0])
     if not model.points:
-        return Loss(tuple(LostTerm(term, None) for term in present), None, 0, "joint range", payload)
+        return Loss(tuple(UnrepresentedTerm(term, None) for term in present), None, 0, "joint range", payload)
     q, within = random_poses(model, point, np.random.default_rng(0))
     full, flank = tool_positions(model, q, point=point)
     lost = []
     for term in present:
         moved = full - tool_positions(_leave_out(model, term), q, point=point, flank=flank)[0]
-        lost.append(LostTerm(term, Distances.of(moved if absorb is None else absorb(q, moved))))
+        lost.append(UnrepresentedTerm(term, Distances.of(moved if absorb is None else absorb(q, moved))))
     return Loss(tuple(lost), Distances.of(full - tool(q)), len(q), within, payload)
 
 

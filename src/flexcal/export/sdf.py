@@ -8,9 +8,9 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.export.representation_error import AT_REST, ToolMap
-from flexcal.export.transforms import SIX, from_six, shifted, six_numbers, transform, turned
+from flexcal.export.transforms import SIX, from_xyz_rpy, shifted, transform, turned, xyz_rpy
 from flexcal.export.urdf_inertials import bodiless_links, bodiless_remark
-from flexcal.export.written_file import Rendered
+from flexcal.export.written_file import RenderedModel
 from flexcal.model.kinematics import link_placement, point_placement
 from flexcal.model.parts import Inertia, Joint
 from flexcal.model.robot import RobotModel
@@ -21,7 +21,7 @@ _FIXED = "world_to_base"
 _MOMENTS = {"ixx": (0, 0), "ixy": (0, 1), "ixz": (0, 2), "iyy": (1, 1), "iyz": (1, 2), "izz": (2, 2)}
 
 
-def render_sdf(model: RobotModel, nominal: RobotModel) -> Rendered:
+def render_sdf(model: RobotModel, nominal: RobotModel) -> RenderedModel:
     """The robot as SDFormat 1.7: geometry, inertials, viscous and Coulomb friction, a frame per point, the base fixed to the world.
 
     Raises `FlexcalError` where two links, joints or points have one name, or one has that of the base or the world.
@@ -52,7 +52,7 @@ def render_sdf(model: RobotModel, nominal: RobotModel) -> Rendered:
         ET.SubElement(frame, "pose").text = _pose(position, rotation)
     ET.indent(root)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
-    return Rendered(
+    return RenderedModel(
         text,
         sdf_tool(model, text),
         AT_REST,
@@ -126,8 +126,8 @@ def _limits(joint: Joint) -> dict[str, float]:
 
 
 def _pose(position: np.ndarray, rotation: np.ndarray) -> str:
-    return " ".join(repr(value) for value in six_numbers(transform(position, rotation)).values())
+    return " ".join(repr(value) for value in xyz_rpy(transform(position, rotation)).values())
 
 
 def _matrix(pose: str) -> np.ndarray:
-    return from_six(dict(zip(SIX, map(float, pose.split()), strict=True)))
+    return from_xyz_rpy(dict(zip(SIX, map(float, pose.split()), strict=True)))

@@ -17,13 +17,13 @@ def transform(position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
     return matrix
 
 
-def six_numbers(placement: np.ndarray) -> dict[str, float]:
+def xyz_rpy(placement: np.ndarray) -> dict[str, float]:
     """x, y, z (m), roll, pitch, yaw (rad) of a placement (4, 4) = Trans Rz(yaw) Ry(pitch) Rx(roll)."""
     values = [*placement[:3, 3], *rotation_rpy(placement[:3, :3])]
     return {key: float(value) + 0.0 for key, value in zip(SIX, values, strict=True)}
 
 
-def from_six(numbers: dict[str, float]) -> np.ndarray:
+def from_xyz_rpy(numbers: dict[str, float]) -> np.ndarray:
     """The placement (4, 4) that six numbers say."""
     values = np.array([numbers[key] for key in SIX], dtype=float)
     return transform(values[:3], rpy_rotation(values[3:]))

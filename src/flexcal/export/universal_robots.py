@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.export.chain import chain_to
+from flexcal.export.chain import path_to
 from flexcal.export.dh_parameters import Axes, DhChain, chain_axes, dh_chain, joint_transform, link_transform
 from flexcal.export.representation_error import AT_REST, ToolMap
-from flexcal.export.transforms import Z, from_six, six_numbers, transform, turned
-from flexcal.export.written_file import Rendered
+from flexcal.export.transforms import Z, from_xyz_rpy, transform, turned, xyz_rpy
+from flexcal.export.written_file import RenderedModel
 from flexcal.model.parts import rotation_vector
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import read_elements, read_urdf
@@ -28,13 +28,13 @@ _ALPHA = np.pi / 2 * np.array([1, 0, 0, 1, -1, 0])
 _ALIKE = np.deg2rad(1.0)
 
 
-def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
+def render_kinematics(model: RobotModel, nominal: RobotModel) -> RenderedModel:
     """The calibrated joint placements as `kinematics: {shoulder: {x, y, z, roll, pitch, yaw}, …, hash}`.
 
     The last frame is at the URDF's `tool0` along the last axis, or at the last link without one. Raises `FlexcalError` for a robot that
     is not one chain of six revolute joints, or has no point at its end.
     """
-    point, chain = chain_to(model, None, "Placements of joints")
+    point, chain = path_to(model, None, "Placements of joints")
     if chain != (0, 1, 2, 3, 4, 5) or model.n != 6 or {j.kind for j in model.joints} != {"revolute"}:
         raise FlexcalError(
             f"a kinematics file is of one chain of six revolute joints, which {model.name} is not; export urdf or mdh instead."
@@ -51,7 +51,7 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> Rendered:
     text = _yaml(placements)
     tool = joint_transform(0.0, back) @ after.tool
     xyz, vector = tool[:3, 3], rotation_vector(tool[:3, :3])
-    return Rendered(
+    return RenderedModel(
         text,
         _tool_map(text, root, tool),
         AT_REST,
@@ -79,7 +79,7 @@ def _tool_map(text: str, root: np.ndarray, tool: np.ndarray) -> ToolMap:
     import yaml
 
     read = yaml.safe_load(text)["kinematics"]
-    links = [from_six(read[name]) for name in LINKS]
+    links = [from_xyz_rpy(read[name]) for name in LINKS]
 
     def positions(q: np.ndarray) -> np.ndarray:
         at = np.broadcast_to(root, (len(q), 4, 4))
@@ -94,7 +94,7 @@ def _yaml(placements: list[np.ndarray]) -> str:
     lines = ["kinematics:"]
     for name, placement in zip(LINKS, placements, strict=True):
         lines.append(f"  {name}:")
-        lines += [f"    {key}: {value!r}" for key, value in six_numbers(placement).items()]
+        lines += [f"    {key}: {value!r}" for key, value in xyz_rpy(placement).items()]
     digest = hashlib.sha256("\n".join(lines).encode()).hexdigest()
     return "\n".join([*lines, f"  hash: flexcal_{digest[:16]}", ""])
 

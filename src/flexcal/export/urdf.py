@@ -10,18 +10,18 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.urdf_inertials import bodiless_remark, write_inertials
-from flexcal.export.written_file import Exported, Rendered, write_rendered
+from flexcal.export.written_file import ExportedFile, RenderedModel, write_rendered
 from flexcal.model.kinematics import link_placement, point_placement
 from flexcal.model.parts import rotation_rpy, rpy_rotation
 from flexcal.model.robot import RobotModel
 
 
-def write_urdf(model: RobotModel, path: str | Path) -> Exported:
+def write_urdf(model: RobotModel, path: str | Path) -> ExportedFile:
     """Write the URDF of `model` and measure what it lost; see `render_urdf`. Raises `FlexcalError` where it cannot be written, too."""
     return write_rendered(model, path, render_urdf(model))
 
 
-def render_urdf(model: RobotModel) -> Rendered:
+def render_urdf(model: RobotModel) -> RenderedModel:
     """The URDF of `model` with its geometric errors in the joint origins, its inertials, and a link a point of `points:` there.
 
     The point links are named after the points. Offsets, misalignments and lengths (Eqs. 15-17) fit a URDF exactly. A link identified with
@@ -39,7 +39,7 @@ def render_urdf(model: RobotModel) -> Rendered:
     _add_points(model, root)
     ET.indent(tree)
     text = '<?xml version="1.0"?>\n' + ET.tostring(root, encoding="unicode", xml_declaration=False) + "\n"
-    return Rendered(text, urdf_tool(model, text), AT_REST, "<!--", remarks=_remarks(model, bodiless))
+    return RenderedModel(text, urdf_tool(model, text), AT_REST, "<!--", remarks=_remarks(model, bodiless))
 
 
 def urdf_tool(model: RobotModel, text: str) -> ToolMap:

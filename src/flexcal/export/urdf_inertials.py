@@ -7,7 +7,7 @@ from collections.abc import Container, Iterator, Sequence
 
 import numpy as np
 
-from flexcal.model.parts import Inertia, is_body
+from flexcal.model.parts import Inertia, is_physically_consistent
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import read_urdf
 
@@ -37,7 +37,7 @@ def bodiless_links(model: RobotModel, nominal: Sequence[Inertia]) -> tuple[str, 
     return tuple(
         joint.link
         for joint, ours, theirs in zip(model.joints, model.inertias, nominal, strict=True)
-        if not _same(ours, theirs) and not is_body(model.values, joint.link)
+        if not _same(ours, theirs) and not is_physically_consistent(model.values, joint.link)
     )
 
 

@@ -9,22 +9,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.export.representation_error import Loss, ToolMap, measure_loss
+from flexcal.export.representation_error import Loss, ToolMap, measure_export_error
 from flexcal.files.transaction import write_text
 from flexcal.model.robot import RobotModel
 
 
 @dataclass(frozen=True, eq=False)
-class Rendered:
+class RenderedModel:
     """A robot as `text`, and `tool`: where that text, read back, puts the target.
 
-    `cannot_carry` are the terms that the format has no place for; `absorb` as `measure_loss` takes it; `about` says in sentences what
-    stands in the file, for its header; `remarks` what a reader of it must know besides; `table` is what to show of it.
+    `unrepresented` are the terms that the format has no place for; `absorb` as `measure_export_error` takes it; `about` says in sentences
+    what stands in the file, for its header; `remarks` what a reader of it must know besides; `table` is what to show of it.
     """
 
     text: str
     tool: ToolMap
-    cannot_carry: tuple[str, ...]
+    unrepresented: tuple[str, ...]
     comments: Literal["<!--", "#"] | None
     about: tuple[str, ...] = ()
     remarks: tuple[str, ...] = ()
@@ -34,7 +34,7 @@ class Rendered:
 
 
 @dataclass(frozen=True, eq=False)
-class Exported:
+class ExportedFile:
     """The written file, its loss, and remarks; `table` are its rows."""
 
     path: Path
@@ -51,14 +51,14 @@ class Exported:
         return tuple(term.name for term in self.loss.terms)
 
 
-def write_rendered(model: RobotModel, path: str | Path, rendered: Rendered) -> Exported:
+def write_rendered(model: RobotModel, path: str | Path, rendered: RenderedModel) -> ExportedFile:
     """Measure what `rendered` lost of `model`, and write it with that in its header; raises `InputError` where it cannot be written."""
-    loss = measure_loss(
-        model, rendered.tool, rendered.cannot_carry, point=rendered.point, absorb=rendered.absorb
+    loss = measure_export_error(
+        model, rendered.tool, rendered.unrepresented, point=rendered.point, absorb=rendered.absorb
     )
     lines = [f"{model.name}, written by flexcal.", *rendered.about, *loss.sentences, *rendered.remarks]
     write_text(path, _with_header(rendered.text, lines, rendered.comments))
-    return Exported(Path(path), loss, rendered.remarks, rendered.table)
+    return ExportedFile(Path(path), loss, rendered.remarks, rendered.table)
 
 
 def _with_header(text: str, lines: list[str], comments: str | None) -> str:

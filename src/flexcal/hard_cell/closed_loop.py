@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.hard_cell.equilibrium import Standing, stand, transmission_error
+from flexcal.hard_cell.equilibrium import StaticEquilibrium, stand, transmission_error
 from flexcal.hard_cell.multibody import Multibody, build
 from flexcal.hard_cell.true_parameters import HYSTERESIS_TWIST, HardRobot
 from flexcal.mujoco_library import step_address
@@ -119,7 +119,7 @@ def run_loop(
     return angle, torque
 
 
-def _angles(arm: Multibody, whole: Multibody, resting: Standing) -> np.ndarray:
+def _angles(arm: Multibody, whole: Multibody, resting: StaticEquilibrium) -> np.ndarray:
     """The rest angles (d,) of the hinges that an arm has."""
     return np.array([resting.angles[whole.hinge(j, part)] for j, part in arm.hinges])
 

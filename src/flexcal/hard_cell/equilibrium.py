@@ -14,7 +14,7 @@ ITERATIONS, TOLERANCE = 60, 1e-13
 
 
 @dataclass(frozen=True, eq=False)
-class Standing:
+class StaticEquilibrium:
     """All hinges (d,) rad at rest, the torque (n,) N m of every motor against gravity, the reflector (3,) m in the base frame."""
 
     angles: np.ndarray
@@ -45,7 +45,7 @@ def stand(
     *,
     slip: np.ndarray | None = None,
     scatter: np.ndarray | None = None,
-) -> Standing:
+) -> StaticEquilibrium:
     """The arm at rest with motors at `motors` (n,) rad; all of them must be hinges of `arm`.
 
     `slip` (n,) in [-1, 1] is the state of each drive's hysteresis, `scatter` (n,) rad an error of each gear at this visit. The balance is
@@ -74,7 +74,7 @@ def stand(
         angles[elastic] = found[elastic]
         if moved < TOLERANCE:
             held = arm.gravity(angles)
-            return Standing(angles, held[motor], arm.point)
+            return StaticEquilibrium(angles, held[motor], arm.point)
     raise FlexcalError(
         "the hard cell's robot has no stable equilibrium: its springs are too soft for gravity; check the stiffness values."
     )

@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.calibration.accuracy.pose_repeatability import PoseRepeatability, repeatability_of
 from flexcal.data.poses import PoseSet
 
-VISITS_A_SET = 10
+VISITS_PER_SET = 10
 """Visits to a pose, one cycle after the other, from which its accuracy and repeatability at a time are taken."""
 _CHANCE = 0.0027
 """How often a pose that stays is said to wander: three standard deviations of a Gaussian."""
@@ -55,17 +55,17 @@ class PoseDrift:
         return float(abs(accuracy[-1] - accuracy[0]))
 
 
-def drift_of_poses(poses: PoseSet, visited: Sequence[PoseRepeatability]) -> list[PoseDrift]:
-    """Of every pose that was visited twice `VISITS_A_SET` times or more; none without times that go on from row to row."""
+def pose_drifts(poses: PoseSet, visited: Sequence[PoseRepeatability]) -> list[PoseDrift]:
+    """Of every pose that was visited twice `VISITS_PER_SET` times or more; none without times that go on from row to row."""
     time = poses.time
     if time is None or (np.diff(time) < 0).any():
         return []
     return [
-        _evaluate(poses.position, time, pose.rows) for pose in visited if len(pose.rows) >= 2 * VISITS_A_SET
+        _evaluate(poses.position, time, pose.rows) for pose in visited if len(pose.rows) >= 2 * VISITS_PER_SET
     ]
 
 
-def common_way(drifts: Sequence[PoseDrift]) -> tuple[float, float]:
+def common_displacement(drifts: Sequence[PoseDrift]) -> tuple[float, float]:
     """Displacement common to all poses from their first to their last sets, and the root mean square of the remainders, m."""
     ways = np.array([drift.way[-1] for drift in drifts])
     together = ways.mean(axis=0)
@@ -73,7 +73,7 @@ def common_way(drifts: Sequence[PoseDrift]) -> tuple[float, float]:
 
 
 def _evaluate(position: np.ndarray, time: np.ndarray, rows: np.ndarray) -> PoseDrift:
-    sets = tuple(np.array_split(rows, len(rows) // VISITS_A_SET))
+    sets = tuple(np.array_split(rows, len(rows) // VISITS_PER_SET))
     centres = np.array([position[own].mean(axis=0) for own in sets])
     return PoseDrift(
         sets,

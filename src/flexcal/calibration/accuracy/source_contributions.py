@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.calibration.error_model import joint_turns
+from flexcal.calibration.error_model import joint_rotation_jacobian
 from flexcal.calibration.measurement import Propagation, covariance_root, moving_parameters, predict
 from flexcal.data.poses import PoseSet
-from flexcal.model.robot import INERTIALS
+from flexcal.model.robot import MASS_AND_COM
 
 PARAMETERS = ("geometry", "backlash", "springs", "link masses", "payload", "instrument's place")
 REPEATABILITY, MODEL_ERROR = "repeatability", "model error"
@@ -23,7 +23,7 @@ def source_of(name: str) -> str:
         return "payload"
     if key in ("stiffness", "hardening"):
         return "springs"
-    if key in INERTIALS:
+    if key in MASS_AND_COM:
         return "link masses"
     return "backlash" if key == "backlash" else "geometry"
 
@@ -50,7 +50,7 @@ def error_sources(reach: Propagation, q: np.ndarray) -> dict[str, np.ndarray]:
     )
     at = predict(model, poses, jacobians=True)
     roots = at.jacobian(names) @ root
-    turned = (joint_turns(at) ** 2).sum(axis=(1, 2))
+    turned = (joint_rotation_jacobian(at) ** 2).sum(axis=(1, 2))
     scatter = {
         REPEATABILITY: 3 * model.value("scatter.robot") ** 2 + model.value("scatter.angular") ** 2 * turned,
         MODEL_ERROR: np.full(size, 3 * model.value("scatter.model") ** 2),

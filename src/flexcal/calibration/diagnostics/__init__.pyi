@@ -1,16 +1,16 @@
 from .bearing_axes import BearingAxes, compare_bearings
 from .drift_test import Drift
 from .gravity_residuals import GravityLoads, gravity_loads
-from .plausibility import Moved, hardly_fits, moved_far, scattered
+from .plausibility import ImplausibleShift, implausible_shifts, is_implausible, residuals_implausible
 
 __all__ = [
     "BearingAxes",
     "Drift",
     "GravityLoads",
-    "Moved",
+    "ImplausibleShift",
     "compare_bearings",
     "gravity_loads",
-    "hardly_fits",
-    "moved_far",
-    "scattered",
+    "implausible_shifts",
+    "is_implausible",
+    "residuals_implausible",
 ]

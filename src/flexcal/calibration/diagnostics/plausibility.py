@@ -22,7 +22,7 @@ SCATTERED = 0.01
 
 
 @dataclass(frozen=True)
-class Moved:
+class ImplausibleShift:
     """A parameter that ended at `value`, `times` its tolerance (or the standard deviation of its prior) from its start."""
 
     name: str
@@ -32,12 +32,12 @@ class Moved:
     times: float
 
 
-def hardly_fits(found: Calibration) -> bool:
+def is_implausible(found: Calibration) -> bool:
     """Whether data and robot are inconsistent, so that the fit must not be used."""
-    return bool(moved_far(found)) or scattered(found)
+    return bool(implausible_shifts(found)) or residuals_implausible(found)
 
 
-def scattered(found: Calibration) -> bool:
+def residuals_implausible(found: Calibration) -> bool:
     """Whether the residuals, without outliers, are larger than plausible for any robot."""
     rows = ~np.isin(np.arange(len(found.poses)), found.estimate.outliers)
     position = found.poses.position[rows]
@@ -45,7 +45,7 @@ def scattered(found: Calibration) -> bool:
     return bool(np.sqrt(np.mean(found.residuals[rows] ** 2)) > SCATTERED * extent)
 
 
-def moved_far(found: Calibration) -> tuple[Moved, ...]:
+def implausible_shifts(found: Calibration) -> tuple[ImplausibleShift, ...]:
     """Parameters with an implausibly large change from their start values, the largest first."""
     estimate, prior = found.estimate.parameters, found.prior
     kept = [name for name in found.identifiability.kept_names if _has_size(name)]
@@ -56,7 +56,7 @@ def moved_far(found: Calibration) -> tuple[Moved, ...]:
     times = np.abs(end - start) / size
     far = [k for k in np.argsort(-times / limit) if times[k] > limit[k]]
     items = [(estimate[named[k]], float(start[k]), float(times[k])) for k in far]
-    return tuple(Moved(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
+    return tuple(ImplausibleShift(p.name, p.natural(x), p.value, p.unit, t) for p, x, t in items)
 
 
 def _limits(kept: list[str], size: np.ndarray) -> np.ndarray:

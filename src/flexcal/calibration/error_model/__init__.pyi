@@ -1,24 +1,24 @@
-from .error_components import Scatter, joint_turns, known_scatter, whitened
+from .error_components import Scatter, joint_rotation_jacobian, known_scatter, whitened
 from .error_statistics import ErrorStatistics
-from .folds import are_different, order_folds, single_poses, workspace_folds
-from .groups import SAME_COMMAND, ErrorCells, block_columns, distinct, occurrence
+from .folds import are_different, order_folds, repeated_pose_numbers, workspace_folds
+from .groups import SAME_COMMAND, ErrorGroups, block_columns, distinct, occurrence
 from .variance_components import TRANSMISSION, LinearFit
 
 __all__ = [
     "SAME_COMMAND",
     "TRANSMISSION",
-    "ErrorCells",
+    "ErrorGroups",
     "ErrorStatistics",
     "LinearFit",
     "Scatter",
     "are_different",
     "block_columns",
     "distinct",
-    "joint_turns",
+    "joint_rotation_jacobian",
     "known_scatter",
     "occurrence",
     "order_folds",
-    "single_poses",
+    "repeated_pose_numbers",
     "whitened",
     "workspace_folds",
 ]

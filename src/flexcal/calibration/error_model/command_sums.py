@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.calibration.error_model.groups import ErrorCells
+from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.incidence_matrices import incidence, pairs_of
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class CommandSums:
     groups: tuple[tuple[int, csr_matrix], ...]
 
     @classmethod
-    def of(cls, points: ErrorCells, cell: np.ndarray, cells: int) -> CommandSums:
+    def of(cls, points: ErrorGroups, cell: np.ndarray, cells: int) -> CommandSums:
         """Of `points` that have commands; `cell` (G, T, kinds) are the cells of their visits, -1 where there is no point."""
         assert points.command is not None
         visits = points.visits

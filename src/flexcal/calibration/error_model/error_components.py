@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.error_model.groups import ErrorCells
+from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.incidence_matrices import incidence
 from flexcal.calibration.measurement import Prediction
 from flexcal.model.robot import RobotModel
@@ -57,7 +57,7 @@ class Scatter:
         diagonal = (self.share * sigma) ** 2 + self.robot**2 + self.pose**2 + _SMALLEST**2
         return diagonal[:, :, None] * np.eye(3) + self.angular**2 * turns @ np.swapaxes(turns, 1, 2)
 
-    def jointly(self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorCells) -> np.ndarray:
+    def jointly(self, sigma: np.ndarray, turns: np.ndarray, cells: ErrorGroups) -> np.ndarray:
         """The same (G, 3 T, 3 T), m², of all measurements of a visit to a pose together, which are independent of other visits'.
 
         The diagonal is 1 where a visit lacks a point.
@@ -90,7 +90,7 @@ class Scatter:
         turned = float(np.mean((turns**2).sum(axis=2))) if turns.size else 0.0
         return float(np.sqrt(self.robot**2 + self.pose**2 + self.angular**2 * turned))
 
-    def shared(self, cells: ErrorCells, rows: np.ndarray) -> np.ndarray:
+    def shared(self, cells: ErrorGroups, rows: np.ndarray) -> np.ndarray:
         """Sums (k, m) of `rows` (N, 3, m) over the points that share each coordinate of a model error, times its standard deviation."""
         flat = rows.reshape(len(rows), -1)
         sums = [np.zeros((0, flat.shape[1]))]
@@ -123,7 +123,7 @@ def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
     return Scatter(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
 
 
-def joint_turns(at: Prediction) -> np.ndarray:
+def joint_rotation_jacobian(at: Prediction) -> np.ndarray:
     """How every revolute joint, turned by one radian, moves the points: (N, 3, r), m/rad, in the instrument's frame."""
     joints = [joint for joint in at.model.joints if joint.kind == "revolute"]
     return at.jacobian([f"{joint.name}.offset" for joint in joints])

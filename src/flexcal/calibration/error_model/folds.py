@@ -8,7 +8,7 @@ _SAME = 0.01
 """rad or m: joints that differ by less make the same pose."""
 
 
-def single_poses(q: np.ndarray) -> np.ndarray:
+def repeated_pose_numbers(q: np.ndarray) -> np.ndarray:
     """Number (N,) of the pose that each row of joint positions `q` (N, n) repeats: those that differ by less than 0.01 rad or m are one."""
     result = np.full(len(q), -1)
     for row in range(len(q)):
@@ -19,7 +19,7 @@ def single_poses(q: np.ndarray) -> np.ndarray:
 
 
 def are_different(q: np.ndarray, count: int) -> bool:
-    """Whether there are at least `count` different poses, as `single_poses` tells them, among joint positions (N, n)."""
+    """Whether there are at least `count` different poses, as `repeated_pose_numbers` tells them, among joint positions (N, n)."""
     for _ in range(count):
         if not len(q):
             return False

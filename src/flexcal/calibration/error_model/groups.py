@@ -21,7 +21,7 @@ _FEWEST_REPEATED = 5
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorCells:
+class ErrorGroups:
     """Labels (N,) of points that share an error, whole numbers from 0.
 
     `pose`: measured in one visit to a pose, each another target; the robot's scatter is common to them. The others share a model error:
@@ -35,7 +35,7 @@ class ErrorCells:
     command: np.ndarray | None = None
 
     @classmethod
-    def of(cls, poses: PoseSet) -> ErrorCells:
+    def of(cls, poses: PoseSet) -> ErrorGroups:
         """Rows of one pose number are a visit; those of a target that the visit already has begin another."""
         _, target = np.unique(poses.target, return_inverse=True)
         visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
@@ -50,10 +50,10 @@ class ErrorCells:
         workspace = workspace_folds(place / size[:, None], count)
         return cls(visit, workspace[visit], order_folds(len(size), count)[visit], command)
 
-    def subset(self, rows: np.ndarray) -> ErrorCells:
+    def subset(self, rows: np.ndarray) -> ErrorGroups:
         """Those of the rows with these indices, or where this mask is true."""
         blocks = {name: distinct(labels[rows]) for name, labels in self.blocks.items()}
-        return ErrorCells(distinct(self.pose[rows]), **blocks)
+        return ErrorGroups(distinct(self.pose[rows]), **blocks)
 
     @property
     def blocks(self) -> dict[str, np.ndarray]:

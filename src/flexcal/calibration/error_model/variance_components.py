@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.error_model.error_components import Scatter
-from flexcal.calibration.error_model.groups import ErrorCells
+from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
 
@@ -45,7 +45,7 @@ class LinearFit:
     waves: np.ndarray
     sigma: np.ndarray
     turns: np.ndarray
-    cells: ErrorCells
+    cells: ErrorGroups
 
     def products(self, scatter: Scatter, columns: np.ndarray) -> np.ndarray:
         """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, the last, the residual, less what the parameters explain.

@@ -1,8 +1,14 @@
 from .elastic_prior import ElasticPrior
-from .gauge_freedom import POINT_KNOWN, found_point, point_uncertainty, probable_robot, probable_robots
+from .gauge_freedom import (
+    KNOWN_POINT_STD,
+    point_uncertainty,
+    probable_robot,
+    probable_robots,
+    with_calibrated_points,
+)
 from .geometric_calibration import Calibration, calibrate
 from .least_squares_problem import LossName
-from .stratified_sample import EvenSample, all_errors
+from .stratified_sample import StratifiedSample, all_errors
 from .terms import (
     LEAST_POSES,
     PER_JOINT,
@@ -15,17 +21,16 @@ from .terms import (
 )
 
 __all__ = [
+    "KNOWN_POINT_STD",
     "LEAST_POSES",
     "PER_JOINT",
-    "POINT_KNOWN",
     "TOLERANCE",
     "Calibration",
     "ElasticPrior",
-    "EvenSample",
     "LossName",
+    "StratifiedSample",
     "all_errors",
     "calibrate",
-    "found_point",
     "free_joints",
     "geometric_parameters",
     "loaded_compliances",
@@ -34,4 +39,5 @@ __all__ = [
     "probable_robot",
     "probable_robots",
     "tolerances",
+    "with_calibrated_points",
 ]

@@ -10,15 +10,15 @@ import numpy as np
 
 from flexcal.calibration.error_model import (
     TRANSMISSION,
-    ErrorCells,
+    ErrorGroups,
     LinearFit,
     Scatter,
     are_different,
-    joint_turns,
+    joint_rotation_jacobian,
     whitened,
 )
 from flexcal.calibration.fit.elastic_prior import ElasticPrior
-from flexcal.calibration.fit.least_squares_problem import GeometryFit, PlainLoss
+from flexcal.calibration.fit.least_squares_problem import GeometryProblem, PlainLoss
 from flexcal.calibration.fit.marginalised_elasticity import marginalised
 from flexcal.calibration.fit.practical_identifiability import Undetermined, undetermined
 from flexcal.calibration.fit.structural_identifiability import (
@@ -100,9 +100,9 @@ class PointFit:
         return random_waves(self.start, self.poses, self.geometric) if TRANSMISSION in self.terms else {}
 
     @cached_property
-    def cells(self) -> ErrorCells:
+    def cells(self) -> ErrorGroups:
         """Which points share an error."""
-        return ErrorCells.of(self.poses)
+        return ErrorGroups.of(self.poses)
 
     @cached_property
     def straight(self) -> Prediction:
@@ -144,7 +144,7 @@ class PointFit:
         kept = Parameters(item for item in self.free if item.name not in names)
         if near is None:
             at = predict(self.start, self.poses, elastic=self.elastic, jacobians=True)
-            turns = joint_turns(at)
+            turns = joint_rotation_jacobian(at)
         else:
             at, turns = near.at, near.turns
             kept = Parameters(
@@ -153,7 +153,7 @@ class PointFit:
         whitening = scatter.weights(self.poses.sigma, turns)
         flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
         for _ in range(_FLANK_PASSES):
-            task = GeometryFit(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
+            task = GeometryProblem(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
             if self.marginalised and len(prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
             else:
@@ -180,7 +180,7 @@ class FittedPoints:
     model: RobotModel
     at: Prediction
     flank: np.ndarray
-    task: GeometryFit
+    task: GeometryProblem
 
     @cached_property
     def residuals(self) -> np.ndarray:
@@ -190,7 +190,7 @@ class FittedPoints:
     @cached_property
     def turns(self) -> np.ndarray:
         """How every revolute joint moves the points (N, 3, r), m/rad."""
-        return joint_turns(self.at)
+        return joint_rotation_jacobian(self.at)
 
     @cached_property
     def inliers(self) -> np.ndarray:

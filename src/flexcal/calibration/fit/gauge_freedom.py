@@ -18,9 +18,9 @@ from flexcal.calibration.measurement import predict
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
 from flexcal.model.kinematics import found_xyz, joint_limits
-from flexcal.model.robot import GEOMETRY, STATION, Posterior, RobotModel, posterior_spread, unit_of
+from flexcal.model.robot import GEOMETRY, STATION, Posterior, RobotModel, propagated_covariance_root, unit_of
 
-POINT_KNOWN = 0.002
+KNOWN_POINT_STD = 0.002
 """m, 1σ: a measured point that is known less well than this on the tool was not found at all."""
 POINT_STD = 0.010
 """m: how well a ruler has the place of a measured point, 1σ a coordinate."""
@@ -80,7 +80,7 @@ def probable_robots(model: RobotModel, targets: Sequence[str]) -> tuple[RobotMod
     return replace(found, posterior=whole), replace(found, posterior=unseen)
 
 
-def found_point(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
+def with_calibrated_points(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) -> RobotModel:
     """The `nominal` robot with the calibrated positions of the measured points `targets` of `model` in their frames."""
     values = {}
     for target in targets:
@@ -91,7 +91,7 @@ def found_point(nominal: RobotModel, model: RobotModel, targets: Sequence[str]) 
 
 def point_uncertainty(model: RobotModel, target: str) -> float:
     """1σ distance (m) to which the posterior of `model` has the place of a measured point in its frame."""
-    spread = posterior_spread(model, lambda changed: found_xyz(changed, target))
+    spread = propagated_covariance_root(model, lambda changed: found_xyz(changed, target))
     return float(np.linalg.norm(spread))
 
 

@@ -20,7 +20,7 @@ LossName = Literal["auto", "squares", "huber", "cauchy"]
 
 
 @dataclass(frozen=True, eq=False)
-class GeometryFit:
+class GeometryProblem:
     """Geometric parameters `kept` of the robot `start` to be fitted to `poses` that rest on `flank` (N, n).
 
     `prior` is what is known of stiffness and inertia beforehand; `elastic` says whether the arm deflects at all; `whitening` W (N, 3, 3) in

@@ -7,15 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.fit.least_squares_problem import GeometryFit
-from flexcal.estimation import Estimate, Parameters, Problem, known_to_a_factor_of_two, solve
+from flexcal.calibration.fit.least_squares_problem import GeometryProblem
+from flexcal.estimation import Estimate, Parameters, Problem, is_log_identified, solve
 
 _RELINEARISATIONS = 10
 _SETTLED = 1e-4
 """Step of the marginalised parameters, in standard deviations of their prior, below which they count as found."""
 
 
-def marginalised(fit: GeometryFit, *, progress: Callable[[int, float], None] | None) -> Estimate:
+def marginalised(fit: GeometryProblem, *, progress: Callable[[int, float], None] | None) -> Estimate:
     """Fit the geometry alone, then read stiffness and inertia θ off the residual r: what `fit.reestimated` finds, by another way.
 
     With S = R + J Σ Jᵀ the posterior is θ₀ + Σ Jᵀ S⁻¹ r, and geometry x and θ have the joint covariance of one Gaussian update. J is
@@ -44,7 +44,7 @@ class _Marginal:
     Σ Jᵀ S⁻¹ = spreadᵀ W; `shift` (3 N,) is how far the elasticity's step from its prior has already moved the points.
     """
 
-    fit: GeometryFit
+    fit: GeometryProblem
     kept: Parameters
     elastic: Parameters
     slopes: np.ndarray
@@ -53,7 +53,7 @@ class _Marginal:
     lost: np.ndarray
 
     @classmethod
-    def about(cls, fit: GeometryFit, kept: Parameters, elastic: Parameters) -> _Marginal:
+    def about(cls, fit: GeometryProblem, kept: Parameters, elastic: Parameters) -> _Marginal:
         at = fit.predicted(_values(kept + elastic), jacobians=True)
         slopes = fit.columns(at, elastic.names) * elastic.natural_slope(elastic.coordinates())
         values, vectors = np.linalg.eigh(fit.prior.covariance)
@@ -111,7 +111,7 @@ def _joint(at: _Marginal, geometry: Estimate) -> Estimate:
         parameters=parameters,
         covariance=covariance,
         rank=geometry.rank + len(at.elastic),
-        identifiable=geometry.identifiable + known_to_a_factor_of_two(at.elastic, own),
+        identifiable=geometry.identifiable + is_log_identified(at.elastic, own),
         chi2=float(np.sum(fit.residual(predicted) ** 2)),
         degrees_of_freedom=max(0, round(len(rows) - effective)),
     )

@@ -23,7 +23,7 @@ _PAYLOADS = 20
 
 
 @dataclass(frozen=True, eq=False)
-class EvenSample:
+class StratifiedSample:
     """`rows` (M,) of `total` that were drawn evenly over positions, stations and payloads, in measuring order.
 
     Visits to a pose are kept whole. Where positions were visited again, several visits, evenly in time, of fewer positions are kept.
@@ -33,7 +33,7 @@ class EvenSample:
     total: int
 
     @classmethod
-    def of(cls, poses: PoseSet, most: int = MOST) -> EvenSample | None:
+    def of(cls, poses: PoseSet, most: int = MOST) -> StratifiedSample | None:
         """About `most` rows, always the same ones; None where there are no more than that."""
         if len(poses) <= most:
             return None

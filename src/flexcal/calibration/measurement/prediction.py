@@ -19,7 +19,7 @@ from flexcal.model.statics import (
     lateral_slopes,
     tool_at_rest,
     twist_by_hardening,
-    twist_of,
+    twist_from_torque,
 )
 from flexcal.progress import Progress, silent
 
@@ -93,7 +93,7 @@ class Prediction:
         """How far a joint turns (N,) with its backlash, gravity compliance, hardening or one wave of its transmission error."""
         if key == "hardening":
             hardening = self.model.hardening[joint]
-            twist = twist_of(-self.rest.torque[:, joint], self.model.stiffness[joint, 2], hardening)
+            twist = twist_from_torque(-self.rest.torque[:, joint], self.model.stiffness[joint, 2], hardening)
             return twist_by_hardening(twist, hardening)
         if key == "backlash":
             return -self.rest.flank[:, joint]

@@ -10,7 +10,7 @@ from flexcal.calibration.measurement.prediction import left_jacobian
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import vector_rotation
-from flexcal.model.robot import GEOMETRY, INERTIALS, LATERAL, SPRINGS, STATION, RobotModel
+from flexcal.model.robot import GEOMETRY, LATERAL, MASS_AND_COM, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     carried_mass,
     elastic_axes,
@@ -19,7 +19,7 @@ from flexcal.model.statics import (
     spring_loads,
     tangent_ratio,
     twist_by_hardening,
-    twist_of,
+    twist_from_torque,
 )
 
 _GEOMETRIC = (*GEOMETRY, *STATION, "backlash", "gravity_compliance", *LATERAL)
@@ -69,7 +69,7 @@ class Propagation:
         by_load = at.motion_jacobian[:, :3][:, :, axes[:, 0], axes[:, 1]] / -stiffness
         if model.hardening.any():
             hardening = np.where(axes[:, 1] == 2, model.hardening[axes[:, 0]], 0.0)
-            by_load /= tangent_ratio(twist_of(loads, stiffness, hardening), hardening)[:, None]
+            by_load /= tangent_ratio(twist_from_torque(loads, stiffness, hardening), hardening)[:, None]
         by_geometry = at.geometry_jacobian[:, :3]
         by_geometry[:, :, : 6 * model.n] += np.matmul(by_load, coupling)
         twists = by_geometry[:, :, [6 * joint for joint, _ in self.twisting]] * self._twist(q, loads)[:, None]
@@ -110,7 +110,7 @@ class Propagation:
                 columns[:, k] = -torque[:, joint]
             elif kind == "hardening":
                 hardening = self.model.hardening[joint]
-                twist = twist_of(-torque[:, joint], self.model.stiffness[joint, 2], hardening)
+                twist = twist_from_torque(-torque[:, joint], self.model.stiffness[joint, 2], hardening)
                 columns[:, k] = twist_by_hardening(twist, hardening)
             elif kind in LATERAL:
                 columns[:, k] = 0.0
@@ -222,7 +222,7 @@ def _twisting(model: RobotModel, name: str) -> tuple[int, str] | None:
 
 
 def _is_elastic(name: str) -> bool:
-    return name.rpartition(".")[2] in ("stiffness", "hardening", *INERTIALS)
+    return name.rpartition(".")[2] in ("stiffness", "hardening", *MASS_AND_COM)
 
 
 def _is_geometric(name: str) -> bool:

@@ -1,10 +1,10 @@
 from .cross_validation import CrossValidation, TermSelection, cross_validated, select_terms
 from .stored_trials import considered_document, considered_terms
-from .trials import ConsideredTerm
+from .trials import TermComparison
 
 __all__ = [
-    "ConsideredTerm",
     "CrossValidation",
+    "TermComparison",
     "TermSelection",
     "considered_document",
     "considered_terms",

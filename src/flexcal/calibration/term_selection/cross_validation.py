@@ -6,10 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexcal.calibration.error_model import order_folds, single_poses, workspace_folds
+from flexcal.calibration.error_model import order_folds, repeated_pose_numbers, workspace_folds
 from flexcal.calibration.fit import LEAST_POSES, Calibration, calibrate
 from flexcal.calibration.term_selection.candidates import candidates
-from flexcal.calibration.term_selection.trials import ConsideredTerm, TermTrials, not_tried
+from flexcal.calibration.term_selection.trials import TermComparison, TermTrials, not_tried
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
 
@@ -27,7 +27,7 @@ class TermSelection:
 
     terms: tuple[str, ...]
     model: RobotModel
-    considered: tuple[ConsideredTerm, ...]
+    considered: tuple[TermComparison, ...]
     by: str
     remark: str
 
@@ -67,7 +67,7 @@ def cross_validated(fit: Calibration) -> CrossValidation | None:
 
 def _folds(poses: PoseSet) -> tuple[tuple[np.ndarray, ...], int]:
     """Folds (N,) in measuring order, in the workspace, and of single poses, and how many of these there are."""
-    alone = single_poses(poses.q)
+    alone = repeated_pose_numbers(poses.q)
     folds = (order_folds(len(poses), FOLDS), workspace_folds(poses.position, FOLDS), alone)
     return folds, len(np.unique(alone))
 
@@ -93,7 +93,7 @@ def select_terms(model: RobotModel, poses: PoseSet) -> TermSelection:
     rigid = calibrate(model, poses, terms=base, elastic=bool(model.elastic))
     trials = TermTrials(rigid, open_terms.model, base, folds, many=distinct >= MANY_POSES)
     chosen, rows = base, [trials.start()]
-    left: dict[str, ConsideredTerm] = {}
+    left: dict[str, TermComparison] = {}
 
     def grow(options: list[str], extra: float) -> list[str]:
         """Add the best of the supported options until there is none; those that remain."""

@@ -12,7 +12,7 @@ _REACH = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
-class LeftOut:
+class LeaveOutErrors:
     """A linear fit of p columns to the residuals of N points.
 
     `distances` has, for each kind of fold, the distance (N,) m between points and their prediction from the other folds; `squares` (m²) is
@@ -37,7 +37,7 @@ def left_out(
     penalty: Sequence[float],
     residuals: np.ndarray,
     folds: Sequence[np.ndarray],
-) -> LeftOut:
+) -> LeaveOutErrors:
     """Fit blocks of `columns` (N, 3, k) to `residuals` (N, 3) m, and predict every fold of each kind (N,) from the others.
 
     With the hat matrix H of the fit to all points and r what it leaves, fold g is off by (1 - H_gg)⁻¹ r_g when it is left out
@@ -58,7 +58,7 @@ def left_out(
     left = residuals.ravel() - seen @ (seen.T @ residuals.ravel())
     q, r = seen.reshape(len(residuals), 3, -1), left.reshape(-1, 3)
     distances = tuple(_distances(q, r, fold) for fold in folds)
-    return LeftOut(distances, float(left @ residuals.ravel()), float((seen**2).sum()))
+    return LeaveOutErrors(distances, float(left @ residuals.ravel()), float((seen**2).sum()))
 
 
 def _scale(block: np.ndarray) -> np.ndarray:

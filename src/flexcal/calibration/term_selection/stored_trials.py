@@ -6,11 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from flexcal.calibration.term_selection.trials import ConsideredTerm
+from flexcal.calibration.term_selection.trials import TermComparison
 from flexcal.units import MILLIMETRE
 
 
-def considered_document(row: ConsideredTerm) -> dict[str, Any]:
+def considered_document(row: TermComparison) -> dict[str, Any]:
     """A term that was considered, as results.json has it; null for what was not computed."""
     return {
         "term": row.term,
@@ -25,16 +25,16 @@ def considered_document(row: ConsideredTerm) -> dict[str, Any]:
     }
 
 
-def considered_terms(results: Mapping[str, Any]) -> tuple[ConsideredTerm, ...]:
+def considered_terms(results: Mapping[str, Any]) -> tuple[TermComparison, ...]:
     """What the selection of terms considered, as results.json has it; empty where the terms were given, or the poses too few."""
     return tuple(_considered(row) for row in results["term_selection"])
 
 
-def _considered(row: Mapping[str, Any]) -> ConsideredTerm:
+def _considered(row: Mapping[str, Any]) -> TermComparison:
     order, workspace, single, largest = (
         _number(row[f"{key}_mm"]) * MILLIMETRE for key in ("order", "workspace", "single", "largest")
     )
-    return ConsideredTerm(
+    return TermComparison(
         row["term"],
         tuple(row["terms"]),
         order,

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.fit import Calibration, geometric_parameters
 from flexcal.calibration.measurement import Prediction, predict
-from flexcal.calibration.term_selection.leave_out_errors import LeftOut, left_out
+from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, left_out
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
@@ -25,7 +25,7 @@ _OUT = ("left out in measuring order", "left out in the workspace", "left out on
 
 
 @dataclass(frozen=True)
-class ConsideredTerm:
+class TermComparison:
     """A term that was considered; `term` is None for the base terms, with which all are compared.
 
     `terms` are those fitted, it among them; `order`, `workspace` the mean errors (m) with folds contiguous in measuring order and in the
@@ -44,13 +44,13 @@ class ConsideredTerm:
     reason: str
 
 
-def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> ConsideredTerm:
+def not_tried(term: str, chosen: tuple[str, ...], reason: str) -> TermComparison:
     """The row of a term that cannot be considered."""
     nan = float("nan")
-    return ConsideredTerm(term, (*chosen, term), nan, nan, nan, nan, nan, False, reason)
+    return TermComparison(term, (*chosen, term), nan, nan, nan, nan, nan, False, reason)
 
 
-def _change(old: LeftOut, new: LeftOut, kinds: Sequence[int]) -> str:
+def _change(old: LeaveOutErrors, new: LeaveOutErrors, kinds: Sequence[int]) -> str:
     return f"{old.mean(kinds) / MILLIMETRE:.4f} to {new.mean(kinds) / MILLIMETRE:.4f} mm"
 
 
@@ -75,14 +75,14 @@ class TermTrials:
         self.folds = folds
         self.deciding = (0, 1) if many else (2,)
         self._columns: dict[str, np.ndarray] = {}
-        self._fits: dict[tuple[str, ...], LeftOut] = {}
+        self._fits: dict[tuple[str, ...], LeaveOutErrors] = {}
         self._base = base
 
-    def start(self) -> ConsideredTerm:
+    def start(self) -> TermComparison:
         """The row of the base terms."""
         return self._row(None, self._base, 0.0, taken=True, reason="")
 
-    def compare(self, chosen: tuple[str, ...], term: str, extra: float) -> ConsideredTerm:
+    def compare(self, chosen: tuple[str, ...], term: str, extra: float) -> TermComparison:
         """Whether a term is taken beside those chosen; `extra` is what the criterion must fall by beyond 0."""
         terms = (*chosen, term)
         old, new = self.fit(chosen), self.fit(terms)
@@ -109,7 +109,7 @@ class TermTrials:
             reason = f"lowers the mean error at left-out poses from {change} and the BIC by {-bic:.0f}"
         return self._row(term, terms, bic, taken=taken, reason=reason)
 
-    def fit(self, terms: tuple[str, ...]) -> LeftOut:
+    def fit(self, terms: tuple[str, ...]) -> LeaveOutErrors:
         """The fit of some terms, with springs and inertia where the base fit has them."""
         if terms not in self._fits:
             blocks = [self._block(term) for term in terms] + [self._held]
@@ -123,18 +123,18 @@ class TermTrials:
 
     def _row(
         self, term: str | None, terms: tuple[str, ...], bic: float, *, taken: bool, reason: str
-    ) -> ConsideredTerm:
+    ) -> TermComparison:
         fit = self.fit(terms)
         order, workspace, single = (float(d.mean()) for d in fit.distances)
         largest = fit.largest(self.deciding)
-        return ConsideredTerm(term, terms, order, workspace, single, largest, bic, taken, reason)
+        return TermComparison(term, terms, order, workspace, single, largest, bic, taken, reason)
 
-    def _criterion(self, old: LeftOut, new: LeftOut) -> float:
+    def _criterion(self, old: LeaveOutErrors, new: LeaveOutErrors) -> float:
         """Change of the Bayesian information criterion of the coordinates that the base terms leave free (Schwarz 1978)."""
         free = max(self.rigid.residuals.size - self.fit(self._base).freedom, 1.0)
         return free * np.log(new.squares / old.squares) + (new.freedom - old.freedom) * np.log(free)
 
-    def _gain(self, old: LeftOut, new: LeftOut, kind: int) -> tuple[float, float]:
+    def _gain(self, old: LeaveOutErrors, new: LeaveOutErrors, kind: int) -> tuple[float, float]:
         """Mean gain (m) over the folds of a kind, which are the independent units, and its standard error."""
         fold, gain = self.folds[kind], old.distances[kind] - new.distances[kind]
         gains = np.array([gain[fold == k].mean() for k in np.unique(fold)])

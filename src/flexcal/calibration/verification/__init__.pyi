@@ -1,9 +1,15 @@
 from .arm_poses import ArmPoses, arms_at
-from .best_fit_registration import Placement, best_placement, enough_for_points, registrable, rigid_placement
+from .best_fit_registration import (
+    Placement,
+    best_placement,
+    can_register,
+    can_register_with_points,
+    rigid_placement,
+)
 from .error_scale_test import ErrorScale, error_scale, prediction_document
 from .errors_by_model import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints, errors_before
-from .refitted_placement import Refit, Refitted, refitted
-from .uncalibrated_robot import ErrorsBefore, RobotBefore, robot_before
+from .refitted_placement import Refit, RefittedVerification, refitted
+from .uncalibrated_robot import UncalibratedErrors, UncalibratedRobot, uncalibrated_model
 from .unseen_poses import ErrorCovariance, Verification, verify, verify_jointly
 
 __all__ = [
@@ -15,23 +21,23 @@ __all__ = [
     "ArmPoses",
     "ErrorCovariance",
     "ErrorScale",
-    "ErrorsBefore",
     "MeasuredPoints",
     "Placement",
     "Refit",
-    "Refitted",
-    "RobotBefore",
+    "RefittedVerification",
+    "UncalibratedErrors",
+    "UncalibratedRobot",
     "Verification",
     "arms_at",
     "best_placement",
-    "enough_for_points",
+    "can_register",
+    "can_register_with_points",
     "error_scale",
     "errors_before",
     "prediction_document",
     "refitted",
-    "registrable",
     "rigid_placement",
-    "robot_before",
+    "uncalibrated_model",
     "verify",
     "verify_jointly",
 ]

@@ -42,7 +42,7 @@ _MOST_ARROWS = 1500
 def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray]) -> ArmPoses:
     """The arm of `model` at the points, with `errors` (N, 3) m of the instrument's frame; of many arms and arrows some, evenly chosen."""
     rows = _evenly(len(poses), _MOST_ARROWS)
-    corners = skeletons(model, poses.subset(rows))
+    corners = joint_polylines(model, poses.subset(rows))
     turned = {name: in_base(model, poses, vectors)[rows] for name, vectors in errors.items()}
     surface = LinkSurface.of(model)
     drawn = surface.at(model, poses.q[rows[_evenly(len(rows), _EXAMPLES)]]).astype(np.float32)
@@ -50,7 +50,7 @@ def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray])
     return ArmPoses(arms, drawn, surface.triangles, poses.pose[rows], corners[:, -1], turned)
 
 
-def skeletons(model: RobotModel, poses: PoseSet) -> np.ndarray:
+def joint_polylines(model: RobotModel, poses: PoseSet) -> np.ndarray:
     """Corners (N, joints + 2, 3) m of the arm from the base through every joint to the measured point, base frame, undeflected."""
     chain: list[int] = []
     joint = model.point(str(poses.target[0])).joint

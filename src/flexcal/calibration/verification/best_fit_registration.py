@@ -110,12 +110,12 @@ def _linearised(found: Placement, poses: PoseSet, nominal: np.ndarray, orientati
     return columns.reshape(-1, columns.shape[2])
 
 
-def enough_for_points(poses: PoseSet) -> bool:
+def can_register_with_points(poses: PoseSet) -> bool:
     """Whether there are three coordinates for each parameter of `best_placement`, repeated visits apart."""
     return _distinct(poses) >= 6 * len(poses.stations) + 3 * len(poses.targets)
 
 
-def registrable(poses: PoseSet) -> bool:
+def can_register(poses: PoseSet) -> bool:
     """Whether every station has the four points off a line that a registration with something left to say needs, repeated visits apart."""
     for station in poses.stations:
         own = poses.subset(poses.station == station)

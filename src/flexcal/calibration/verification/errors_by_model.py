@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.verification.uncalibrated_robot import ErrorsBefore
+from flexcal.calibration.verification.uncalibrated_robot import UncalibratedErrors
 from flexcal.calibration.verification.unseen_poses import Verification
 from flexcal.data.poses import PoseSet
 
@@ -68,6 +68,6 @@ class MeasuredPoints:
         return ErrorStatistics.of(self.errors[model])
 
 
-def errors_before(before: ErrorsBefore) -> dict[str, np.ndarray]:
+def errors_before(before: UncalibratedErrors) -> dict[str, np.ndarray]:
     """The errors of an uncalibrated robot by the names that they have among `MeasuredPoints.errors`."""
     return {NOMINAL if name == "registered" else name: errors for name, errors in before.known.items()}

@@ -24,7 +24,7 @@ _SMALL = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class Refitted:
+class RefittedVerification:
     """Verification with the placement of the instrument (`station`), the measured points (`point`), or both fitted to its own poses.
 
     `result` has errors by leave-one-out: each pose against the placement that the other poses give, so that they are honest for all poses.
@@ -39,7 +39,7 @@ class Refitted:
     covariance: ErrorCovariance
 
 
-def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitted:
+def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RefittedVerification:
     """Verify `model` at `poses` with stations or points fitted again and everything else as calibrated.
 
     Linear least squares leaves one pose out by its hat matrix H: e_i = (I - H_ii)⁻¹ r_i. Raises `FlexcalError` where the poses are too
@@ -83,7 +83,7 @@ def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> Refitt
         ambiguous=standing.ambiguous,
     )
     found = replace(covariance, roots=roots, independent=independent, visit=None, common=None)
-    return Refitted(tuple(what), placed, basis.shape[1], result, found)
+    return RefittedVerification(tuple(what), placed, basis.shape[1], result, found)
 
 
 _WORDS = {"station": "the instrument", "point": "the measured point"}

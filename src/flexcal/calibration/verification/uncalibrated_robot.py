@@ -17,8 +17,8 @@ from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.measurement import predict, predicted_positions
 from flexcal.calibration.verification.best_fit_registration import (
     best_placement,
-    enough_for_points,
-    registrable,
+    can_register,
+    can_register_with_points,
     rigid_placement,
 )
 from flexcal.data.poses import PoseSet
@@ -30,7 +30,7 @@ DECLARED_WITHIN = 0.05
 
 
 @dataclass(frozen=True, eq=False)
-class RobotBefore:
+class UncalibratedRobot:
     """Uncalibrated robot as declared, best-fit registered, and with the measured points fitted too.
 
     `declared`: the instrument measures in the base frame, or stands, axes parallel to the base's, where robot.yaml says; None where the
@@ -42,18 +42,18 @@ class RobotBefore:
     registered: RobotModel | None
     own: RobotModel | None
 
-    def errors(self, poses: PoseSet) -> ErrorsBefore:
+    def errors(self, poses: PoseSet) -> UncalibratedErrors:
         """Errors at `poses`, whose stations and targets are those that were placed."""
         found = (
             None if robot is None else poses.position - predicted_positions(robot, poses, elastic=False)
             for robot in (self.declared, self.registered, self.own)
         )
-        return ErrorsBefore(*found)
+        return UncalibratedErrors(*found)
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorsBefore:
-    """Error vectors (N, 3) m, measured minus predicted, of an uncalibrated robot placed as in `RobotBefore`; None where it is not."""
+class UncalibratedErrors:
+    """Error vectors (N, 3) m, measured minus predicted, of an uncalibrated robot placed as in `UncalibratedRobot`; None where it is not."""
 
     declared: np.ndarray | None
     registered: np.ndarray | None
@@ -79,7 +79,7 @@ class ErrorsBefore:
         }
 
 
-def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
+def uncalibrated_model(model: RobotModel, poses: PoseSet) -> UncalibratedRobot:
     """Place the instrument, and the measured points, of the nominal, rigid robot `model` by the measured points of `poses`.
 
     Kabsch (1976) for the registration; Gauss-Newton on the 6 parameters of every station and 3 of every measured point for the robot's own
@@ -89,15 +89,15 @@ def robot_before(model: RobotModel, poses: PoseSet) -> RobotBefore:
         model.station_index(station)
     at_base = replace(model, station=np.zeros_like(model.station))
     declared = _declared(at_base, poses)
-    if not registrable(poses):
-        return RobotBefore(declared, None, None)
+    if not can_register(poses):
+        return UncalibratedRobot(declared, None, None)
     position, orientation = _tools(at_base, poses)
     registered = at_base.with_values(rigid_placement(poses, position).values(at_base))
     own = None
-    if enough_for_points(poses):
+    if can_register_with_points(poses):
         found = best_placement(poses, position, orientation)
         own = at_base.with_values(found.values(at_base))
-    return RobotBefore(declared, registered, own)
+    return UncalibratedRobot(declared, registered, own)
 
 
 def _tools(model: RobotModel, poses: PoseSet) -> tuple[np.ndarray, np.ndarray]:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.error_model import (
-    ErrorCells,
+    ErrorGroups,
     ErrorStatistics,
     Scatter,
     block_columns,
-    joint_turns,
+    joint_rotation_jacobian,
     known_scatter,
 )
 from flexcal.calibration.measurement import (
@@ -81,7 +81,7 @@ class ErrorCovariance:
         own = np.zeros((size, 3, 3)) if self.independent is None else self.independent[rows]
         if self.visit is None or self.common is None:
             return roots, own
-        visits = ErrorCells(self.visit).subset(rows)
+        visits = ErrorGroups(self.visit).subset(rows)
         common = visits.gathered(self.common[rows])
         together = common @ np.swapaxes(common, 1, 2)
         places = together.shape[1] // 3
@@ -110,11 +110,11 @@ def verify_jointly(
     at = predict(model, poses, elastic=elastic, jacobians=True)
     used = moving_parameters(model, elastic=elastic)
     roots = at.jacobian(used) @ covariance_root(model, used)
-    cells = ErrorCells.of(poses)
+    cells = ErrorGroups.of(poses)
     shared = _shared_errors(model, cells)
     scatter = None if noise_free else known_scatter(model, stated=poses.sigma_given)
     independent = None if scatter is None else _independent(model, scatter, at, poses)
-    common = scatter.common(joint_turns(at)) if scatter is not None and cells.several else None
+    common = scatter.common(joint_rotation_jacobian(at)) if scatter is not None and cells.several else None
     squares = (shared**2).sum(axis=(1, 2))
     if independent is not None:
         squares = squares + np.trace(independent, axis1=1, axis2=2)
@@ -143,7 +143,7 @@ def _freedom(model: RobotModel, at: Prediction, poses: PoseSet, predicted: float
         "scatter.robot": rows,
         "scatter.model": rows,
         "scatter.instrument_share": float(np.sum(poses.sigma**2)) if poses.sigma_given else 0.0,
-        "scatter.angular": float(np.sum(joint_turns(at) ** 2)),
+        "scatter.angular": float(np.sum(joint_rotation_jacobian(at) ** 2)),
     }
     seen = [name for name in weights if known.determines(name)]
     spread = [2 * model.value(n) * weights[n] * float(np.sqrt(known.marginal([n])[0, 0])) for n in seen]
@@ -151,7 +151,7 @@ def _freedom(model: RobotModel, at: Prediction, poses: PoseSet, predicted: float
     return 2 * predicted**2 / variance if variance > 0 else np.inf
 
 
-def _shared_errors(model: RobotModel, cells: ErrorCells) -> np.ndarray:
+def _shared_errors(model: RobotModel, cells: ErrorGroups) -> np.ndarray:
     """Columns (N, 3, k) m of the model error, common to the poses of a cell of the workspace."""
     return model.value("scatter.model") * block_columns(
         cells.pose if cells.workspace is None else cells.workspace
@@ -163,4 +163,4 @@ def _independent(model: RobotModel, scatter: Scatter, at: Prediction, poses: Pos
     sigma = (
         poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))
     )
-    return scatter.independent(sigma, joint_turns(at))
+    return scatter.independent(sigma, joint_rotation_jacobian(at))

@@ -10,7 +10,7 @@ from pathlib import Path
 _GIVEN: ContextVar[str] = ContextVar("command_line", default="")
 
 
-def keep_command_line(arguments: Sequence[str]) -> None:
+def record_command_line(arguments: Sequence[str]) -> None:
     """Note the arguments after `flexcal`."""
     _GIVEN.set(shlex.join(["flexcal", *(_from_here(text) for text in arguments)]))
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 from tyro.conf import arg
 
 if TYPE_CHECKING:
-    from flexcal.report.results import Particulars
+    from flexcal.report.results import MeasurementDetails
 
 _BLANK = arg(metavar="TEXT", help_behavior_hint="(default: a line to fill in)")
 
@@ -29,11 +29,11 @@ class ParticularsOptions:
     """Date of the measurement."""
 
     @property
-    def particulars(self) -> Particulars:
+    def particulars(self) -> MeasurementDetails:
         """As the sheets take them."""
-        from flexcal.report.results import Particulars
+        from flexcal.report.results import MeasurementDetails
 
-        return Particulars(
+        return MeasurementDetails(
             robot_serial=self.robot_serial,
             instrument=self.instrument,
             instrument_serial=self.instrument_serial,

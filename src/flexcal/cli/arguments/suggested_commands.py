@@ -24,12 +24,12 @@ def measuring(plan: Path, robot: Path, folder: str) -> str:
     return f"flexcal measure {plan}{named} --cell virtual --out {folder}"
 
 
-def on_the_robot(robot: Path, poses: str) -> str:
+def import_command(robot: Path, poses: str) -> str:
     """The other way to measure poses, where the robot is a real one."""
     return f"; or measure them on the robot, and flexcal import {robot} FILE --out {poses}"
 
 
-def with_estimates(place: Path | None) -> str:
+def estimates_option(place: Path | None) -> str:
     """The option by which another verb finds estimates that are not beside robot.yaml; empty where they are."""
     return "" if place is None else f" --estimates {place}"
 
@@ -44,7 +44,7 @@ def after_dynamics(robot: Path, model: RobotModel, loaded: str) -> str:
     return f"{loaded}; or, where the declared payload is weighed, {onward}"
 
 
-def reading_elsewhere(robot: Path, estimates: Path) -> str:
+def estimates_entry_hint(robot: Path, estimates: Path) -> str:
     """How other verbs find estimates that are not beside robot.yaml."""
     entry = f"'estimates: {relpath(estimates, robot.parent)}'"
     line = next((i for i, text in enumerate(_lines(robot), start=1) if text.startswith("estimates:")), None)

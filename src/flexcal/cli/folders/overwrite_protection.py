@@ -153,7 +153,7 @@ def _digest_on_disk(path: Path) -> str:
         ) from problem
 
 
-def settle_inputs(parsed: Any) -> None:
+def complete_interrupted_runs(parsed: Any) -> None:
     """Finish what a run that was cut off has left in the folders of all paths among the arguments, so that files of one run are read there.
 
     Raises `InputError` where that is not possible.

@@ -23,7 +23,7 @@ def error_table(title: str, rows: Mapping[str, Mapping[str, Any]]) -> Table:
     return table
 
 
-def before_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
+def uncalibrated_rows(document: Mapping[str, Any]) -> dict[str, Mapping[str, Any]]:
     """The three blocks `before` of a document as rows of `error_table`, dashes where one is not known."""
     labels = {
         "declared": "before, as declared",

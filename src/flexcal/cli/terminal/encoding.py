@@ -11,7 +11,7 @@ _NEAR = {"…": "...", "·": "*", "–": "-", "−": "-", "σ": "sigma", "χ": "
 _NEAR |= dict.fromkeys("─━═╌╍", "-") | dict.fromkeys("│┃║", "|")
 
 
-def show_near_letters() -> None:
+def substitute_unencodable() -> None:
     """Let standard output and error show near letters where their encoding lacks one."""
     codecs.register_error("flexcal.near", _near)
     for stream in (sys.stdout, sys.stderr):

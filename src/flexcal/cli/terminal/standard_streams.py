@@ -12,7 +12,7 @@ from typing import TextIO
 from flexcal.errors import FlexcalError
 
 
-def provide_streams() -> None:
+def replace_closed_streams() -> None:
     """Let what goes to a closed standard stream be lost, rather than end up in the next file that is opened."""
     for handle in range(3):
         try:
@@ -26,7 +26,7 @@ def provide_streams() -> None:
 
 
 @contextmanager
-def held_output() -> Iterator[None]:
+def buffered_output() -> Iterator[None]:
     """Standard output appears when the block ends, also by an exception: results are shown once their files are in place.
 
     Messages that standard error does not take are lost. Raises `FlexcalError` where standard output cannot be written; that its reader has

@@ -16,7 +16,7 @@ _IMPATIENT = 0.5
 
 
 @dataclass
-class Stopping:
+class StopSignal:
     """The signal that came, None before."""
 
     number: int | None = None
@@ -44,9 +44,9 @@ class Stopping:
 
 
 @contextmanager
-def stoppable() -> Iterator[Stopping]:
+def raise_on_stop_signals() -> Iterator[StopSignal]:
     """Within the block, these signals raise `KeyboardInterrupt`, but those that were ignored from the start (nohup) stay so."""
-    stopping = Stopping()
+    stopping = StopSignal()
     before: dict[int, object] = {}
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):

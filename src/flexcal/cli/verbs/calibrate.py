@@ -19,7 +19,7 @@ from flexcal.cli.arguments.shared_options import (
     require_files,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import with_estimates
+from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 from flexcal.files.transaction import current, write_text
 from flexcal.units import MILLIMETRE
@@ -78,9 +78,9 @@ class Calibrate:
 
     def run(self) -> None:
         """Calibrate, and print identifiability, errors and remarks."""
-        from flexcal.calibration.diagnostics import hardly_fits
-        from flexcal.calibration.fit import POINT_KNOWN
-        from flexcal.cli.tables.results import before_rows, dropped_table, error_table, weak_table
+        from flexcal.calibration.diagnostics import is_implausible
+        from flexcal.calibration.fit import KNOWN_POINT_STD
+        from flexcal.cli.tables.results import dropped_table, error_table, uncalibrated_rows, weak_table
         from flexcal.cli.verbs.calibrate import considered_lines
 
         require_robot(self.robot, *self.poses)
@@ -89,8 +89,8 @@ class Calibrate:
         console = Console(self.json)
         with console.progress() as progress:
             found = self._calibrated(self.terms, progress)
-            known = all(point["std_m"] <= POINT_KNOWN for point in found.found_points.values())
-            write = self.write_point and known and not hardly_fits(found.selected)
+            known = all(point["std_m"] <= KNOWN_POINT_STD for point in found.found_points.values())
+            write = self.write_point and known and not is_implausible(found.selected)
             if write:
                 told = point_lines(found.found_points)
                 found = self._with_points_written(found, progress)
@@ -111,7 +111,7 @@ class Calibrate:
         errors = document["calibration"]
         terms = ("elastic, " if found.selected.model.elastic else "") + " + ".join(found.selected.terms)
         labels = {"rigid": "rigid", "selected": f"selected: {terms}"}
-        rows = before_rows(document) | {label: errors[key] for key, label in labels.items()}
+        rows = uncalibrated_rows(document) | {label: errors[key] for key, label in labels.items()}
         console.show(error_table("distance to the measured points", rows))
         for remark in document["remarks"]:
             console.say(remark)
@@ -119,18 +119,18 @@ class Calibrate:
             for line in told:
                 console.say(f"{line}: written to {self.robot}, and calibrated with it")
         else:
-            known = all(point["std_m"] <= POINT_KNOWN for point in document["points"].values())
+            known = all(point["std_m"] <= KNOWN_POINT_STD for point in document["points"].values())
             for line in point_lines(document["points"]):
                 console.say(f"{line}; --write-point writes it to {self.robot}" if known else line)
         console.say(found.trust.sentence)
-        where = with_estimates(self.out)
+        where = estimates_option(self.out)
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
         following = (
             f"correct the data or {self.robot}, and calibrate again; "
             f"flexcal import {self.robot} {self.poses[0]} looks for the error"
-            if hardly_fits(found.selected)
+            if is_implausible(found.selected)
             else f"flexcal verify {self.robot} OTHER_POSES…{where}, on poses outside this fit "
             "(flexcal design poses --random plans some)"
         )
@@ -155,12 +155,12 @@ class Calibrate:
 
     def _with_points_written(self, found: RobotCalibration, progress: Progress) -> RobotCalibration:
         """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
-        from flexcal.jobs.setup import write_point_place
+        from flexcal.jobs.setup import write_point_position
 
         text = current(self.robot).read_text(encoding="utf-8")
         try:
             for name, point in found.found_points.items():
-                write_point_place(self.robot, name, point["found_xyz_m"])
+                write_point_position(self.robot, name, point["found_xyz_m"])
             return self._calibrated(found.selected.terms, progress)
         except BaseException:
             write_text(self.robot, text)
@@ -171,7 +171,7 @@ _FOUND_BESIDE = 5e-4
 """m: distance of a point from its declared position above which it is reported."""
 
 
-def unknown_place(name: str, std: float) -> str:
+def undetermined_point_remark(name: str, std: float) -> str:
     """A sentence on a measured point whose position on the tool the calibration does not determine."""
     return (
         f"these poses do not determine the position of the point {name} on the tool (± {std / MILLIMETRE:.2g} mm): its orientation hardly "
@@ -181,13 +181,13 @@ def unknown_place(name: str, std: float) -> str:
 
 def point_lines(points: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """A line for each point whose calibrated position differs from the declared one; `points` as in the document."""
-    from flexcal.calibration.fit import POINT_KNOWN
+    from flexcal.calibration.fit import KNOWN_POINT_STD
 
     lines = []
     for name, point in points.items():
         off = math.dist(point["found_xyz_m"], point["declared_xyz_m"])
-        if point["std_m"] > POINT_KNOWN:
-            lines.append(unknown_place(name, point["std_m"]))
+        if point["std_m"] > KNOWN_POINT_STD:
+            lines.append(undetermined_point_remark(name, point["std_m"]))
         elif off > _FOUND_BESIDE:
             found, declared = (
                 ", ".join(f"{v:.5f}" for v in point[key]) for key in ("found_xyz_m", "declared_xyz_m")

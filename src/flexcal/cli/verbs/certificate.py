@@ -37,7 +37,7 @@ class Certificate(ParticularsOptions):
 
     def run(self) -> None:
         """Compare, and print the accuracy before and after."""
-        from flexcal.cli.tables.results import before_rows, error_table
+        from flexcal.cli.tables.results import error_table, uncalibrated_rows
         from flexcal.jobs.accuracy import certify_robot
 
         require_robot(self.robot, self.targets, self.before, self.after)
@@ -59,7 +59,7 @@ class Certificate(ParticularsOptions):
             "after": "after, in the calibrated frame",
             "after_refitted": "after, best-fit registered, point found too",
         }
-        rows = before_rows(document) | {label: document[key]["ap"] for key, label in labels.items()}
+        rows = uncalibrated_rows(document) | {label: document[key]["ap"] for key, label in labels.items()}
         console.show(error_table("pose accuracy AP: distance to the target", rows))
         for key in ("before", "after"):
             if (repeated := document[key]["rp"]) is not None:

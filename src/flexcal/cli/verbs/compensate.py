@@ -10,9 +10,9 @@ from typing import Annotated, Any
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Numbers, Robot, require_robot
-from flexcal.cli.arguments.suggested_commands import with_estimates
+from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
-from flexcal.cli.verbs.calibrate import unknown_place
+from flexcal.cli.verbs.calibrate import undetermined_point_remark
 from flexcal.units import MILLIMETRE
 
 _LISTED = 10
@@ -93,7 +93,7 @@ class Compensate:
                 "configuration: from_other_postures in --json"
             )
         for name, std in document["points_not_found_m"].items():
-            console.say(unknown_place(name, std))
+            console.say(undetermined_point_remark(name, std))
         for name, point in document["points"].items():
             console.say(_point_words(name, point))
         before = document["error_before_mm"]
@@ -114,7 +114,7 @@ class Compensate:
         console.say(
             f"wrote {self.out}: commands for {document['compensated']} of {document['targets']} targets"
         )
-        where = with_estimates(self.estimates)
+        where = estimates_option(self.estimates)
         console.finish(
             document,
             f"run {self.out} on the robot, measure it, and flexcal verify {self.robot} MEASURED.csv{where}; with the nominal commands "

@@ -19,7 +19,7 @@ from flexcal.cli.arguments.shared_options import (
     require_files,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import after_dynamics, with_estimates
+from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_option
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
@@ -86,7 +86,7 @@ class IdentifyDynamics:
             quantity_table,
         )
         from flexcal.jobs.dynamics import identify_robot_dynamics
-        from flexcal.jobs.logs import signal_sentences
+        from flexcal.jobs.logs import preprocessing_remarks
         from flexcal.report.checks import check_external, check_fit, check_weight_shares
 
         require_robot(self.robot, *self.logs)
@@ -123,7 +123,7 @@ class IdentifyDynamics:
             f"{document['rank']} of {found.train.base.rank} base parameters from {document['equations']} equations; "
             f"{document['masked_rows']} rows at standstill left out"
         )
-        for sentence in signal_sentences(document["signals"]):
+        for sentence in preprocessing_remarks(document["signals"]):
             console.say(sentence)
         if document["friction_tried"]:
             console.show(friction_table(document["friction_tried"]))
@@ -167,7 +167,7 @@ class IdentifyDynamics:
     def _next(self, found: RobotDynamics) -> str:
         """Payload and frequency responses for an elastic robot; else validation, the payload where one is declared, and then a URDF if the
         inertials are physically consistent."""
-        where = with_estimates(self.out)
+        where = estimates_option(self.out)
         model = found.train.observation.model
         payload = (
             f"record logs with the payload and flexcal identify payload {self.robot} LOADED.parquet{where}"

@@ -47,7 +47,7 @@ class IdentifyGains:
         """Fit, and print the gains."""
         from flexcal.cli.tables.results import drive_gain_table
         from flexcal.jobs.dynamics import identify_gains
-        from flexcal.jobs.logs import signal_sentences
+        from flexcal.jobs.logs import preprocessing_remarks
 
         require_robot(self.robot, *self.logs)
         require_files(self.logs, "LOGS")
@@ -59,7 +59,7 @@ class IdentifyGains:
             )
         document = found.document()
         console.show(drive_gain_table(document["parameters"], document["declared_gains"]))
-        for sentence in signal_sentences(document["signals"]):
+        for sentence in preprocessing_remarks(document["signals"]):
             console.say(sentence)
         console.say(f"signals: {{tau: {{gain: [{', '.join(f'{gain:.5g}' for gain in found.gains)}]}}}}")
         console.say(found.trust.sentence)

@@ -10,7 +10,7 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, MaybePath, Robot, require_robot
-from flexcal.cli.arguments.suggested_commands import after_dynamics, reading_elsewhere
+from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_entry_hint
 from flexcal.cli.terminal.console import Console
 
 
@@ -52,6 +52,6 @@ class IdentifyInertials:
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-            console.say(reading_elsewhere(self.robot, found.estimates))
+            console.say(estimates_entry_hint(self.robot, found.estimates))
         loaded = f"flexcal design trajectory {self.robot} --loaded --out holding.yaml, for the payload"
         console.finish(document, after_dynamics(self.robot, found.nominal, loaded))

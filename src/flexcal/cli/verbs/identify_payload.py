@@ -18,7 +18,7 @@ from flexcal.cli.arguments.shared_options import (
     require_files,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import reading_elsewhere, with_estimates
+from flexcal.cli.arguments.suggested_commands import estimates_entry_hint, estimates_option
 from flexcal.cli.terminal.console import Console
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class IdentifyPayload:
     def run(self) -> None:
         """Fit, and print the payload."""
         from flexcal.cli.tables.results import quantity_table
-        from flexcal.jobs.logs import signal_sentences
+        from flexcal.jobs.logs import preprocessing_remarks
         from flexcal.jobs.payload import identify_robot_payload
 
         require_robot(self.robot, *self.logs)
@@ -94,7 +94,7 @@ class IdentifyPayload:
         title = f"payload in the frame {found.frame}, inertia about its centre of mass"
         console.show(quantity_table(title, document["parameters"], units))
         console.say(f"relative torque error: {document['error_percent']['train']:.2f} %")
-        for sentence in signal_sentences(document["signals"]):
+        for sentence in preprocessing_remarks(document["signals"]):
             console.say(sentence)
         for remark in document["remarks"]:
             console.say(remark)
@@ -103,11 +103,11 @@ class IdentifyPayload:
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-            console.say(reading_elsewhere(self.robot, found.estimates))
+            console.say(estimates_entry_hint(self.robot, found.estimates))
         console.finish(document, self._next(found))
 
     def _next(self, found: RobotPayload) -> str:
-        where = with_estimates(self.out or self.estimates)
+        where = estimates_option(self.out or self.estimates)
         if "calibration" in found.blocks:
             return f"flexcal compensate {self.robot} targets.csv{where} --out commands.csv"
         if found.declared.elastic and "stiffness" not in found.blocks:

@@ -17,7 +17,7 @@ from flexcal.cli.arguments.shared_options import (
     require_files,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import reading_elsewhere
+from flexcal.cli.arguments.suggested_commands import estimates_entry_hint
 from flexcal.cli.terminal.console import Console
 
 _CHECK = "check that responses, payload and poses are of this robot, and the start values under `elastic:`"
@@ -105,5 +105,5 @@ class IdentifyStiffness:
         console.say(f"wrote {found.estimates}")
         if self.out is not None:
             console.say(f"wrote {self.out / 'report.html'}")
-            console.say(reading_elsewhere(self.robot, found.estimates))
+            console.say(estimates_entry_hint(self.robot, found.estimates))
         console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

@@ -73,7 +73,7 @@ class Import:
     def run(self) -> None:
         """Import, and show how the columns were read."""
         from flexcal.cli.tables.imported_columns import first_rows_table
-        from flexcal.importing.columns import reasons_of
+        from flexcal.importing.columns import reasons_unused
         from flexcal.jobs.setup import import_file
 
         require_robot(self.robot, self.file)
@@ -89,7 +89,7 @@ class Import:
             unchecked=self.unchecked,
         )
         console.show(first_rows_table(found))
-        for left in reasons_of(found.left_out):
+        for left in reasons_unused(found.left_out):
             console.say(f"left out: {left}")
         for remark in found.remarks:
             console.say(remark)
@@ -126,14 +126,14 @@ class Import:
             )
 
     def _write_point(self, console: Console, found: ImportedFile) -> None:
-        from flexcal.jobs.setup import write_point_place
+        from flexcal.jobs.setup import write_point_position
 
         fit = found.misfit
         if fit is None or fit.doubtful:
             raise InputError(
                 f"{self.file}: these points do not determine the position of the reflector on the tool; leave --write-point out."
             )
-        write_point_place(self.robot, fit.point, fit.moved)
+        write_point_position(self.robot, fit.point, fit.moved)
         console.say(f"wrote the xyz of {fit.point} to {self.robot}")
 
     def _doubt(self, found: ImportedFile) -> str:

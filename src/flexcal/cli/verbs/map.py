@@ -19,7 +19,7 @@ from flexcal.cli.arguments.shared_options import (
     require_at_least,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import with_estimates
+from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 
 
@@ -55,7 +55,7 @@ class Map:
 
     def run(self) -> None:
         """Print the predicted accuracy, the worst position and the sources of error."""
-        from flexcal.cli.tables.results import before_rows, error_table, map_table
+        from flexcal.cli.tables.results import error_table, map_table, uncalibrated_rows
         from flexcal.data.plans import page_beside
         from flexcal.jobs.accuracy import map_accuracy
 
@@ -79,7 +79,7 @@ class Map:
         document = found.document()
         console.show(map_table(document))
         if document["before"] is not None:
-            console.show(error_table("at the verification poses", before_rows(document)))
+            console.show(error_table("at the verification poses", uncalibrated_rows(document)))
         sources = ", ".join(f"{kind} {100 * share:.0f} %" for kind, share in document["sources"].items())
         console.say(f"reduction of the variance if these were known exactly: {sources}")
         worst = document["worst"][0]
@@ -96,7 +96,7 @@ class Map:
         console.say(found.trust.sentence)
         pages = dict.fromkeys([self.out, page_beside(self.out)])
         console.say(f"wrote {' and '.join(str(path) for path in pages)}: {document['poses']} poses")
-        where = with_estimates(self.estimates)
+        where = estimates_option(self.estimates)
         console.finish(
             document,
             f"flexcal compensate {self.robot} TARGETS.csv{where}, for commands with this accuracy",

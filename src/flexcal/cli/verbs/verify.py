@@ -17,7 +17,7 @@ from flexcal.cli.arguments.shared_options import (
     require_files,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import with_estimates
+from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ class Verify:
 
     def run(self) -> None:
         """Verify, and print the errors."""
-        from flexcal.cli.tables.results import before_rows, error_table
+        from flexcal.cli.tables.results import error_table, uncalibrated_rows
         from flexcal.jobs.accuracy import verify_robot
 
         require_robot(self.robot, *self.poses)
@@ -69,7 +69,9 @@ class Verify:
             }
         if document["ambiguous_poses"]:
             labels["measured_unambiguous"] = "calibrated, flank certain"
-        rows = before_rows(document) | {label: blocks[key] for key, label in labels.items() if key in blocks}
+        rows = uncalibrated_rows(document) | {
+            label: blocks[key] for key, label in labels.items() if key in blocks
+        }
         console.show(error_table("distance to the measured points", rows))
         rms = document["rms_mm"]
         whole = (
@@ -89,7 +91,7 @@ class Verify:
 
     def _next(self, status: Status) -> str:
         """The next step after a verdict."""
-        where = with_estimates(self.estimates)
+        where = estimates_option(self.estimates)
         if status == "bad":
             return "mend what the verdict names, and verify again; do not use this calibration before that"
         if status == "unknown":

@@ -1,15 +1,15 @@
 from .amplitude_spectrum import shaped
-from .backlash_limit import share_at_rest, within_preload
+from .backlash_limit import static_amplitude_share, within_preload
 from .multisines import Schedule, flat_multisine, room
 from .payload_placement import Placement, payload_placements
-from .pose_selection import ChosenPoses, choose_frequency_poses, stiffness_curve
+from .pose_selection import FrequencyPoseSelection, choose_frequency_poses, stiffness_curve
 from .predicted_uncertainty import PlannedResponses
 from .response_noise import COMMON_SENSORS, ResponseSensors
 from .spring_precision import largest_stiffness_std
 
 __all__ = [
     "COMMON_SENSORS",
-    "ChosenPoses",
+    "FrequencyPoseSelection",
     "Placement",
     "PlannedResponses",
     "ResponseSensors",
@@ -20,7 +20,7 @@ __all__ = [
     "payload_placements",
     "room",
     "shaped",
-    "share_at_rest",
+    "static_amplitude_share",
     "stiffness_curve",
     "within_preload",
 ]

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.design.frequency.backlash_limit import gap_load, share, within_preload
+from flexcal.design.frequency.backlash_limit import backlash_load, share, within_preload
 from flexcal.design.frequency.predicted_uncertainty import PlannedResponses
 from flexcal.design.frequency.spring_precision import spring_criterion
 from flexcal.model.robot import RobotModel
@@ -23,14 +23,15 @@ ITERATIONS = 20
 def shaped(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
     """The plan, whose spectrum is flat, with amplitudes that make `spring_criterion` small in its poses.
 
-    No axis gets more than `ROOM` times its torque, and no gap is strained beyond what `gap_load` allows. The multiplicative algorithm for
-    optimal designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of what more of it would gain over what
-    it costs, its share of the axis' power plus its share in the gap that is strained most. Raises `FlexcalError` as `within_preload` does.
+    No axis gets more than `ROOM` times its torque, and no gap is strained beyond what `backlash_load` allows. The multiplicative algorithm
+    for optimal designs (Silvey, Titterington & Torsney 1978): the power of a line grows with the root of what more of it would gain over
+    what it costs, its share of the axis' power plus its share in the gap that is strained most. Raises `FlexcalError` as `within_preload`
+    does.
     """
     criterion, plan = spring_criterion(planned.parameters), within_preload(model, planned.plan)
     allowed = ROOM**2 * np.sum(plan.amplitude**2, axis=1, keepdims=True)
     flat = plan.amplitude**2
-    load = np.array([gap_load(model, q, plan) for q in plan.poses]).reshape(-1, *flat.shape)
+    load = np.array([backlash_load(model, q, plan) for q in plan.poses]).reshape(-1, *flat.shape)
     best, lowest = plan, np.inf
     for _ in range(ITERATIONS):
         power = plan.amplitude**2

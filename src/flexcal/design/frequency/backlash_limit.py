@@ -22,7 +22,7 @@ INSTANTS = 16
 """Instants of the reference motion at which the torque of the drives is looked at."""
 
 
-def share_at_rest(model: RobotModel, plan: MultisinePlan) -> float:
+def static_amplitude_share(model: RobotModel, plan: MultisinePlan) -> float:
     """The share of the excitation at which its peaks in every pose stay below what gravity puts on the drives with backlash.
 
     The reference motion is left out, as in the paper. Above 1 where there is room.
@@ -35,7 +35,7 @@ def share_at_rest(model: RobotModel, plan: MultisinePlan) -> float:
     return float((held / (CREST * np.sqrt(power))).min(initial=np.inf))
 
 
-def gap_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
+def backlash_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarray:
     """What 1 N² m² of amplitude² of each line adds to the square of how far every gap is strained at `q` (n,), (drives, E, L).
 
     Where the sum over the lines is 1, gravity just exceeds three standard deviations of the drive's torque at rest, or two all along the
@@ -62,7 +62,7 @@ def gap_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.ndarra
 
 
 def share(load: np.ndarray, amplitude: np.ndarray) -> float:
-    """The share of `amplitude` (E, L) N m that strains no gap beyond its limit; `load` (..., E, L) is that of `gap_load`.
+    """The share of `amplitude` (E, L) N m that strains no gap beyond its limit; `load` (..., E, L) is that of `backlash_load`.
 
     0 where the reference motion alone opens a gap; inf without backlash.
     """
@@ -75,7 +75,7 @@ def within_preload(model: RobotModel, plan: MultisinePlan) -> MultisinePlan:
 
     Raises `FlexcalError` where next to nothing would be left, naming the pose.
     """
-    shares = [share(gap_load(model, q, plan), plan.amplitude) for q in plan.poses]
+    shares = [share(backlash_load(model, q, plan), plan.amplitude) for q in plan.poses]
     if min(shares) < LOWEST:
         raise FlexcalError(
             f"gravity does not load the drives with backlash in pose {int(np.argmin(shares)) + 1} enough: their gaps would stay closed "

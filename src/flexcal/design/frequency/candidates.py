@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.design.frequency.backlash_limit import gap_load, share
+from flexcal.design.frequency.backlash_limit import backlash_load, share
 from flexcal.design.frequency.multisines import room
 from flexcal.design.poses import preloaded
 from flexcal.design.scene import CollisionChecker
@@ -17,7 +17,7 @@ _BATCH = 256
 _TRIES = 400
 
 
-class ExcitablePoses:
+class FrequencyPoseCandidates:
     """Where a robot can be excited as `plan` says: within its limits with room for the motion, touching nothing, every gap closed.
 
     The robot is checked for collisions at the middle and at both ends of the reference motion. Raises `FlexcalError` that names the joint
@@ -66,7 +66,7 @@ class ExcitablePoses:
         ends = np.outer([0.0, 1.0, -1.0], swing)
         held = q[preloaded(self.model, q, self.plan.payload)]
         free = [x for x in held if not self.checker.collides(x + ends).any()]
-        closed = [x for x in free if share(gap_load(self.model, x, self.plan), self.plan.amplitude) >= 1]
+        closed = [x for x in free if share(backlash_load(self.model, x, self.plan), self.plan.amplitude) >= 1]
         lost["collision"] += len(held) - len(free)
         lost["gravity preload"] += len(q) - len(held) + len(free) - len(closed)
         return np.array(closed).reshape(-1, self.model.n)

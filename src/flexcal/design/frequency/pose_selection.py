@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.design.frequency.candidates import ExcitablePoses
+from flexcal.design.frequency.candidates import FrequencyPoseCandidates
 from flexcal.design.frequency.response_jacobian import response_parameters, response_sensitivity
 from flexcal.design.frequency.response_noise import COMMON_SENSORS, ResponseSensors
 from flexcal.design.frequency.spring_precision import largest_stiffness_std, spring_criterion
@@ -27,7 +27,7 @@ NEIGHBOURS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class ChosenPoses:
+class FrequencyPoseSelection:
     """`poses` (P, n) rad, numbers `chosen` (P,) of the `candidates` (C, n), of which the first `drawn` are random and the others near the
     chosen ones; `screened` is the sensitivity of all candidates."""
 
@@ -47,14 +47,14 @@ def choose_frequency_poses(
     sensors: ResponseSensors = COMMON_SENSORS,
     checker: CollisionChecker | None = None,
     progress: Progress = silent,
-) -> ChosenPoses:
+) -> FrequencyPoseSelection:
     """The `count` of so many random `candidates` that determine all springs best together, excited as `plan` says; by exchange.
 
     Then, twice, further candidates are drawn about the chosen poses, and the exchange goes on.
 
     Raises `FlexcalError` where too few candidates are feasible, or so few poses leave a stiffness unknown, which is named.
     """
-    excitable = ExcitablePoses(CollisionChecker(model) if checker is None else checker, plan)
+    excitable = FrequencyPoseCandidates(CollisionChecker(model) if checker is None else checker, plan)
     parameters = response_parameters(model, plan)
     criterion = spring_criterion(parameters)
     pool = excitable.random(max(candidates, count), rng, progress)
@@ -75,11 +75,11 @@ def choose_frequency_poses(
             f"{count} poses cannot determine {worst}: its predicted standard deviation is {100 * std:.0f} %; choose more poses, "
             "or hold a payload off the wrist's axis."
         )
-    return ChosenPoses(pool[chosen], pool, drawn, chosen, screened)
+    return FrequencyPoseSelection(pool[chosen], pool, drawn, chosen, screened)
 
 
 def stiffness_curve(
-    chosen: ChosenPoses, counts: np.ndarray, rng: np.random.Generator, random_sets: int = 10
+    chosen: FrequencyPoseSelection, counts: np.ndarray, rng: np.random.Generator, random_sets: int = 10
 ) -> tuple[np.ndarray, np.ndarray]:
     """Largest predicted standard deviation of a stiffness (K,) for `counts` (K,) of poses: chosen one by one, and at random (median)."""
     screened = chosen.screened

@@ -10,9 +10,9 @@ import numpy as np
 from flexcal.data.plans import MultisinePlan
 from flexcal.design.frequency.response_jacobian import (
     PoseResponse,
-    friction_in,
-    known_before,
+    friction_disturbance,
     pose_response,
+    prior_of_parameters,
     response_parameters,
 )
 from flexcal.design.frequency.response_noise import COMMON_SENSORS, ResponseSensors
@@ -43,10 +43,10 @@ class PlannedResponses:
         """Of a robot as it is known."""
         parameters = response_parameters(model, plan)
         responses = (
-            pose_response(model, q, plan, parameters, friction_in(model, q, plan), sensors)
+            pose_response(model, q, plan, parameters, friction_disturbance(model, q, plan), sensors)
             for q in plan.poses
         )
-        return cls(plan, parameters, known_before(model, parameters), tuple(responses))
+        return cls(plan, parameters, prior_of_parameters(model, parameters), tuple(responses))
 
     @cached_property
     def sensitivity(self) -> Sensitivity:

@@ -28,7 +28,13 @@ from flexcal.model.robot import (
     sensor_parameters,
     springs_and_rotors,
 )
-from flexcal.model.vibration import KNOT_OCTAVES, flatness_shifts, friction_shifts, linearise, transfer_matrix
+from flexcal.model.vibration import (
+    KNOT_OCTAVES,
+    friction_response_change,
+    linearise,
+    sensitivity_response_change,
+    transfer_matrix,
+)
 from flexcal.progress import Progress, silent
 
 
@@ -95,7 +101,7 @@ def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
     """What the responses of all poses share: springs, rotors, inertials of links and payload, a delay an axis, geometric errors, and of
     every sensor on the arm its sensitivity, delay and errors of mounting.
 
-    Priors are those that robot.yaml declares; `known_before` takes what was estimated before instead.
+    Priors are those that robot.yaml declares; `prior_of_parameters` takes what was estimated before instead.
     """
     delays = (
         Parameter(f"{joint.name}.delay", "s", 0.0, prior_std=1 / plan.rate_hz) for joint in model.driven
@@ -130,17 +136,17 @@ def response_sensitivity(
     rows = []
     for number, q in enumerate(poses):
         progress("sensitivities", number / len(poses))
-        friction = friction_in(model, q, plan).thinned(every)
+        friction = friction_disturbance(model, q, plan).thinned(every)
         rows.append(pose_response(model, q, thin, parameters, friction, sensors).rows(thin))
     progress("sensitivities", 1.0)
     return Sensitivity(
         np.array(rows).reshape(len(poses), *2 * (len(parameters),)),
         parameters,
-        known_before(model, parameters),
+        prior_of_parameters(model, parameters),
     )
 
 
-def known_before(model: RobotModel, parameters: Parameters) -> np.ndarray:
+def prior_of_parameters(model: RobotModel, parameters: Parameters) -> np.ndarray:
     """Information (p, p) of the robot's posterior, and of the parameters' priors where nothing was estimated."""
     prior = model.posterior.prior(parameters)[1]
     scale = np.sqrt(np.diag(prior))
@@ -184,8 +190,8 @@ def pose_response(
         else:
             columns.append(by[item.name] * (item.value if item.scale == "log" else 1.0))
     loss = [by[name] * value * FRICTION_LOG_STD for name, value in zip(rubbing, viscous, strict=True)]
-    strange = friction_shifts(response, frequencies, FRICTION_TOLERANCE * viscous, KNOT_OCTAVES)
-    uneven = flatness_shifts(
+    strange = friction_response_change(response, frequencies, FRICTION_TOLERANCE * viscous, KNOT_OCTAVES)
+    uneven = sensitivity_response_change(
         response,
         frequencies,
         arm_sensors,
@@ -202,7 +208,7 @@ def pose_response(
     )
 
 
-def friction_in(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> FrictionDisturbance:
+def friction_disturbance(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> FrictionDisturbance:
     """What friction does in the pose `q` (n,) under all lines of `plan`."""
     return FrictionDisturbance.of(model, linearise(model, q, plan.payload), plan)
 

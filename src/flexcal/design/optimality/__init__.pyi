@@ -1,23 +1,23 @@
-from .condition_criteria import ColumnCondition, LeastEigenvalue, condition_number
+from .condition_criteria import ConditionNumberCriterion, SmoothMinimumEigenvalue, condition_number
 from .criteria import Criterion, DOptimal, Observability, SpectralCriterion, TraceOptimal, observability
 from .exchange_algorithm import exchange
-from .lower_bound import least_trace
+from .lower_bound import trace_lower_bound
 from .rank_updates import Selection, greedy
 from .shortlist import choose
 
 __all__ = [
-    "ColumnCondition",
+    "ConditionNumberCriterion",
     "Criterion",
     "DOptimal",
-    "LeastEigenvalue",
     "Observability",
     "Selection",
+    "SmoothMinimumEigenvalue",
     "SpectralCriterion",
     "TraceOptimal",
     "choose",
     "condition_number",
     "exchange",
     "greedy",
-    "least_trace",
     "observability",
+    "trace_lower_bound",
 ]

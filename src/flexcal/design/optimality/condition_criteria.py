@@ -11,7 +11,7 @@ _POWER = 8.0
 
 
 @dataclass(frozen=True)
-class LeastEigenvalue:
+class SmoothMinimumEigenvalue:
     """½ log of the harmonic mean of order 8 of M's eigenvalues: E-optimality, smooth where eigenvalues meet."""
 
     name: str = "E"
@@ -29,7 +29,7 @@ class LeastEigenvalue:
 
 
 @dataclass(frozen=True)
-class ColumnCondition:
+class ConditionNumberCriterion:
     """-log cond(W) of W with columns of unit norm (Gautier & Khalil 1992; van der Sluis 1969 for the scaling), with norms of order 8."""
 
     name: str = "condition"

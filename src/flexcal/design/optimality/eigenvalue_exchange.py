@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from flexcal.design.optimality.criteria import DOptimal, SpectralCriterion, TraceOptimal
-from flexcal.design.optimality.rank_updates import CHOOSING, Selection, greedy, rank_exchange
+from flexcal.design.optimality.rank_updates import SELECTION_STAGE, Selection, greedy, rank_exchange
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
@@ -116,13 +116,13 @@ def spectral_exchange(
         )
         merits = np.exp(0.5 * np.array(found.history))
         return Selection(found.chosen, float(np.exp(0.5 * found.merit)), tuple(merits.tolist()))
-    progress(CHOOSING, 0.0)
+    progress(SELECTION_STAGE, 0.0)
     starts = [start] if start is not None else _starts(sensitivity, count)
     tried = []
     for number, chosen in enumerate(starts):
 
         def tell(share: float, done: int = number) -> None:
-            progress(CHOOSING, (done + share) / len(starts))
+            progress(SELECTION_STAGE, (done + share) / len(starts))
 
         tried.append(_from(sensitivity, [int(i) for i in chosen], criterion, passes, tell))
     return max(tried, key=lambda selection: selection.merit)

@@ -14,7 +14,7 @@ SPREAD = 4
 """Candidates in that design, per parameter: so many that their weights come near the best."""
 
 
-def least_trace(sensitivity: Sensitivity, criterion: TraceOptimal, counts: np.ndarray) -> np.ndarray:
+def trace_lower_bound(sensitivity: Sensitivity, criterion: TraceOptimal, counts: np.ndarray) -> np.ndarray:
     """Numbers (K,) that tr(W M'⁻¹) of no set of `counts` (K,) candidates is below, M' their information with the prior P.
 
     tr(W M⁻¹) is convex in M and goes with 1/t as M with t, so that for every M', M and t > 0 it is at least 2 φ/t - tr(S M')/t², with φ

@@ -17,10 +17,10 @@ from flexcal.errors import FlexcalError
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
-FAINT = 1e-5
+POOL_REGULARISATION = 1e-5
 """Information of the whole pool, per candidate, that is added so that a set smaller than the parameters has a merit."""
 
-CHOOSING = "choosing"
+SELECTION_STAGE = "choosing"
 """The stage that exchanges tell of."""
 
 REBUILT = 8
@@ -50,16 +50,16 @@ def rank_exchange(
     state = RankUpdates(sensitivity, criterion)
     chosen = [] if start is None else [int(i) for i in start]
     state.rebuild(chosen)
-    progress(CHOOSING, 0.0)
+    progress(SELECTION_STAGE, 0.0)
     chosen = _grow(state, count, chosen)
     history = [state.merit]
     for number in range(passes):
-        progress(CHOOSING, (number + 1) / (passes + 1))
+        progress(SELECTION_STAGE, (number + 1) / (passes + 1))
         if not _exchange_once(state, chosen):
             break
         state.rebuild(chosen)
         history.append(state.merit)
-    progress(CHOOSING, 1.0)
+    progress(SELECTION_STAGE, 1.0)
     return Selection(
         np.array(chosen), criterion.merit(_information(sensitivity, chosen, criterion)), tuple(history)
     )
@@ -99,7 +99,7 @@ class RankUpdates:
         root = np.linalg.solve(factor, np.eye(self.size))
         self._flat = np.ascontiguousarray(flat @ root.T)
         self._offset = float(2 * np.log(np.diag(factor)).sum())
-        self._start = _symmetric(root @ (prior + FAINT * pool) @ root.T)
+        self._start = _symmetric(root @ (prior + POOL_REGULARISATION * pool) @ root.T)
         self.trace_weight = root @ criterion.weight @ root.T if isinstance(criterion, TraceOptimal) else None
         self.rebuild([])
 
@@ -119,7 +119,7 @@ class RankUpdates:
             self.spread = _symmetric(self.inverse @ self.trace_weight @ self.inverse)
             self.trace = float(np.sum(self.inverse * self.trace_weight))
             seen = (self._flat @ self.spread).reshape(shape)
-            self.spread_blocks = _products(seen, self._flat.reshape(shape))
+            self.weighted_blocks = _products(seen, self._flat.reshape(shape))
 
     @property
     def merit(self) -> float:
@@ -131,7 +131,7 @@ class RankUpdates:
         lead = np.moveaxis(self.blocks, 0, -1) + np.eye(self.rows)[:, :, None]
         if self.trace_weight is None:
             return np.log(_determinants(lead))
-        return _solved_traces(lead, np.moveaxis(self.spread_blocks, 0, -1))
+        return _solved_traces(lead, np.moveaxis(self.weighted_blocks, 0, -1))
 
     def add(self, candidate: int) -> None:
         """Put a candidate in."""
@@ -144,13 +144,13 @@ class RankUpdates:
     def copy_state(self) -> tuple[np.ndarray | float, ...]:
         """What `restore` needs to come back here."""
         state = (self.inverse, self.spread, self.log_det, self.blocks)
-        return state if self.trace_weight is None else (*state, self.trace, self.spread_blocks)
+        return state if self.trace_weight is None else (*state, self.trace, self.weighted_blocks)
 
     def restore(self, state: tuple) -> None:
         """Come back to a state of `copy_state`."""
         self.inverse, self.spread, self.log_det, self.blocks = state[:4]
         if self.trace_weight is not None:
-            self.trace, self.spread_blocks = state[4:]
+            self.trace, self.weighted_blocks = state[4:]
 
     def _block(self, candidates: list[int]) -> np.ndarray:
         return self._flat.reshape(self.candidates, self.rows, self.size)[candidates]
@@ -167,7 +167,7 @@ class RankUpdates:
             self.blocks = self.blocks - sign * _products(seen @ middle, seen)
             self.inverse = self.inverse - sign * (across @ middle @ across.T)
             return
-        own = self.spread_blocks[candidate]
+        own = self.weighted_blocks[candidate]
         self.trace -= sign * float(np.sum(middle * own))
         wide = self.spread @ block.T
         both = (self._flat @ np.hstack([across, wide])).reshape(self.candidates, self.rows, 2 * self.rows)
@@ -175,7 +175,7 @@ class RankUpdates:
         turned = seen @ middle
         mixed = _products(turned, sign * broad - 0.5 * (turned @ own))
         self.blocks = self.blocks - sign * _products(turned, seen)
-        self.spread_blocks = self.spread_blocks - mixed - np.swapaxes(mixed, 1, 2)
+        self.weighted_blocks = self.weighted_blocks - mixed - np.swapaxes(mixed, 1, 2)
         scaled = across @ middle
         change = scaled @ (sign * wide - 0.5 * (scaled @ own)).T
         self.spread = self.spread - change - change.T

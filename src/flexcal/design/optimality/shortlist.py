@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.design.optimality.criteria import Criterion, SpectralCriterion
 from flexcal.design.optimality.exchange_algorithm import exchange
-from flexcal.design.optimality.rank_updates import CHOOSING, Selection
+from flexcal.design.optimality.rank_updates import SELECTION_STAGE, Selection
 from flexcal.estimation import Sensitivity
 from flexcal.progress import Progress, silent
 
@@ -41,7 +41,7 @@ def choose(
     found = exchange(sensitivity.subset(listed), count, criterion)
     chosen, history = listed[found.chosen], [found.merit]
     for number in range(ROUNDS):
-        progress(CHOOSING, (number + 1) / (ROUNDS + 1))
+        progress(SELECTION_STAGE, (number + 1) / (ROUNDS + 1))
         promise = promises(sensitivity, chosen, criterion)
         promise[chosen] = np.inf
         listed = np.argpartition(-promise, short - 1)[:short]
@@ -51,7 +51,7 @@ def choose(
         history.append(found.merit)
         if set(chosen) == set(before):
             break
-    progress(CHOOSING, 1.0)
+    progress(SELECTION_STAGE, 1.0)
     return Selection(chosen, found.merit, tuple(history))
 
 

@@ -9,7 +9,7 @@ from .geometry_sensitivity import (
     pose_sensitivity,
 )
 from .gravity_preload import preloaded
-from .ordering import VisitingOrder, visiting_order
+from .ordering import MeasurementOrder, measurement_order
 from .selection import CriterionName, PoseDesign, choose_poses, design_poses, fewest_poses, random_poses
 from .sequential_selection import NextPoses, next_poses
 from .working_volume import WorkingVolume, working_box, working_points
@@ -17,18 +17,19 @@ from .working_volume import WorkingVolume, working_box, working_points
 __all__ = [
     "BaseSensitivity",
     "CriterionName",
+    "MeasurementOrder",
     "NextPoses",
     "PoseCandidates",
     "PoseCurve",
     "PoseDesign",
     "Tolerances",
-    "VisitingOrder",
     "WorkingVolume",
     "base_sensitivity",
     "choose_poses",
     "design_poses",
     "fewest_poses",
     "geometry_jacobian",
+    "measurement_order",
     "next_poses",
     "pose_candidates",
     "pose_curve",
@@ -36,7 +37,6 @@ __all__ = [
     "preloaded",
     "random_candidates",
     "random_poses",
-    "visiting_order",
     "working_box",
     "working_points",
 ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.model.kinematics import even_configurations
+from flexcal.model.kinematics import low_discrepancy_configurations
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import certain_flank, gravity_torque
 
@@ -30,7 +30,9 @@ def preloaded(model: RobotModel, q: np.ndarray, payload: float | None = None) ->
     joints = list(preload_joints(model))
     if not joints or not len(q):
         return np.ones(len(q), dtype=bool)
-    largest = np.abs(gravity_torque(model, even_configurations(model, 1000), payload))[:, joints].max(axis=0)
+    largest = np.abs(gravity_torque(model, low_discrepancy_configurations(model, 1000), payload))[
+        :, joints
+    ].max(axis=0)
     least = np.maximum(LEAST_TORQUE, LEAST_SHARE * largest)
     torque = gravity_torque(model, q, payload)
     sure = np.all(np.abs(torque[:, joints]) > least, axis=1)

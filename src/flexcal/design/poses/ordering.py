@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.design.poses.candidates import above_floor
-from flexcal.design.poses.travelling_salesman import short_tour
+from flexcal.design.poses.travelling_salesman import shortest_path
 from flexcal.design.scene import CollisionChecker
 from flexcal.model.kinematics import link_frames
 
@@ -20,7 +20,7 @@ _EVEN = 64
 
 
 @dataclass(frozen=True, eq=False)
-class VisitingOrder:
+class MeasurementOrder:
     """`order` (N,) of the poses, least `seconds` (N - 1,) of the moves, and which are `blocked` (N - 1,) and need a way round."""
 
     order: np.ndarray
@@ -28,7 +28,9 @@ class VisitingOrder:
     blocked: np.ndarray
 
 
-def visiting_order(checker: CollisionChecker, q: np.ndarray, *, point: str | None = None) -> VisitingOrder:
+def measurement_order(
+    checker: CollisionChecker, q: np.ndarray, *, point: str | None = None
+) -> MeasurementOrder:
     """Short tour through the poses `q` (N, n) with any start: first the fewest blocked moves, then the shortest time.
 
     A move is as long as its slowest joint at full speed needs. Only the moves of a way are checked for collision; those that touch
@@ -38,7 +40,7 @@ def visiting_order(checker: CollisionChecker, q: np.ndarray, *, point: str | Non
     dear = 1 + float(seconds.sum())
     known: dict[tuple[int, int], bool] = {}
     cost = seconds.copy()
-    order = short_tour(cost)
+    order = shortest_path(cost)
     for _ in range(ROUNDS):
         new = [move for move in _moves(order) if move not in known]
         for first, second in new:
@@ -47,12 +49,12 @@ def visiting_order(checker: CollisionChecker, q: np.ndarray, *, point: str | Non
                 cost[[first, second], [second, first]] += dear
         if not any(known[move] for move in new):
             break
-        order = short_tour(cost, start=order)
+        order = shortest_path(cost, start=order)
     ways = _moves(order)
     touching = [
         known[a, b] if (a, b) in known else blocked(checker, q[a], q[b], point=point) for a, b in ways
     ]
-    return VisitingOrder(order, seconds[order[:-1], order[1:]], np.array(touching, dtype=bool))
+    return MeasurementOrder(order, seconds[order[:-1], order[1:]], np.array(touching, dtype=bool))
 
 
 def move_seconds(checker: CollisionChecker, q: np.ndarray) -> np.ndarray:

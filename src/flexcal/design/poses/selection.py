@@ -17,8 +17,8 @@ from flexcal.design.optimality import (
     TraceOptimal,
     choose,
     greedy,
-    least_trace,
     observability,
+    trace_lower_bound,
 )
 from flexcal.design.poses.candidates import random_candidates
 from flexcal.design.poses.feasibility import PoseCandidates, pose_candidates
@@ -103,9 +103,9 @@ class PoseDesign:
 
     @property
     def least_possible(self) -> float:
-        """A tool error, m, that no choice of as many of the candidates could predict less than (see `least_trace`)."""
+        """A tool error, m, that no choice of as many of the candidates could predict less than (see `trace_lower_bound`)."""
         trace = TraceOptimal(self.tool_weight, "c")
-        return float(least_trace(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
+        return float(trace_lower_bound(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
 
     @property
     def criteria(self) -> dict[CriterionName, float]:

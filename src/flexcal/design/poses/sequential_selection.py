@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.data.poses import PoseSet
-from flexcal.design.optimality import DOptimal, TraceOptimal, greedy, least_trace
+from flexcal.design.optimality import DOptimal, TraceOptimal, greedy, trace_lower_bound
 from flexcal.design.poses.feasibility import PoseCandidates
 from flexcal.design.poses.geometry_sensitivity import BLOCK, geometry_jacobian, measuring_noise
 from flexcal.design.poses.selection import CriterionName, PoseDesign, criterion_named, tool_error
@@ -68,7 +68,7 @@ def next_poses(
     steps = range(count + 1)
     errors = [tool_error(base, found.tool_weight, selection.chosen[:number]) for number in steps]
     alone = replace(known, prior_information=before.prior_information)
-    least = least_trace(alone, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
+    least = trace_lower_bound(alone, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
     design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
     return NextPoses(design, done, np.array(errors), np.minimum(least, errors))
 

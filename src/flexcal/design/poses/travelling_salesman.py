@@ -11,7 +11,7 @@ LONGEST = 3
 _ENOUGH = 1e-9
 
 
-def short_tour(cost: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
+def shortest_path(cost: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:
     """The order (N,) of a short open way, either end free; `cost` (N, N) of moves is symmetric. With `start`, that order improved."""
     count = len(cost)
     if count < 3:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.model.kinematics import even_configurations, joint_batch
+from flexcal.model.kinematics import joint_batch, low_discrepancy_configurations
 from flexcal.model.robot import RobotModel
 from flexcal.model.urdf import locked_joints, read_elements
 
@@ -152,7 +152,7 @@ class CollisionChecker:
     def _always_touching(self, pairs: list[tuple[int, int]], margins: list[float]) -> list[tuple[int, int]]:
         self._checked = self._set_pairs(pairs, margins)
         always = np.ones(len(pairs), dtype=bool)
-        for values in self.configurations(even_configurations(self.model, _SAMPLES)):
+        for values in self.configurations(low_discrepancy_configurations(self.model, _SAMPLES)):
             if not always.any():
                 break
             always &= self._touching(values)

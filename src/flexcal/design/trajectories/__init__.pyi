@@ -2,7 +2,7 @@ from .criterion import TrajectoryCriterion
 from .excitation_problem import NEAR
 from .motion_space import Kind
 from .optimisation import TrajectoryDesign, design_trajectories
-from .regressor_columns import TorqueColumns
+from .regressor_columns import BaseRegressor
 from .required_limits import COULOMB, VISCOUS, require_stated_limits, with_assumed_friction
 from .rest_to_rest import TimedMotion, timed_motion
 from .sequences import SequenceName, Stage, sequence
@@ -11,11 +11,11 @@ __all__ = [
     "COULOMB",
     "NEAR",
     "VISCOUS",
+    "BaseRegressor",
     "Kind",
     "SequenceName",
     "Stage",
     "TimedMotion",
-    "TorqueColumns",
     "TrajectoryCriterion",
     "TrajectoryDesign",
     "design_trajectories",

@@ -8,8 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.design.optimality import ColumnCondition, Criterion, DOptimal, LeastEigenvalue, TraceOptimal
-from flexcal.design.trajectories.regressor_columns import DRIVE, TorqueColumns
+from flexcal.design.optimality import (
+    ConditionNumberCriterion,
+    Criterion,
+    DOptimal,
+    SmoothMinimumEigenvalue,
+    TraceOptimal,
+)
+from flexcal.design.trajectories.regressor_columns import DRIVE, BaseRegressor
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel, declared, uncertain_inertials
 
@@ -22,7 +28,7 @@ _FAINT = 1e-9
 CONDITIONING = 0.3
 """Weight of -log cond(W) in the compound criterion, beside log det a parameter: for a tenth more standard deviation of each, condition
 numbers of 5 in place of 15 to 90."""
-_CONDITION = ColumnCondition()
+_CONDITION = ConditionNumberCriterion()
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,7 +45,7 @@ class Unknowns:
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueGoal:
+class ExcitationCriterion:
     """A criterion of unknowns after `gathered` information (r, r) on the base columns, and `instants` of a new motion.
 
     The merit is that of the criterion and, `conditioning` times, -log cond(W) of the base columns: with both, a compound criterion
@@ -71,11 +77,11 @@ class TorqueGoal:
             by_total += self.conditioning * _CONDITION.gradient(total)
         return self.instants * by_total
 
-    def about(self, wanted: Sequence[str]) -> TorqueGoal:
+    def about(self, wanted: Sequence[str]) -> ExcitationCriterion:
         """The same of some of the unknowns only, the others eliminated (Ds-optimality)."""
         return replace(self, criterion=MarginalD(np.isin(self.unknowns.names, list(wanted))))
 
-    def after(self, information: np.ndarray) -> TorqueGoal:
+    def after(self, information: np.ndarray) -> ExcitationCriterion:
         """The goal of the next motion."""
         return replace(self, gathered=self.total(information))
 
@@ -102,12 +108,12 @@ class MarginalD:
 
 
 def torque_goal(
-    columns: TorqueColumns,
+    columns: BaseRegressor,
     criterion: TrajectoryCriterion,
     of: Sequence[str],
     sizes: np.ndarray,
     instants: float,
-) -> TorqueGoal:
+) -> ExcitationCriterion:
     """The goal of the first motion. `sizes` (r,) of the base columns are what D, E and A count them in.
 
     condition, D, E and A are of the base parameters without prior; posterior (D) and c (the variances of the parameters `of`, which get
@@ -125,28 +131,28 @@ def torque_goal(
         if criterion == "c":
             _require_visible(columns, unknowns, of)
             chosen = np.isin(unknowns.names, list(of)).astype(float)
-            return TorqueGoal(TraceOptimal(np.diag(chosen), "c"), unknowns, nothing, instants)
+            return ExcitationCriterion(TraceOptimal(np.diag(chosen), "c"), unknowns, nothing, instants)
         wanted = np.array([name.rpartition(".")[2] not in DRIVE[1:] for name in unknowns.names])
         if criterion == "posterior":
-            return TorqueGoal(MarginalD(wanted, criterion), unknowns, nothing, instants)
-        return TorqueGoal(
+            return ExcitationCriterion(MarginalD(wanted, criterion), unknowns, nothing, instants)
+        return ExcitationCriterion(
             MarginalD(wanted, criterion), unknowns, faint * np.outer(sizes, sizes), instants, CONDITIONING
         )
     names = columns.found.kept_names
     if criterion == "condition":
-        return TorqueGoal(
-            ColumnCondition(), Unknowns(names, np.eye(columns.rank), nothing), nothing, instants
+        return ExcitationCriterion(
+            ConditionNumberCriterion(), Unknowns(names, np.eye(columns.rank), nothing), nothing, instants
         )
     of_base = Unknowns(names, np.diag(1 / sizes), faint)
     kinds: dict[str, Criterion] = {
         "D": DOptimal(),
-        "E": LeastEigenvalue(),
+        "E": SmoothMinimumEigenvalue(),
         "A": TraceOptimal(np.eye(columns.rank), "A"),
     }
-    return TorqueGoal(kinds[criterion], of_base, nothing, instants)
+    return ExcitationCriterion(kinds[criterion], of_base, nothing, instants)
 
 
-def declared_unknowns(columns: TorqueColumns, free: tuple[str, ...] = ()) -> Unknowns:
+def declared_unknowns(columns: BaseRegressor, free: tuple[str, ...] = ()) -> Unknowns:
     """What robot.yaml's prior is about, in units of its standard deviations, then friction and the parameters `free`, without one."""
     model = columns.model
     names = uncertain_inertials(model, range(model.n))
@@ -170,7 +176,7 @@ def _has_prior(model: RobotModel, name: str) -> bool:
     return name.rpartition(".")[2] not in DRIVE[1:] and bool(np.isfinite(declared(model, name).prior_std))
 
 
-def _direction(columns: TorqueColumns, name: str) -> np.ndarray:
+def _direction(columns: BaseRegressor, name: str) -> np.ndarray:
     """Change (p,) of all columns' values by one prior standard deviation of a parameter, or by one of its coordinate without prior."""
     if name in columns.found.names and name.rpartition(".")[2] in DRIVE[1:]:
         return np.eye(len(columns.found.names))[columns.found.names.index(name)]
@@ -182,7 +188,7 @@ def _direction(columns: TorqueColumns, name: str) -> np.ndarray:
     return (above - below) / (2 * _STEP)
 
 
-def _require_visible(columns: TorqueColumns, unknowns: Unknowns, of: Sequence[str]) -> None:
+def _require_visible(columns: BaseRegressor, unknowns: Unknowns, of: Sequence[str]) -> None:
     stacked = np.vstack([unknowns.directions, unknowns.prior])
     norms = np.maximum(np.linalg.norm(stacked, axis=0), 1e-300)
     _, sizes, right = np.linalg.svd(stacked / norms)

@@ -8,10 +8,10 @@ from typing import Protocol
 import numpy as np
 
 from flexcal.design.scene import Clearance
-from flexcal.design.trajectories.interior_point import Valued
+from flexcal.design.trajectories.interior_point import BarrierValue
 from flexcal.design.trajectories.limit_usage import MotionLimits
 from flexcal.design.trajectories.motion_space import MotionSpace
-from flexcal.design.trajectories.regressor_columns import TorqueColumns
+from flexcal.design.trajectories.regressor_columns import BaseRegressor
 from flexcal.model.kinematics import point_kinematics
 
 NEAR = 0.05
@@ -23,7 +23,7 @@ _EDGE = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Excess:
+class LimitViolation:
     """Largest `uses` (4, n) of position, velocity, acceleration and torque, share that the `point` is beyond, m that `distance` lacks."""
 
     uses: np.ndarray
@@ -40,11 +40,11 @@ class Merit(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class ExcitingProgram:
+class ExcitationProblem:
     """A motion of `space` that makes `merit` large and keeps `limits`; `weights` (n,) are 1/σ of the torques."""
 
     space: MotionSpace
-    columns: TorqueColumns
+    columns: BaseRegressor
     merit: Merit
     weights: np.ndarray
     limits: MotionLimits
@@ -58,11 +58,11 @@ class ExcitingProgram:
         weighted = columns * self.weights[:, None, None]
         return np.sum(weighted @ weighted.transpose(0, 2, 1), axis=0) / columns.shape[2]
 
-    def evaluate(self, x: np.ndarray, barrier: float) -> Valued:
+    def evaluate(self, x: np.ndarray, barrier: float) -> BarrierValue:
         """Minus the merit, and the barrier of all limits, each counted by its mean over the instants."""
         motion = self.space.motion(x)
         q = motion[0]
-        outside = Valued(np.inf, lambda: np.zeros(x.size), lambda v: v)
+        outside = BarrierValue(np.inf, lambda: np.zeros(x.size), lambda v: v)
         linear = self._linear_uses(motion)
         if np.abs(linear).max() >= 1:
             return outside
@@ -102,7 +102,7 @@ class ExcitingProgram:
             bend[1] / self.limits.velocity**2,
             bend[2] / self.limits.acceleration**2,
         )
-        return Valued(-merit - share * float(room), gradient, self.space.solver(np.array(weights)))
+        return BarrierValue(-merit - share * float(room), gradient, self.space.solver(np.array(weights)))
 
     def within(self, x: np.ndarray) -> bool:
         """Whether the motion is inside all limits at all instants."""
@@ -129,7 +129,7 @@ class ExcitingProgram:
     def _torque_use(self, columns: np.ndarray) -> np.ndarray:
         return np.einsum("jrn,r->nj", columns, self.columns.smooth_values) / self._drive_share
 
-    def excess(self, x: np.ndarray) -> Excess | None:
+    def excess(self, x: np.ndarray) -> LimitViolation | None:
         """By how much a motion passes the limits at its worst instants; None where it keeps them."""
         motion = self.space.motion(x)
         uses = [np.abs(use).max(axis=0) for use in self.uses(motion, self.columns.write(motion))]
@@ -137,7 +137,7 @@ class ExcitingProgram:
         distance = self.clearance.near(motion[0])[1].min(initial=NEAR)
         if max(use.max() for use in uses) < 1 and point < 0 and distance > _SLACK:
             return None
-        return Excess(
+        return LimitViolation(
             np.maximum(np.array(uses), 1 - _EDGE), max(float(point), -_EDGE), max(_SLACK - distance, 0.0)
         )
 
@@ -145,7 +145,7 @@ class ExcitingProgram:
         """Whether a motion passes no limit."""
         return self.excess(x) is None
 
-    def tightened(self, excess: Excess) -> ExcitingProgram:
+    def tightened(self, excess: LimitViolation) -> ExcitationProblem:
         """With limits that are smaller by what was too much, and a little more."""
         limits, shrink = self.limits, (1 - _EDGE) / excess.uses
         middle, half = (limits.upper + limits.lower) / 2, self._half * shrink[0]
@@ -194,7 +194,7 @@ class ExcitingProgram:
             f"{self._drive_share[j]:.4g} {unit} of its effort"
         )
 
-    def finer(self, factor: int) -> ExcitingProgram:
+    def finer(self, factor: int) -> ExcitationProblem:
         """The same on a grid of instants that is finer by this factor."""
         return replace(self, space=self.space.finer(factor), clearance=self.clearance.wider(0.0))
 
@@ -211,7 +211,7 @@ class _Point:
     speed: float
 
     @classmethod
-    def of(cls, columns: TorqueColumns, limits: MotionLimits, motion: np.ndarray) -> _Point:
+    def of(cls, columns: BaseRegressor, limits: MotionLimits, motion: np.ndarray) -> _Point:
         q, dq, _ = motion
         nothing = np.zeros((len(q), 0))
         if not limits.cartesian:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.design.trajectories.excitation_problem import ExcitingProgram
+from flexcal.design.trajectories.excitation_problem import ExcitationProblem
 from flexcal.errors import FlexcalError, InputError
-from flexcal.model.kinematics import even_configurations
+from flexcal.model.kinematics import low_discrepancy_configurations
 
 FINER = 10
 """How much finer the grid is on which limits are to hold than that of the search."""
@@ -16,13 +16,13 @@ _HALVINGS = 14
 _FIRST_SWING = 0.5
 
 
-def feasible_places(program: ExcitingProgram) -> np.ndarray:
+def feasible_postures(program: ExcitationProblem) -> np.ndarray:
     """Configurations (k, n) in which the robot can stand: no limit of torque or box is passed and nothing touches.
 
     Raises `FlexcalError` that names what stands in the way least where there is none.
     """
     model = program.columns.model
-    places = even_configurations(model, _PLACES)
+    places = low_discrepancy_configurations(model, _PLACES)
     excess = program.standing(places)
     worst = excess.max(axis=1)
     if (worst < 0).any():
@@ -34,7 +34,7 @@ def feasible_places(program: ExcitingProgram) -> np.ndarray:
     )
 
 
-def require_standing(program: ExcitingProgram, q: np.ndarray) -> None:
+def require_holding_torque(program: ExcitationProblem, q: np.ndarray) -> None:
     """Raise `InputError` that names the limit which a robot at rest in `q` (n,) passes."""
     if not program.standing(q[None]).max() < 0:
         raise InputError(
@@ -42,8 +42,8 @@ def require_standing(program: ExcitingProgram, q: np.ndarray) -> None:
         )
 
 
-def feasible_swing(
-    program: ExcitingProgram, places: np.ndarray | None, rng: np.random.Generator
+def feasible_start_motion(
+    program: ExcitationProblem, places: np.ndarray | None, rng: np.random.Generator
 ) -> np.ndarray:
     """Coordinates of a random motion within all limits, about one of the `places` where the space leaves that open.
 

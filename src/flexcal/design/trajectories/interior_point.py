@@ -19,7 +19,7 @@ _PATIENCE = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Valued:
+class BarrierValue:
     """`value`, inf outside the limits, the `gradient` (k,) and `curved`: the barrier's Hessian's inverse times a vector, about."""
 
     value: float
@@ -30,7 +30,7 @@ class Valued:
 class Program(Protocol):
     """A function with limits."""
 
-    def evaluate(self, x: np.ndarray, barrier: float) -> Valued:
+    def evaluate(self, x: np.ndarray, barrier: float) -> BarrierValue:
         """f(x) - `barrier` Σ log(room that the limits leave)."""
         ...
 

@@ -10,22 +10,22 @@ import numpy as np
 from flexcal.data.plans import FourierPaths, SplinePaths, TrajectoryPlan
 from flexcal.design.scene import Clearance, CollisionChecker
 from flexcal.design.trajectories.criterion import (
-    TorqueGoal,
+    ExcitationCriterion,
     TrajectoryCriterion,
     declared_unknowns,
     torque_goal,
 )
-from flexcal.design.trajectories.excitation_problem import NEAR, ExcitingProgram
+from flexcal.design.trajectories.excitation_problem import NEAR, ExcitationProblem
 from flexcal.design.trajectories.feasible_start import (
     FINER,
-    feasible_places,
-    feasible_swing,
-    require_standing,
+    feasible_postures,
+    feasible_start_motion,
+    require_holding_torque,
 )
 from flexcal.design.trajectories.interior_point import minimise
 from flexcal.design.trajectories.limit_usage import MotionLimits
 from flexcal.design.trajectories.motion_space import Kind, MotionSpace
-from flexcal.design.trajectories.regressor_columns import TorqueColumns
+from flexcal.design.trajectories.regressor_columns import BaseRegressor
 from flexcal.design.trajectories.required_limits import require_stated_limits
 from flexcal.design.trajectories.sequences import Stage
 from flexcal.errors import InputError
@@ -57,9 +57,9 @@ class TrajectoryDesign:
 
     model: RobotModel
     plan: TrajectoryPlan
-    columns: TorqueColumns
+    columns: BaseRegressor
     limits: MotionLimits
-    goal: TorqueGoal
+    goal: ExcitationCriterion
     merits: tuple[float, ...]
     information: tuple[np.ndarray, ...]
     clearance: float | None
@@ -131,7 +131,7 @@ def design_trajectories(
     frequency = 1 / duration if base_frequency_hz is None else base_frequency_hz
     periods = _periods(duration, frequency)
     limits = MotionLimits.of(model, share)
-    columns = TorqueColumns.of(model, payload)
+    columns = BaseRegressor.of(model, payload)
     size = harmonics if kind == "fourier" else 3 * harmonics
     begin = None if start is None else np.asarray(start, dtype=float)
     space = MotionSpace.of(
@@ -147,7 +147,9 @@ def design_trajectories(
     goal = torque_goal(columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration)
     if sequence and criterion != "D":
         raise InputError("a sequence is designed by the criterion D of each stage's parameters; choose D.")
-    program = ExcitingProgram(space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR))
+    program = ExcitationProblem(
+        space, columns, goal, weights, limits, Clearance(CollisionChecker(model), NEAR)
+    )
     if after is not None:
         if after.payload != payload or after.joint_count != model.n:
             raise InputError("the plan before is for another robot or payload; design both alike.")
@@ -214,7 +216,7 @@ def _periods(duration: float, frequency: float) -> int:
     return round(periods)
 
 
-def _sizes(columns: TorqueColumns, weights: np.ndarray, limits: MotionLimits) -> np.ndarray:
+def _sizes(columns: BaseRegressor, weights: np.ndarray, limits: MotionLimits) -> np.ndarray:
     """Root mean square (r,) of the base columns at random states within the limits, relative to the torques' noise."""
     rng = np.random.default_rng(0)
     swing = rng.uniform(-1, 1, (3, 500, len(weights)))
@@ -227,7 +229,7 @@ def _sizes(columns: TorqueColumns, weights: np.ndarray, limits: MotionLimits) ->
 
 
 def _designed(
-    program: ExcitingProgram,
+    program: ExcitationProblem,
     begin: np.ndarray | None,
     starts: int,
     steps: int,
@@ -238,14 +240,14 @@ def _designed(
 ) -> np.ndarray:
     """Coordinates of one trajectory: from the most promising start, and from the next ones where its repair cost more than lies between."""
     if begin is None:
-        places = feasible_places(program)
+        places = feasible_postures(program)
     else:
-        require_standing(program, begin)
+        require_holding_torque(program, begin)
         places = None
     tried = []
     for k in range(starts):
         progress("trajectories", (number + 0.7 * k / starts) / count)
-        first = feasible_swing(program, places, rng)
+        first = feasible_start_motion(program, places, rng)
         x = minimise(program, first, list(_SCREENING), steps)
         tried.append((_merit(program, x), k, x, first))
     best, most = tried[0][3], -np.inf
@@ -259,11 +261,11 @@ def _designed(
     return best
 
 
-def _merit(program: ExcitingProgram, x: np.ndarray) -> float:
+def _merit(program: ExcitationProblem, x: np.ndarray) -> float:
     return program.merit.merit(program.information(program.space.motion(x)))
 
 
-def _kept(program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, steps: int) -> np.ndarray:
+def _kept(program: ExcitationProblem, x: np.ndarray, inside: np.ndarray, steps: int) -> np.ndarray:
     """`x` changed so that all limits hold on the finer grid: the coarse one gets tighter where they did not.
 
     `inside` keeps them.
@@ -281,7 +283,7 @@ def _kept(program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, steps: in
 
 
 def _smaller(
-    program: ExcitingProgram, x: np.ndarray, inside: np.ndarray, keeps: Callable[[np.ndarray], bool]
+    program: ExcitationProblem, x: np.ndarray, inside: np.ndarray, keeps: Callable[[np.ndarray], bool]
 ) -> np.ndarray:
     """Of the motions between `x` and the same place without a swing, and between `x` and `inside`, the best of the first two that keep
     the limits."""

@@ -26,7 +26,7 @@ _SEED = 1991
 
 
 @dataclass(frozen=True, eq=False)
-class TorqueColumns:
+class BaseRegressor:
     """The observation matrix of a rigid robot with classic friction (Eq. 2.20), its base columns only (Gautier 1991).
 
     `payload` is what the robot holds, kg; None takes the declared one. `found` says which of all columns (`names`) are kept and what
@@ -38,7 +38,7 @@ class TorqueColumns:
     found: Identifiability
 
     @classmethod
-    def of(cls, model: RobotModel, payload: float | None = None) -> TorqueColumns:
+    def of(cls, model: RobotModel, payload: float | None = None) -> BaseRegressor:
         """By rank-revealing QR at random states, the same in every run."""
         names = column_names(model)
         samples = _SAMPLES_PER_COLUMN * len(names)

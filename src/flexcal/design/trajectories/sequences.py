@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from flexcal.design.trajectories.regressor_columns import DRIVE, TorqueColumns
+from flexcal.design.trajectories.regressor_columns import DRIVE, BaseRegressor
 
 SequenceName = Literal["links", "axes", "kinds"]
 
@@ -18,7 +18,7 @@ class Stage:
     wanted: tuple[str, ...]
 
 
-def sequence(columns: TorqueColumns, name: SequenceName) -> tuple[Stage, ...]:
+def sequence(columns: BaseRegressor, name: SequenceName) -> tuple[Stage, ...]:
     """links: from the last to the first, each with those beyond it moving; axes: the outer half, then all for the inner one;
     kinds: inertias, then moments of gravity, then friction, all joints moving. A stage that is about nothing is left out.
     """

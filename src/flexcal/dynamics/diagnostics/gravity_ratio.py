@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate, student_quantile
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.torques import torque_regressor
 
 _POSES = 300
@@ -20,7 +20,7 @@ UNLIKE = 2.0
 
 
 @dataclass(frozen=True)
-class WeightShare:
+class GravityRatio:
     """Identified weight over that of the URDF, and its 95 % interval from `low` to `high`."""
 
     share: float
@@ -33,7 +33,7 @@ class WeightShare:
         return self.high < 1 / UNLIKE or self.low > UNLIKE
 
 
-def weight_shares(data: RegressionData, estimate: Estimate) -> dict[str, WeightShare]:
+def weight_shares(data: RegressionData, estimate: Estimate) -> dict[str, GravityRatio]:
     """By joint: slope of the identified gravity torque against that of the URDF over the joints' range, through zero.
 
     Joints without weight of their own, and those with a declared spring, which may carry it, are left out.
@@ -46,7 +46,7 @@ def weight_shares(data: RegressionData, estimate: Estimate) -> dict[str, WeightS
         ]
     )
     q = np.random.default_rng(0).uniform(limits[:, 0], limits[:, 1], (_POSES, model.n))
-    still, links = np.zeros_like(q), len(INERTIAL) * model.n
+    still, links = np.zeros_like(q), len(LINK_PARAMETERS) * model.n
     columns = torque_regressor(model, q, still, still)
     declared = columns @ data.observation.values()[:links]
     size = np.sqrt(np.mean(declared**2, axis=0))
@@ -59,5 +59,5 @@ def weight_shares(data: RegressionData, estimate: Estimate) -> dict[str, WeightS
             continue
         slope = declared[:, k] @ columns[:, k] / np.sum(declared[:, k] ** 2)
         share, half = float(slope @ x), quantile * math.sqrt(max(0.0, float(slope @ covariance @ slope)))
-        found[name] = WeightShare(share, share - half, share + half)
+        found[name] = GravityRatio(share, share - half, share + half)
     return found

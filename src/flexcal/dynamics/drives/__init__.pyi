@@ -1,11 +1,11 @@
-from .backlash import with_play
+from .backlash import with_backlash
 from .gains import drive_gains
-from .nominal_inertials import with_nominal_spread
-from .stiffness_bias import attenuation
+from .nominal_inertials import with_nominal_uncertainty
+from .stiffness_bias import stiffness_attenuation
 
 __all__ = [
-    "attenuation",
     "drive_gains",
-    "with_nominal_spread",
-    "with_play",
+    "stiffness_attenuation",
+    "with_backlash",
+    "with_nominal_uncertainty",
 ]

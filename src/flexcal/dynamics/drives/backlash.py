@@ -13,7 +13,7 @@ _PASSES = 2
 """The first finds at what reading of both encoders a spring is relaxed, the second how wide the gap there is."""
 
 
-def with_play(
+def with_backlash(
     observation: Observation, equations: Callable[[Observation], Sequence[ExperimentSystem]]
 ) -> Observation:
     """The observation whose springs at joints with backlash know their gap; the same where no spring has one.
@@ -27,7 +27,7 @@ def with_play(
         data = RegressionData.of(observation, BaseParameters.of(observation), equations(observation))
         values = weighted_least_squares(data).values
         springs = (
-            spring.with_play(model, values) if spring.joint in model.backlash_joints else spring
+            spring.with_backlash(model, values) if spring.joint in model.backlash_joints else spring
             for spring in observation.springs
         )
         observation = replace(observation, springs=tuple(springs))

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.dynamics.estimators import InstrumentalFit, instrumental_fit, noise_levels
-from flexcal.dynamics.regression import Batch, RegressionData, Triangle, triangular
+from flexcal.dynamics.regression import Batch, RegressionData, TriangularFactor, triangular
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 
 _SETTLED = 1e-6
 """Largest relative change of a gain that ends the iteration."""
@@ -102,8 +102,8 @@ class _Terms:
     def __init__(self, data: RegressionData, payloads: Sequence[float], link: int) -> None:
         self.data, self._payloads = data, payloads
         self._base = list(data.base.found.kept)
-        first = len(INERTIAL) * link
-        self._mass, self._rest = first, list(range(first + 1, first + len(INERTIAL)))
+        first = len(LINK_PARAMETERS) * link
+        self._mass, self._rest = first, list(range(first + 1, first + len(LINK_PARAMETERS)))
         n = data.observation.model.n
         self._width = len(self._base) + len(self._rest) + n
         self.gains = slice(self._width - n, self._width)
@@ -111,7 +111,7 @@ class _Terms:
     @property
     def whole(self) -> list[tuple[Batch]]:
         """Every experiment as one batch: all that values need, and too little for their covariance."""
-        found: dict[int, list[Triangle]] = {}
+        found: dict[int, list[TriangularFactor]] = {}
         for s in self.data.subsystems:
             found.setdefault(s.experiment, []).append(s.triangle)
         return [(Batch(0, own[0].rows, tuple(t.factor for t in own)),) for own in found.values()]

@@ -16,7 +16,7 @@ _STEP = 1e-4
 """Of the central differences, in estimation coordinates."""
 
 
-def with_nominal_spread(data: RegressionData, estimate: Estimate) -> Estimate:
+def with_nominal_uncertainty(data: RegressionData, estimate: Estimate) -> Estimate:
     """The estimate, its covariance larger by what nominal values of parameters that it does not estimate may be off.
 
     In a rigid arm the others absorb these exactly, by the regrouping. In the equation of a bearing a link also adds torque in proportion to

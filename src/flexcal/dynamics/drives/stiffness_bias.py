@@ -9,7 +9,7 @@ from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
 
 
-def attenuation(data: RegressionData, estimate: Estimate) -> dict[str, float]:
+def stiffness_attenuation(data: RegressionData, estimate: Estimate) -> dict[str, float]:
     """By name of the identified stiffnesses of drives and bearings, the largest share by which noise of q - θ can have made them too small.
 
     Noise of size σ_e in N rows of a column of which the others leave t makes K smaller by K N σ_e² / ‖t‖². It also stands in the

@@ -1,4 +1,4 @@
-from .column_noise import column_errors, noisy_logs
+from .column_noise import perturbed_logs, regressor_errors
 from .didim import direct_and_inverse
 from .ekf import kalman_filter
 from .energy_model import energy_least_squares
@@ -19,7 +19,6 @@ __all__ = [
     "InstrumentalFit",
     "RecordedRows",
     "Unknowns",
-    "column_errors",
     "direct_and_inverse",
     "energy_least_squares",
     "extended",
@@ -30,9 +29,10 @@ __all__ = [
     "kalman_filter",
     "maximum_likelihood",
     "noise_levels",
-    "noisy_logs",
     "ordinary_least_squares",
+    "perturbed_logs",
     "power_least_squares",
+    "regressor_errors",
     "total_least_squares",
     "weighted_least_squares",
     "weighted_system",

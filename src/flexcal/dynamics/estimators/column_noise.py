@@ -29,7 +29,7 @@ _GAIN = 70.0
 _SEED = 1994
 
 
-def column_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> RegressionData:
+def regressor_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> RegressionData:
     """Rows of W with the noise of the experiments `noisy`, less those of the recorded ones; zero in Y, signs and constants.
 
     Of either, one pass. Each of the noisy experiments has the samples of its recorded one, and errors of the same size on top of its own.
@@ -59,14 +59,15 @@ def _difference(block: Rows, spoilt: Rows) -> Iterable[np.ndarray]:
         yield np.vstack([other[:-1] - own[:-1], np.zeros_like(own[-1:])])
 
 
-def noisy_logs(recorded: RecordedRows) -> list[NoisyLog]:
+def perturbed_logs(recorded: RecordedRows) -> list[PerturbedLog]:
     """The recorded logs with their own position noise added once more; raises `FlexcalError` for an experiment that is no log."""
     model = recorded.observation.model
     logs = [experiment for experiment in recorded.experiments if isinstance(experiment, JointLog)]
     if len(logs) < len(recorded.experiments):
         raise FlexcalError("total least squares needs the positions as they were logged, with their noise.")
     return [
-        NoisyLog(log, model, position_noise(log, model), _SEED + number) for number, log in enumerate(logs)
+        PerturbedLog(log, model, position_noise(log, model), _SEED + number)
+        for number, log in enumerate(logs)
     ]
 
 
@@ -81,7 +82,7 @@ def position_noise(log: JointLog, model: RobotModel) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class NoisyLog:
+class PerturbedLog:
     """A log whose positions have more white noise, of standard deviations `std` (n,), the same at every pass."""
 
     log: JointLog

@@ -19,7 +19,7 @@ from flexcal.dynamics.regression import (
     triangular,
 )
 from flexcal.dynamics.signals import Experiment, Window, slowest_speeds
-from flexcal.dynamics.simulation import ForwardModel, ForwardModels, ForwardSteps, forward_steps
+from flexcal.dynamics.simulation import IntegrationSteps, StateTransition, StateTransitions, discretise_motion
 from flexcal.estimation import Estimate
 
 POSITION_NOISE = 1e-5
@@ -53,10 +53,12 @@ def kalman_filter(data: RegressionData, recorded: RecordedRows) -> Estimate:
         about = state.parameters.copy()
         state = _Filter(data, unknowns)
         for sigma, (experiment, window) in zip(torque, _recordings(recorded), strict=True):
-            for steps in forward_steps(recorded.observation, experiment, window, slowest_speeds(experiment)):
+            for steps in discretise_motion(
+                recorded.observation, experiment, window, slowest_speeds(experiment)
+            ):
                 if steps.begins:
                     state.restart()
-                models = ForwardModels.of(steps, about, _smoothing(recorded))
+                models = StateTransitions.of(steps, about, _smoothing(recorded))
                 state.follow(models, _step_noise(sigma, steps, recorded))
     found, spread = _settled(state, recorded, torque, unknowns.kept)
     cost = float(np.linalg.norm(system.right - system.matrix @ found) ** 2)
@@ -75,7 +77,7 @@ def _recordings(recorded: RecordedRows) -> Iterator[tuple[Experiment, Window]]:
     return zip(recorded.experiments, recorded.windows, strict=True)
 
 
-def _step_noise(sigma: np.ndarray, steps: ForwardSteps, recorded: RecordedRows) -> np.ndarray:
+def _step_noise(sigma: np.ndarray, steps: IntegrationSteps, recorded: RecordedRows) -> np.ndarray:
     """Standard deviation (n,) of the mean torque of a step, N m, of noise `sigma` of decimated rows that is white up to their band."""
     return sigma * np.sqrt(recorded.decimation.factor * steps.spacing / steps.length)
 
@@ -88,13 +90,13 @@ def _settled(
     root, scores = state.root(), []
     for sigma, (experiment, window) in zip(torque, _recordings(recorded), strict=True):
         own: InnovationScores | None = None
-        for steps in forward_steps(recorded.observation, experiment, window, slowest_speeds(experiment)):
+        for steps in discretise_motion(recorded.observation, experiment, window, slowest_speeds(experiment)):
             if own is None:
                 length = (
                     int(experiment.samples * steps.spacing / steps.length) // batches_each(len(torque)) + 1
                 )
                 own = InnovationScores(state.parameters, kept, root, POSITION_NOISE, length)
-            models = ForwardModels.of(steps, state.parameters, _smoothing(recorded))
+            models = StateTransitions.of(steps, state.parameters, _smoothing(recorded))
             own.follow(models, _step_noise(sigma, steps, recorded), _FIRST_SPEED)
         if own is not None:
             scores.append(own.scores)
@@ -135,7 +137,7 @@ class _Filter:
         self.restart()
         return (self._root * self._scale).T
 
-    def follow(self, models: ForwardModels, torque_noise: np.ndarray) -> None:
+    def follow(self, models: StateTransitions, torque_noise: np.ndarray) -> None:
         """Predict and correct, step by step; `torque_noise` (n,) is the standard deviation of a step's mean torque, N m."""
         steps = models.steps
         for k in range(len(steps.torque)):
@@ -153,7 +155,7 @@ class _Filter:
         self._whole[2 * n :, 2 * n :] = self._root
         return np.concatenate([position, speed])
 
-    def _step(self, model: ForwardModel, after: np.ndarray, torque_noise: np.ndarray) -> None:
+    def _step(self, model: StateTransition, after: np.ndarray, torque_noise: np.ndarray) -> None:
         n, size = self._n, len(self._whole)
         onward = np.eye(size)
         onward[: 2 * n, : 2 * n] = model.by_state

@@ -14,7 +14,7 @@ from flexcal.dynamics.estimators.wls import noise_levels
 from flexcal.dynamics.inverse_model import Column, Coupling, Memory, RotorInertia
 from flexcal.dynamics.signals import Motion
 from flexcal.estimation import Estimate
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.torques import energy_regressor
 
 _WINDOW = 0.1
@@ -59,7 +59,7 @@ class EnergyModel(ScalarEquations):
     def _stored(self, motion: Motion) -> np.ndarray:
         """Energy of links and rotors by parameter (p + 1, N), the last row zero."""
         found = np.zeros((len(self.names) + 1, len(motion)))
-        found[: len(INERTIAL) * self.model.n] = energy_regressor(self.model, motion.q, motion.dq).T
+        found[: len(LINK_PARAMETERS) * self.model.n] = energy_regressor(self.model, motion.q, motion.dq).T
         for column in self._columns(replace(motion, ddq=motion.dq), {}, inertial=True):
             found[self.names.index(column.name)] += 0.5 * motion.dq[:, column.joint] * column.values
         return found

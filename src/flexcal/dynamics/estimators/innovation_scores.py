@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.dynamics.regression import Scores
-from flexcal.dynamics.simulation import ForwardModel, ForwardModels
+from flexcal.dynamics.simulation import StateTransition, StateTransitions
 
 
 class InnovationScores:
@@ -24,7 +24,7 @@ class InnovationScores:
         self._state: tuple[np.ndarray, np.ndarray, np.ndarray] | None = None
         self._found: dict[int, tuple[np.ndarray, np.ndarray]] = {}
 
-    def follow(self, models: ForwardModels, torque_noise: np.ndarray, first_speed: float) -> None:
+    def follow(self, models: StateTransitions, torque_noise: np.ndarray, first_speed: float) -> None:
         """Steps that follow those before; `torque_noise` (n,) is the standard deviation of a step's mean torque (N m)."""
         steps = models.steps
         n, size = len(torque_noise), self._root.shape[1]
@@ -44,7 +44,7 @@ class InnovationScores:
                 )
             self._step(models.step(k, self._state[0], self._parameters), steps.after[k], torque_noise)
 
-    def _step(self, model: ForwardModel, after: np.ndarray, torque_noise: np.ndarray) -> None:
+    def _step(self, model: StateTransition, after: np.ndarray, torque_noise: np.ndarray) -> None:
         assert self._state is not None
         n = len(after)
         _, spread, slope = self._state

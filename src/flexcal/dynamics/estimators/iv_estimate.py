@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.regression import Batch, BatchCovariance, rows_of, score_covariance, triangular
+from flexcal.dynamics.regression import Batch, BatchCovariance, parameter_rows, score_covariance, triangular
 from flexcal.errors import FlexcalError
 
 _WEAKEST = 1e-3
@@ -62,7 +62,7 @@ def instrumental_fit(
     spread = score_covariance(
         experiments,
         noise,
-        [np.vstack([rows_of(whiten, kept, own), np.zeros((len(own) + 1, size))]) for own in members],
+        [np.vstack([parameter_rows(whiten, kept, own), np.zeros((len(own) + 1, size))]) for own in members],
         [np.concatenate([np.zeros(len(own)), -found[own], [1.0]]) for own in members],
         root,
         cost / (equations - size),
@@ -73,7 +73,7 @@ def instrumental_fit(
 def _columns(members: np.ndarray, kept: Sequence[int], start: np.ndarray) -> np.ndarray:
     """(2 m + 1, 2 k + 1): from a joint's [Z, W, Y] to the kept columns of Z, those of W, and Y less what `start` explains."""
     m, size = len(members), len(kept)
-    chosen = rows_of(np.eye(size), kept, members)
+    chosen = parameter_rows(np.eye(size), kept, members)
     found = np.zeros((2 * m + 1, 2 * size + 1))
     found[:m, :size] = found[m : 2 * m, size : 2 * size] = chosen
     found[m : 2 * m, -1] = -start[members]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.regression import RegressionData, Triangle, batch_covariance, stacked
+from flexcal.dynamics.regression import RegressionData, TriangularFactor, batch_covariance, stacked
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse
 from flexcal.model.robot import unit_in
@@ -44,20 +44,20 @@ class Unknowns:
     hidden: tuple[Dropped, ...]
 
     @classmethod
-    def of(cls, data: RegressionData, system: Triangle) -> Unknowns:
+    def of(cls, data: RegressionData, system: TriangularFactor) -> Unknowns:
         """The base parameters that a weighted `system` of all columns determines."""
         base = data.base.found
         structural = [data.names[i] for i in base.kept]
         seen = analyse(system.matrix[:, base.kept], structural, prefer=structural)
         return cls(data, [base.kept[i] for i in seen.kept], seen.dropped)
 
-    def reduced(self, system: Triangle) -> tuple[np.ndarray, np.ndarray]:
+    def reduced(self, system: TriangularFactor) -> tuple[np.ndarray, np.ndarray]:
         """R (k + 1, k + 1) of the kept columns times a scale (k,), and of what is left of Y at the model's values; and that scale."""
         right = system.right - system.matrix @ self.data.observation.values()
         scale = 1.0 / np.linalg.norm(system.matrix[:, self.kept], axis=0)
-        return Triangle.of(system.matrix[:, self.kept] * scale, right).factor, scale
+        return TriangularFactor.of(system.matrix[:, self.kept] * scale, right).factor, scale
 
-    def freedom(self, system: Triangle) -> int:
+    def freedom(self, system: TriangularFactor) -> int:
         """Rows less parameters; raises `FlexcalError` where none is left."""
         freedom = system.rows - len(self.kept)
         if freedom <= 0:
@@ -99,10 +99,10 @@ class Unknowns:
         )
 
 
-def weighted_system(data: RegressionData, noise: Sequence[float]) -> Triangle:
+def weighted_system(data: RegressionData, noise: Sequence[float]) -> TriangularFactor:
     """All subsystems as one system of all columns, each divided by its `noise` (N m)."""
     weighted = [
-        Triangle(s.triangle.factor / sigma, s.triangle.rows)
+        TriangularFactor(s.triangle.factor / sigma, s.triangle.rows)
         for s, sigma in zip(data.subsystems, noise, strict=True)
     ]
     return stacked(weighted, [s.members for s in data.subsystems], len(data.names))

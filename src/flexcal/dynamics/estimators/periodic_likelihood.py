@@ -13,7 +13,7 @@ from flexcal.dynamics.estimators.linear_least_squares import Unknowns
 from flexcal.dynamics.estimators.recorded_rows import RecordedRows
 from flexcal.dynamics.estimators.wls import weighted_least_squares
 from flexcal.dynamics.inverse_model import Memory, Observation
-from flexcal.dynamics.regression import RegressionData, Triangle, mixed_covariance
+from flexcal.dynamics.regression import RegressionData, TriangularFactor, mixed_covariance
 from flexcal.dynamics.signals import Motion, RepeatedMotion, real_rows
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
@@ -90,7 +90,7 @@ def maximum_likelihood(data: RegressionData, recorded: RecordedRows) -> Estimate
         roots = [_root(_scatter(own), rows) for own, rows in zip(missed, means, strict=True)]
         parts = [_whitened(rows, root) for rows, root in zip(means, roots, strict=True)]
         stack = np.concatenate(parts)
-        system = Triangle.of(stack[:, :-1], stack[:, -1])
+        system = TriangularFactor.of(stack[:, :-1], stack[:, -1])
         unknowns = Unknowns.of(data, system)
         before, kept = found, unknowns.kept
         triangle, scale = unknowns.reduced(system)

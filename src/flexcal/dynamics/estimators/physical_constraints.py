@@ -8,9 +8,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from flexcal.dynamics.inverse_model import Equations
-from flexcal.dynamics.regression import Triangle
+from flexcal.dynamics.regression import TriangularFactor
 from flexcal.estimation import Cone
-from flexcal.model.parts import INERTIAL, PSEUDO_INERTIA, Inertia, pseudo_inertia
+from flexcal.model.parts import LINK_PARAMETERS, PSEUDO_INERTIA, Inertia, pseudo_inertia
 from flexcal.model.robot import RobotModel
 
 _LINK_FLOOR = 1e-3
@@ -30,7 +30,7 @@ _UNKNOWN_MASS, _UNKNOWN_RADIUS = 1.0, 0.05
 """kg and m, of a link of which neither URDF nor the other links tell anything."""
 
 
-def feasible_set(observation: Equations, system: Triangle) -> tuple[Cone, ...]:
+def feasible_set(observation: Equations, system: TriangularFactor) -> tuple[Cone, ...]:
     """The cones of all links and drives of an observation, whose weighted equations are `system`.
 
     A link's pseudo-inertia is positive definite (Sousa & Cortesão 2014; Wensing, Kim & Slotine 2018), with CAD as its reference and the
@@ -46,7 +46,7 @@ def feasible_set(observation: Equations, system: Triangle) -> tuple[Cone, ...]:
 def _links(model: RobotModel) -> Iterator[Cone]:
     std = max(model.prior.mass, _TIGHTEST)
     for i, link in enumerate(model.inertias):
-        members = np.arange(len(INERTIAL) * i, len(INERTIAL) * (i + 1))
+        members = np.arange(len(LINK_PARAMETERS) * i, len(LINK_PARAMETERS) * (i + 1))
         if link.mass > 0:
             yield Cone(members, PSEUDO_INERTIA, pseudo_inertia(extended(link)), _LINK_FLOOR, 2.0 * std)
             yield _scalar(members[0], link.mass, 1.0 - _MASS_BOUND * std, math.inf)
@@ -72,7 +72,7 @@ def _guessed(model: RobotModel, link: int) -> Inertia:
     return Inertia(mass, np.zeros(3), 0.4 * mass * radius**2 * np.eye(3))
 
 
-def _drives(observation: Equations, system: Triangle) -> Iterator[Cone]:
+def _drives(observation: Equations, system: TriangularFactor) -> Iterator[Cone]:
     model, names = observation.model, observation.names
     torque, sizes = float(np.linalg.norm(system.right)) or 1.0, np.linalg.norm(system.matrix, axis=0)
     largest: dict[str, float] = {}

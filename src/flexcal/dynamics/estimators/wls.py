@@ -8,7 +8,7 @@ from flexcal.dynamics.estimators.linear_least_squares import Unknowns, linear_fi
 from flexcal.dynamics.regression import RegressionData, Subsystem
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 
 _FIRST, _ROUNDS = 1e-2, 3
 """Noise to begin with of equations that nobody drives, over what their links ask, and how often it is renewed."""
@@ -56,7 +56,7 @@ def _fitted(data: RegressionData, noise: list[float]) -> np.ndarray:
 
 def _first(data: RegressionData, s: Subsystem) -> float:
     """Noise (N m) to begin with of a subsystem that nobody drives: a share of what CAD says that its links ask, else of the torques."""
-    links = s.members < len(INERTIAL) * data.observation.model.n
+    links = s.members < len(LINK_PARAMETERS) * data.observation.model.n
     asked = s.triangle.matrix[:, links] @ data.observation.values()[s.members[links]]
     sizes = [np.linalg.norm(o.triangle.right) / np.sqrt(o.triangle.rows) for o in data.subsystems]
     return _FIRST * (float(np.linalg.norm(asked)) / np.sqrt(s.triangle.rows) or float(max(sizes))) or 1.0

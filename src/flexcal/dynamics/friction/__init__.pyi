@@ -1,6 +1,6 @@
 from .catalogue import FRICTION_TERMS
 from .selection import FrictionSelection, select_friction
-from .stepwise import Candidate, Trial
+from .stepwise import Candidate, SelectionStep
 from .terms import AsymmetricCoulomb, LoadCoulomb, Presliding, Stribeck, SublinearViscous, WarmUp
 
 __all__ = [
@@ -10,9 +10,9 @@ __all__ = [
     "FrictionSelection",
     "LoadCoulomb",
     "Presliding",
+    "SelectionStep",
     "Stribeck",
     "SublinearViscous",
-    "Trial",
     "WarmUp",
     "select_friction",
 ]

@@ -101,7 +101,7 @@ def _size(systems: Sequence[ExperimentSystem], observation: Observation, axis: M
     return math.sqrt(square / sum(batch.rows for s in systems for batch in s.batches))
 
 
-def variants(name: str, scale: Scale) -> tuple[Candidate, ...]:
+def candidate_shapes(name: str, scale: Scale) -> tuple[Candidate, ...]:
     """The term `name` of the library in the shapes to try."""
     match name:
         case "sublinear_viscous":
@@ -135,7 +135,7 @@ def variants(name: str, scale: Scale) -> tuple[Candidate, ...]:
             return tuple(Candidate(name, f"{time:.3g} s", warming(time)) for time in times)
 
 
-def plain_terms(friction: tuple[str, ...]) -> tuple[DriveTerm, ...]:
+def standard_terms(friction: tuple[str, ...]) -> tuple[DriveTerm, ...]:
     """Rotor inertia, the terms among `friction` outside the library, coupling and springs; raises `FlexcalError` for an unknown name."""
     for name in friction:
         if name not in FRICTION_TERMS:

@@ -9,12 +9,12 @@ import numpy as np
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
-from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, plain_terms, variants
-from flexcal.dynamics.friction.significance import WideFit
+from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, candidate_shapes, standard_terms
+from flexcal.dynamics.friction.significance import CandidateFit
 from flexcal.dynamics.friction.stepwise import (
     Candidate,
     FrictionChoice,
-    Trial,
+    SelectionStep,
     best_shapes,
     candidate_columns,
     forward_selection,
@@ -22,19 +22,19 @@ from flexcal.dynamics.friction.stepwise import (
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, DriveTerm, Observation
 from flexcal.dynamics.regression import ExperimentSystem, RegressionData, folds
 from flexcal.estimation import Estimate
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import RobotModel
 
 
 @dataclass(frozen=True, eq=False)
-class ModelSpread:
+class ModelUncertainty:
     """`deviations` (models, k) of the parameters `names` from those of the selected model, which is the first of the models."""
 
     names: tuple[str, ...]
     deviations: np.ndarray
 
     @classmethod
-    def of(cls, estimates: Sequence[Estimate]) -> ModelSpread:
+    def of(cls, estimates: Sequence[Estimate]) -> ModelUncertainty:
         """Of the parameters that all `estimates` have identified, the selected model's first."""
         names = estimates[0].parameters.names
         shared = np.all([estimate.identifiable for estimate in estimates], axis=0)
@@ -78,8 +78,8 @@ class FrictionSelection:
     terms: tuple[DriveTerm, ...]
     names: tuple[str, ...]
     chosen: tuple[Candidate, ...]
-    trials: tuple[Trial, ...]
-    spread: ModelSpread | None = None
+    trials: tuple[SelectionStep, ...]
+    spread: ModelUncertainty | None = None
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -100,12 +100,12 @@ def select_friction(
     unknown term, and as `weighted_least_squares` does.
     """
     names = _CLASSIC if isinstance(friction, str) else friction
-    plain = CLASSIC if isinstance(friction, str) else plain_terms(names)
+    plain = CLASSIC if isinstance(friction, str) else standard_terms(names)
     library = LIBRARY if friction == "auto" else tuple(name for name in LIBRARY if name in names)
     if not library:
         return FrictionSelection(plain, names, (), ())
     scale = _scale(model, equations)
-    candidates = [candidate for name in library for candidate in variants(name, scale)]
+    candidates = [candidate for name in library for candidate in candidate_shapes(name, scale)]
     wide = Observation(model, (*plain, *candidates))
     systems = equations(wide)
     base = BaseParameters.of(Observation(model, plain)).found
@@ -113,7 +113,7 @@ def select_friction(
     reach = -(-2 * decimation.support // decimation.factor)
     blocks = folds(systems, wide.members, len(wide.names), fixed, reach)
     groups = {candidate: candidate_columns(wide, candidate) for candidate in candidates}
-    fit = WideFit(wide, systems, fixed)
+    fit = CandidateFit(wide, systems, fixed)
     choice = (
         forward_selection(blocks, fixed, groups, fit.p_value)
         if friction == "auto"
@@ -129,10 +129,12 @@ def select_friction(
     )
 
 
-def _spread(fit: WideFit, choice: FrictionChoice, groups: Mapping[Candidate, Sequence[int]]) -> ModelSpread:
+def _spread(
+    fit: CandidateFit, choice: FrictionChoice, groups: Mapping[Candidate, Sequence[int]]
+) -> ModelUncertainty:
     of = {candidate.label: numbers for candidate, numbers in groups.items()}
     sets = [[c.label for c in choice.chosen], *choice.rivals]
-    return ModelSpread.of([fit.estimate([n for label in labels for n in of[label]]) for labels in sets])
+    return ModelUncertainty.of([fit.estimate([n for label in labels for n in of[label]]) for labels in sets])
 
 
 def _scale(model: RobotModel, equations: Callable[[Observation], Sequence[ExperimentSystem]]) -> Scale:
@@ -140,4 +142,4 @@ def _scale(model: RobotModel, equations: Callable[[Observation], Sequence[Experi
     systems = equations(classic)
     data = RegressionData.of(classic, BaseParameters.of(classic), systems)
     found = weighted_least_squares(data).parameters.coordinates()
-    return Scale.of(systems, classic, found[: len(INERTIAL) * model.n])
+    return Scale.of(systems, classic, found[: len(LINK_PARAMETERS) * model.n])

@@ -18,7 +18,7 @@ _FREEDOM = 8.0
 
 
 @dataclass(frozen=True, eq=False)
-class WideFit:
+class CandidateFit:
     """Weighted least squares of some columns of an observation that has all candidates' columns side by side.
 
     `plain` are the numbers of the columns that are always in.

@@ -42,7 +42,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Trial:
+class SelectionStep:
     """A set of friction terms beyond the classic ones, and its cross-validation error ‖Y - W χ‖ / ‖Y‖.
 
     `p_value` is that of the last of the terms, times the number of candidates; None where the error alone decided.
@@ -58,7 +58,7 @@ class FrictionChoice:
     """The candidates chosen, and everything that was tried, in order."""
 
     chosen: tuple[Candidate, ...]
-    trials: tuple[Trial, ...]
+    trials: tuple[SelectionStep, ...]
 
     @property
     def rivals(self) -> tuple[tuple[str, ...], ...]:
@@ -88,7 +88,7 @@ def forward_selection(
     """
     chosen: list[Candidate] = []
     (error,) = prediction_errors(folds, plain, [[]])
-    trials = [Trial((), error)]
+    trials = [SelectionStep((), error)]
     while left := [c for c in groups if c.name not in {taken.name for taken in chosen}]:
         before = [number for candidate in chosen for number in groups[candidate]]
         _, tried = _best(folds, plain, groups, chosen, left)
@@ -115,7 +115,7 @@ def best_shapes(
 ) -> FrictionChoice:
     """The terms `names`, one after the other, each in the shape with the smallest error; all of them are taken."""
     chosen: list[Candidate] = []
-    trials: list[Trial] = []
+    trials: list[SelectionStep] = []
     for name in names:
         found, tried = _best(folds, plain, groups, chosen, [c for c in groups if c.name == name])
         trials += tried
@@ -129,11 +129,11 @@ def _best(
     groups: Mapping[Candidate, Sequence[int]],
     chosen: Sequence[Candidate],
     left: Sequence[Candidate],
-) -> tuple[Candidate, list[Trial]]:
+) -> tuple[Candidate, list[SelectionStep]]:
     fixed = [*plain, *(number for candidate in chosen for number in groups[candidate])]
     errors = prediction_errors(folds, fixed, [groups[candidate] for candidate in left])
     before = tuple(candidate.label for candidate in chosen)
-    tried = [Trial((*before, c.label), error) for c, error in zip(left, errors, strict=True)]
+    tried = [SelectionStep((*before, c.label), error) for c, error in zip(left, errors, strict=True)]
     return left[errors.index(min(errors))], tried
 
 

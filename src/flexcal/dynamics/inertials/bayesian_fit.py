@@ -9,8 +9,8 @@ import numpy as np
 
 from flexcal.data.plans import TrajectoryPlan
 from flexcal.data.recordings import Recording
-from flexcal.dynamics.inertials.linearised_equations import TrajectoryRows, unknowns
-from flexcal.dynamics.inertials.second_order_covariance import Curvature
+from flexcal.dynamics.inertials.linearised_equations import LinearisedEquations, unknowns
+from flexcal.dynamics.inertials.second_order_covariance import SecondOrderCovariance
 from flexcal.dynamics.signals import PeriodicMotion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate, Problem, solve
@@ -24,7 +24,7 @@ _SMALLEST = 1e-9
 """Noise of torques that are fitted exactly, relative to them."""
 
 
-def noise(rows: TrajectoryRows, estimate: Estimate, weighed: np.ndarray) -> np.ndarray:
+def noise(rows: LinearisedEquations, estimate: Estimate, weighed: np.ndarray) -> np.ndarray:
     """Standard deviation (2 K + 1, n) of every coefficient of every joint, N m, smooth over the lines.
 
     From the residual of an estimate that was weighed with `weighed` (2 K + 1, n), less the freedom that it took from there. About every
@@ -72,27 +72,27 @@ def identify_with_prior(model: RobotModel, plan: TrajectoryPlan, recordings: Ite
     if not motions:
         raise FlexcalError("there is no recording of a trajectory to identify from; give at least one.")
     parameters, own = unknowns(model)
-    rows = TrajectoryRows.about(model, parameters, motions, plan.payload)
+    rows = LinearisedEquations.about(model, parameters, motions, plan.payload)
     silent = [name for name, size in zip(model.joint_names, rows.size, strict=True) if not size > 0]
     if silent:
         raise FlexcalError(f"the torque of {silent[0]} is zero in all recordings; record it.")
     estimate = _fit(rows, rows.first_sigma())
     sigma = noise(rows, estimate, rows.first_sigma())
     for _ in range(ROUNDS):
-        rows = TrajectoryRows.about(model, estimate.parameters, motions, plan.payload)
+        rows = LinearisedEquations.about(model, estimate.parameters, motions, plan.payload)
         estimate = _fit(rows, sigma)
         sigma = noise(rows, estimate, sigma)
         step = estimate.parameters.coordinates() - rows.parameters.coordinates()
         if step @ np.linalg.solve(estimate.covariance, step) < CONVERGED:
             break
     for _ in range(CURVATURE_PASSES):
-        bent = Curvature.of(model, estimate, motions).added_to(rows)
+        bent = SecondOrderCovariance.of(model, estimate, motions).added_to(rows)
         estimate = _fit(bent, sigma)
         sigma = noise(bent, estimate, sigma)
     return _marginal(estimate, own)
 
 
-def _fit(rows: TrajectoryRows, sigma: np.ndarray) -> Estimate:
+def _fit(rows: LinearisedEquations, sigma: np.ndarray) -> Estimate:
     about = rows.parameters.coordinates()
     right = (rows.residual / sigma).ravel()
     slope = -(rows.jacobian / sigma[:, :, None]).reshape(right.size, -1)

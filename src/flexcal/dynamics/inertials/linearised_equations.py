@@ -46,7 +46,7 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
 
 
 @dataclass(frozen=True, eq=False)
-class TrajectoryRows:
+class LinearisedEquations:
     """T trajectories, n joints, 2 K + 1 coefficients: `measured` minus predicted torque is `residual` (T, 2 K + 1, n), N m.
 
     `jacobian` (T, 2 K + 1, n, p) is the derivative of the prediction in estimation coordinates, at the values of `parameters`.
@@ -64,7 +64,7 @@ class TrajectoryRows:
         parameters: Parameters,
         motions: Sequence[PeriodicMotion],
         payload: float | None,
-    ) -> TrajectoryRows:
+    ) -> LinearisedEquations:
         """Linearised at the values of the parameters."""
         x = parameters.coordinates()
         measured, predicted, jacobians = [], [], []

@@ -13,7 +13,7 @@ from itertools import combinations_with_replacement
 
 import numpy as np
 
-from flexcal.dynamics.inertials.linearised_equations import SAMPLES_PER_LINE, TrajectoryRows
+from flexcal.dynamics.inertials.linearised_equations import SAMPLES_PER_LINE, LinearisedEquations
 from flexcal.dynamics.signals import PeriodicMotion
 from flexcal.estimation import Estimate, Parameter, Parameters
 from flexcal.model.robot import RobotModel, uncertain_inertials
@@ -25,14 +25,16 @@ _NOTHING = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class Curvature:
+class SecondOrderCovariance:
     """Second-order terms of the rows: `mean` (T, 2 K + 1, n) and `columns` (T, 2 K + 1, n, c), N m, with independent unit factors."""
 
     mean: np.ndarray
     columns: np.ndarray
 
     @classmethod
-    def of(cls, model: RobotModel, estimate: Estimate, motions: Sequence[PeriodicMotion]) -> Curvature:
+    def of(
+        cls, model: RobotModel, estimate: Estimate, motions: Sequence[PeriodicMotion]
+    ) -> SecondOrderCovariance:
         """Moments of the terms δ_a δ_b of the deviations δ of an estimate, by Isserlis' theorem, times their effect on the torques."""
         names = uncertain_inertials(model, range(model.n))
         bends, pairs = _second_derivatives(model, estimate.parameters.subset(names))
@@ -49,11 +51,11 @@ class Curvature:
         )
         return cls(rows @ c[a, b], rows @ (turns[:, kept] * np.sqrt(sizes[kept])))
 
-    def added_to(self, rows: TrajectoryRows) -> TrajectoryRows:
+    def added_to(self, rows: LinearisedEquations) -> LinearisedEquations:
         """The rows with these terms beside the linear ones, as unknowns of their own."""
         count = self.columns.shape[-1]
         unknown = Parameters(Parameter(f"curvature_{k + 1}", "1", 0.0, prior_std=1.0) for k in range(count))
-        return TrajectoryRows(
+        return LinearisedEquations(
             rows.parameters + unknown,
             rows.measured,
             rows.residual - self.mean,

@@ -1,6 +1,6 @@
 from .base_parameters import BaseParameters
 from .bearing_spring import BearingSpring
-from .drive_spring import DriveSpring, Play
+from .drive_spring import DriveBacklash, DriveSpring
 from .drive_terms import (
     CLASSIC,
     Column,
@@ -25,6 +25,7 @@ __all__ = [
     "Column",
     "Coulomb",
     "Coupling",
+    "DriveBacklash",
     "DriveSpring",
     "DriveTerm",
     "Equations",
@@ -32,7 +33,6 @@ __all__ = [
     "Memory",
     "MotorAxis",
     "Observation",
-    "Play",
     "RotorInertia",
     "SensorOffset",
     "TorqueOffset",

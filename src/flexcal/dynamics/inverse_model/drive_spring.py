@@ -14,7 +14,7 @@ from flexcal.model.robot import RobotModel
 
 
 @dataclass(frozen=True)
-class Play:
+class DriveBacklash:
     """Backlash in a drive: no torque while q - θ is nearer to `centre` than `half_gap`, both in rad."""
 
     centre: float
@@ -33,14 +33,14 @@ class DriveSpring:
     """
 
     joint: int
-    play: Play | None = None
+    play: DriveBacklash | None = None
 
-    def with_play(self, model: RobotModel, values: Mapping[str, float]) -> DriveSpring:
+    def with_backlash(self, model: RobotModel, values: Mapping[str, float]) -> DriveSpring:
         """With the play that `values` by name amount to."""
         name = f"{model.joint_names[self.joint]}.drive"
         stiffness = values[f"{name}.stiffness"]
         half_gap = max(0.0, values.get(f"{name}.gap_torque", 0.0) / stiffness)
-        return replace(self, play=Play(values[f"{name}.torque_offset"] / stiffness, half_gap))
+        return replace(self, play=DriveBacklash(values[f"{name}.torque_offset"] / stiffness, half_gap))
 
     def columns(self, model: RobotModel, motion: Motion, motor: int) -> Iterator[Column]:
         """The columns, where `motor` is the number of the motor's equation; raises `FlexcalError` for a motion without arm side."""

@@ -9,7 +9,7 @@ from functools import lru_cache
 import numpy as np
 
 from flexcal.estimation import analyse
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques import inertial_names, torque_regressor
 
@@ -18,7 +18,7 @@ _SAMPLES_PER_COLUMN = 3
 
 
 @dataclass(frozen=True, eq=False)
-class LinkColumns:
+class InertialColumns:
     """Of one joint: it feels the inertials `felt` (f,), of which `kept` (k,) are enough: W = W_kept · `spread` (k, f).
 
     That holds at every state, to the 1e-9 of the largest column that rank is counted by.
@@ -30,7 +30,7 @@ class LinkColumns:
 
 
 @lru_cache(maxsize=4)
-def link_columns(model: RobotModel) -> tuple[LinkColumns, ...]:
+def inertial_columns(model: RobotModel) -> tuple[InertialColumns, ...]:
     """For every joint, by rank-revealing QR of its columns at random states."""
     names = inertial_names(model)
     q, dq, ddq = random_states(model, _SAMPLES_PER_COLUMN * len(names))
@@ -40,12 +40,12 @@ def link_columns(model: RobotModel) -> tuple[LinkColumns, ...]:
     for joint in range(model.n):
         felt = np.array([number for number in range(len(names)) if _beyond(model, joint, number)])
         seen = analyse(matrix[:, joint, felt], [names[number] for number in felt], scale=scale[felt])
-        found.append(LinkColumns(felt, felt[list(seen.kept)], seen.regrouping))
+        found.append(InertialColumns(felt, felt[list(seen.kept)], seen.regrouping))
     return tuple(found)
 
 
 def _beyond(model: RobotModel, joint: int, column: int) -> bool:
-    at = column // len(INERTIAL)
+    at = column // len(LINK_PARAMETERS)
     while at > joint:
         at = model.joints[at].parent
     return at == joint

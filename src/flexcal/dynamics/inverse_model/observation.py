@@ -11,11 +11,11 @@ import numpy as np
 from flexcal.dynamics.inverse_model.bearing_spring import BearingSpring
 from flexcal.dynamics.inverse_model.drive_spring import DriveSpring, coupled_columns
 from flexcal.dynamics.inverse_model.drive_terms import Column, DriveTerm, JointSprings, Memory
-from flexcal.dynamics.inverse_model.independent_inertials import LinkColumns, link_columns
+from flexcal.dynamics.inverse_model.independent_inertials import InertialColumns, inertial_columns
 from flexcal.dynamics.inverse_model.sensor_offset import SensorOffset
-from flexcal.dynamics.inverse_model.tilted_bearings import TiltedArm
+from flexcal.dynamics.inverse_model.tilted_bearings import TiltedBearings
 from flexcal.dynamics.signals import ArmSide, Motion
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques import inertial_names, torque_regressor, write_torque_regressor
 
@@ -85,22 +85,22 @@ class Observation:
         return tuple(found)
 
     @cached_property
-    def _links(self) -> tuple[LinkColumns, ...]:
+    def _links(self) -> tuple[InertialColumns, ...]:
         """For every equation; a motor alone feels no link, and where bearings tilt none of the columns is left out."""
-        nothing = LinkColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
+        nothing = InertialColumns(np.zeros(0, dtype=int), np.zeros(0, dtype=int), np.zeros((0, 0)))
         motors = (nothing for _ in self.springs)
         if self._tilted is None:
-            return (*link_columns(self.model), *motors)
+            return (*inertial_columns(self.model), *motors)
         joints = [(joint, 2) for joint in range(self.model.n)]
         tilts = [(bearing.joint, bearing.component) for bearing in self.bearings]
         every = [[_all_of(self._tilted.felt(at)) for at in some] for some in (joints, tilts)]
         return (*every[0], *motors, *every[1])
 
     @cached_property
-    def _tilted(self) -> TiltedArm | None:
+    def _tilted(self) -> TiltedBearings | None:
         """The arm with its tilts, where there are any."""
         tilting = sorted({bearing.joint for bearing in self.bearings})
-        return TiltedArm(self.model, tilting) if tilting else None
+        return TiltedBearings(self.model, tilting) if tilting else None
 
     @cached_property
     def _at_rest(self) -> list[Column]:
@@ -136,7 +136,7 @@ class Observation:
         }
         coordinates = [(joint, 2) for joint in range(self.model.n)]
         coordinates = coordinates if self._tilted is None else self._tilted.coordinates
-        links = np.full((len(coordinates), len(INERTIAL) * self.model.n), -1)
+        links = np.full((len(coordinates), len(LINK_PARAMETERS) * self.model.n), -1)
         for number, (joint, component) in enumerate(coordinates):
             equation = joint if component == 2 else tilts[joint, component]
             own = self._links[equation]
@@ -225,6 +225,6 @@ class Observation:
         return np.nan_to_num([known.get(name, 0.0) for name in self.names])
 
 
-def _all_of(felt: np.ndarray) -> LinkColumns:
+def _all_of(felt: np.ndarray) -> InertialColumns:
     """All columns that are felt, each its own."""
-    return LinkColumns(felt, felt, np.eye(len(felt)))
+    return InertialColumns(felt, felt, np.eye(len(felt)))

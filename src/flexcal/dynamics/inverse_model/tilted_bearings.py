@@ -9,14 +9,14 @@ import numpy as np
 from flexcal.dynamics.signals import Motion
 from flexcal.kernels import Tree
 from flexcal.model.kinematics import joint_placement
-from flexcal.model.parts import INERTIAL, bearing_frame
+from flexcal.model.parts import LINK_PARAMETERS, bearing_frame
 from flexcal.model.robot import RobotModel
 
 _TURNED = {2: (0, 1, 2), 1: (2, 0, 1), 0: (1, 2, 0)}
 """Axes of the bearing frame in cyclic order, that of the coordinate last."""
 
 
-class TiltedArm:
+class TiltedBearings:
     """The robot's tree with a joint for each tilt of the bearings of `tilting` joints, in the order of Eq. (1).
 
     `coordinates` are (joint, component) from base to tool: 2 the joint itself, 1 tilt about y, 0 tilt about x.
@@ -28,7 +28,7 @@ class TiltedArm:
         self.coordinates = [(i, c) for i in range(model.n) for c in components.get(i, (2,))]
         last = {joint: number for number, (joint, _) in enumerate(self.coordinates)}
         self._links = np.concatenate(
-            [len(INERTIAL) * last[joint] + np.arange(len(INERTIAL)) for joint in range(model.n)]
+            [len(LINK_PARAMETERS) * last[joint] + np.arange(len(LINK_PARAMETERS)) for joint in range(model.n)]
         )
         parents, slides, turns, offsets, normals, frames = [], [], [], [], [], []
         for number, (joint, component) in enumerate(self.coordinates):
@@ -51,9 +51,9 @@ class TiltedArm:
             if component == 2:
                 self._geometry[number, 0] = model.geometry[joint, 0]
 
-    def __reduce__(self) -> tuple[type[TiltedArm], tuple[RobotModel, tuple[int, ...]]]:
+    def __reduce__(self) -> tuple[type[TiltedBearings], tuple[RobotModel, tuple[int, ...]]]:
         """The kernels' view is built anew where it arrives: other processes can be handed arms."""
-        return TiltedArm, (self.model, self._tilting)
+        return TiltedBearings, (self.model, self._tilting)
 
     def felt(self, coordinate: tuple[int, int]) -> np.ndarray:
         """Numbers of the inertials, of all links, that a coordinate feels: those of the links beyond its joint."""
@@ -64,7 +64,9 @@ class TiltedArm:
                 at = self.model.joints[at].parent
             if at == coordinate[0]:
                 beyond.append(link)
-        return np.concatenate([len(INERTIAL) * link + np.arange(len(INERTIAL)) for link in beyond])
+        return np.concatenate(
+            [len(LINK_PARAMETERS) * link + np.arange(len(LINK_PARAMETERS)) for link in beyond]
+        )
 
     def write(
         self,
@@ -78,7 +80,7 @@ class TiltedArm:
         `states` are the links' q, q̇, q̈ (N, n); the tilts are those of the motion's arm side.
         """
         q, dq, ddq = (self._whole(values, motion, order) for order, values in enumerate(states))
-        wide = np.full((len(self.coordinates), len(INERTIAL) * len(self.coordinates)), -1)
+        wide = np.full((len(self.coordinates), len(LINK_PARAMETERS) * len(self.coordinates)), -1)
         wide[:, self._links] = places
         self._tree.torque_regressor(self._geometry, self.model.gravity, q, dq, ddq, wide, out)
 

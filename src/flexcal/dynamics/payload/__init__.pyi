@@ -1,11 +1,11 @@
 from .equations import PayloadEquations
-from .flexibility_correction import ArmYield, error_sources
+from .flexibility_correction import FlexibilityCorrection, error_sources
 from .identification import BODY, PayloadFit, identify_payload
 from .robot_prior import RobotPrior
 
 __all__ = [
     "BODY",
-    "ArmYield",
+    "FlexibilityCorrection",
     "PayloadEquations",
     "PayloadFit",
     "RobotPrior",

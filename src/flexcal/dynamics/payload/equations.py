@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.dynamics.payload.flexibility_correction import YIELD, error_column
 from flexcal.dynamics.payload.robot_prior import FRICTION, RobotPrior
 from flexcal.dynamics.regression import Batch, RegressionData, triangular
-from flexcal.model.parts import INERTIAL, PSEUDO_INERTIA, Payload
+from flexcal.model.parts import LINK_PARAMETERS, PSEUDO_INERTIA, Payload
 
 FRICTION_CHANGE = 0.2
 """1σ of what warmth and load change of friction from one recording to another, relative to Coulomb and viscous friction; and of a torque
@@ -23,7 +23,7 @@ class PayloadEquations:
     """Equations of several recordings, of which `loaded` (one each) tells where the payload is `held`.
 
     Unknown are y and z of the `prior`, what friction is beyond the robot's own in the loaded recordings, and the payload's ten
-    parameters φ in its frame, in this order. `data` are equations of links and drives, with the columns of an `ArmYield` each.
+    parameters φ in its frame, in this order. `data` are equations of links and drives, with the columns of an `FlexibilityCorrection` each.
     """
 
     data: RegressionData
@@ -39,13 +39,13 @@ class PayloadEquations:
             *(f"open_{k}" for k in range(open_)),
             *(f"known_{k}" for k in range(known)),
             *(f"{name}.change" for name in self._rubbing),
-            *(f"payload.{key}" for key in INERTIAL),
+            *(f"payload.{key}" for key in LINK_PARAMETERS),
         )
 
     @property
     def payload(self) -> slice:
         """Where the payload's ten are among the unknowns."""
-        return slice(len(self.names) - len(INERTIAL), len(self.names))
+        return slice(len(self.names) - len(LINK_PARAMETERS), len(self.names))
 
     @cached_property
     def _rubbing(self) -> tuple[str, ...]:
@@ -105,7 +105,7 @@ class PayloadEquations:
         known = slice(first, first + self.prior.base_root.shape[1])
         changes = {name: known.stop + number for number, name in enumerate(self._rubbing)}
         errors = dict(zip(map(error_column, self.prior.sources), self.prior.source_root, strict=True))
-        moved, link = in_link(self.held), len(INERTIAL) * self.held.joint
+        moved, link = payload_to_link_frame(self.held), len(LINK_PARAMETERS) * self.held.joint
         result[-1, -1] = 1.0
         for row, number in zip(result, members, strict=False):
             name = names[number]
@@ -119,15 +119,15 @@ class PayloadEquations:
                 row[-1] = -self.prior.base[base[number]]
             if loaded and name in changes:
                 row[changes[name]] = 1.0
-            if loaded and 0 <= number - link < len(INERTIAL):
+            if loaded and 0 <= number - link < len(LINK_PARAMETERS):
                 row[self.payload] = moved[number - link]
         return result
 
 
-def in_link(held: Payload) -> np.ndarray:
+def payload_to_link_frame(held: Payload) -> np.ndarray:
     """(10, 10): from a body's ten parameters in the payload's frame to those in the frame of the link that carries it."""
     place = np.eye(4)
     place[:3, :3], place[:3, 3] = held.rotation, held.translation
     moved = place @ PSEUDO_INERTIA @ place.T
-    basis = PSEUDO_INERTIA.reshape(len(INERTIAL), -1)
-    return np.linalg.lstsq(basis.T, moved.reshape(len(INERTIAL), -1).T, rcond=None)[0]
+    basis = PSEUDO_INERTIA.reshape(len(LINK_PARAMETERS), -1)
+    return np.linalg.lstsq(basis.T, moved.reshape(len(LINK_PARAMETERS), -1).T, rcond=None)[0]

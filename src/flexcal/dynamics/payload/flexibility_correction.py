@@ -14,7 +14,7 @@ from flexcal.dynamics.inverse_model import Column, Memory
 from flexcal.dynamics.signals import Experiment, Motion, stretches
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import GEOMETRY, SPRINGS, RobotModel, uncertain_inertials
-from flexcal.model.vibration import spring_load, yielding_torque
+from flexcal.model.vibration import flexible_joint_torque, spring_load
 
 YIELD = "arm_yield"
 """Name of the column of what the springs change, whose coefficient is one."""
@@ -49,7 +49,7 @@ def error_column(source: str) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class ArmYield:
+class FlexibilityCorrection:
     """Columns of a drive term that holds for one recording: `arm_yield`, and one for every source of error.
 
     `shift` (T, n) N m is the torque of the yielding arm less that of the rigid one at the instants `time` (T,). `slopes` (T, n, s) are the
@@ -66,7 +66,7 @@ class ArmYield:
     @classmethod
     def of(
         cls, model: RobotModel, experiment: Experiment, sources: Sequence[str], payload: float | None = None
-    ) -> ArmYield:
+    ) -> FlexibilityCorrection:
         """Along a recording, of the `model` with `payload` (kg; None: the one that it has), which tells on which flanks drives rest.
 
         Stretches of less than half a second are left out; raises `FlexcalError` where there is no longer one.
@@ -81,17 +81,17 @@ class ArmYield:
     @classmethod
     def _along(
         cls, model: RobotModel, motion: Motion, sources: Sequence[str], payload: float | None
-    ) -> ArmYield:
+    ) -> FlexibilityCorrection:
         states, course = (motion.q, motion.dq, motion.ddq), _Course(motion.time)
         flanks = None
         if model.elastic:
             flanks = course.between(np.sign(spring_load(model, *states, course, payload)))
 
         def rigid(robot: RobotModel) -> np.ndarray:
-            return yielding_torque(robot, *states, np.zeros_like, payload, passes=1)
+            return flexible_joint_torque(robot, *states, np.zeros_like, payload, passes=1)
 
         def torque(robot: RobotModel) -> np.ndarray:
-            return yielding_torque(robot, *states, course, payload, _PASSES, flanks)
+            return flexible_joint_torque(robot, *states, course, payload, _PASSES, flanks)
 
         def shift(robot: RobotModel) -> np.ndarray:
             return torque(robot) - rigid(robot)

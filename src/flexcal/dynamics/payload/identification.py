@@ -8,15 +8,21 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.payload.equations import PayloadEquations
-from flexcal.dynamics.payload.rigid_body import body_covariance, nearest_body, of_body, of_frame, told_moments
+from flexcal.dynamics.payload.rigid_body import (
+    body_covariance,
+    identified_moments,
+    link_frame_from_payload,
+    nearest_body,
+    payload_from_link_frame,
+)
 from flexcal.dynamics.payload.torque_noise import first_noise, residual_noise
 from flexcal.dynamics.regression import RegressionData, score_covariance
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Dropped, Estimate, Parameter, Parameters, analyse, student_quantile
-from flexcal.model.parts import INERTIAL, Payload
-from flexcal.model.robot import INERTIALS, MOMENTS, unit_of
+from flexcal.model.parts import LINK_PARAMETERS, Payload
+from flexcal.model.robot import MASS_AND_COM, MOMENTS, unit_of
 
-BODY = (*INERTIALS, *MOMENTS)
+BODY = (*MASS_AND_COM, *MOMENTS)
 """Of a payload in its frame: inertia about the centre of mass."""
 _UNSEEN = 5e-3
 """Mass over that of all links, below which errors of the model make a mass that is not there."""
@@ -67,13 +73,13 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
 
     The intervals include the uncertainty of the robot, and errors correlated in time and between joints (`score_covariance`).
     What the motion does not tell of the payload stays as declared, and so does inertia whose intervals tell no body from a point
-    (`told_moments`). Raises `FlexcalError` as `residual_noise` does, and where the 95 % interval of the mass contains zero
+    (`identified_moments`). Raises `FlexcalError` as `residual_noise` does, and where the 95 % interval of the mass contains zero
     or lies below it.
     """
     held, noise = equations.held, first_noise(equations)
-    found = _solve(equations, noise, np.zeros(len(INERTIAL)))
+    found = _solve(equations, noise, np.zeros(len(LINK_PARAMETERS)))
     for _ in range(_ROUNDS):
-        start = np.zeros(len(INERTIAL))
+        start = np.zeros(len(LINK_PARAMETERS))
         if found.missing and found.values[0] > 0:
             start = _declared(held, float(found.values[0]))
         noise = residual_noise(equations, noise, found.unknowns, found.unknowns_root)
@@ -98,12 +104,12 @@ def identify_payload(equations: PayloadEquations) -> PayloadFit:
             "check that it was held, the signs of the torques and the robot's own dynamics."
         )
     nearest = nearest_body(found.values, found.root, found.unseen)
-    body = of_body(nearest.parameters)
+    body = payload_from_link_frame(nearest.parameters)
     covariance = body_covariance(nearest.parameters, found.covariance)
     half = quantile * np.sqrt(np.diag(covariance))
     missing = {entry.name for entry in found.missing}
-    told = np.array([f"payload.{key}" not in missing for key in INERTIAL])
-    told[4:] = told_moments(body, half[4:]) if told[4:].all() else False
+    told = np.array([f"payload.{key}" not in missing for key in LINK_PARAMETERS])
+    told[4:] = identified_moments(body, half[4:]) if told[4:].all() else False
     body = np.where(told, body, _body(held, float(body[0])))
     covariance = np.where(np.outer(told, told), covariance, 0.0)
     covariance[0] /= body[0]
@@ -126,7 +132,7 @@ def _body(held: Payload, mass: float) -> np.ndarray:
 
 
 def _declared(held: Payload, mass: float) -> np.ndarray:
-    return of_frame(_body(held, mass))
+    return link_frame_from_payload(_body(held, mass))
 
 
 def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarray) -> _Solution:
@@ -163,7 +169,7 @@ def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarra
     covariance = np.zeros((len(names), len(names)))
     covariance[np.ix_(kept, kept)] = spread.covariance + root @ known.T @ known @ root.T
     missing = tuple(entry for entry in seen.dropped if entry.name in names[own])
-    unseen = np.zeros((len(INERTIAL), len(missing)))
+    unseen = np.zeros((len(LINK_PARAMETERS), len(missing)))
     first = own.start
     for column, entry in zip(unseen.T, missing, strict=True):
         column[names.index(entry.name) - first] = 1.0

@@ -42,7 +42,7 @@ def nearest_body(parameters: np.ndarray, root: np.ndarray, unseen: np.ndarray) -
     return NearestBody(found, rise)
 
 
-def of_body(parameters: np.ndarray) -> np.ndarray:
+def payload_from_link_frame(parameters: np.ndarray) -> np.ndarray:
     """Mass, centre of mass and the six of the inertia about it (10,) from mass, first moments and inertia about the frame."""
     mass = parameters[0]
     com = parameters[1:4] / mass
@@ -50,23 +50,25 @@ def of_body(parameters: np.ndarray) -> np.ndarray:
     return np.concatenate([[mass], com, parameters[4:] - around])
 
 
-def of_frame(body: np.ndarray) -> np.ndarray:
-    """The reverse of `of_body`."""
+def link_frame_from_payload(body: np.ndarray) -> np.ndarray:
+    """The reverse of `payload_from_link_frame`."""
     mass, com = body[0], body[1:4]
     around = parallel_axis(mass, com)[np.triu_indices(3)]
     return np.concatenate([[mass], mass * com, body[4:] + around])
 
 
 def body_covariance(parameters: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Covariance (10, 10) of `of_body` to first order."""
+    """Covariance (10, 10) of `payload_from_link_frame` to first order."""
     slope = np.empty((len(parameters), len(parameters)))
     for k in range(len(parameters)):
         step = _STEP * max(abs(parameters[k]), 1.0) * (np.arange(len(parameters)) == k)
-        slope[:, k] = (of_body(parameters + step) - of_body(parameters - step)) / (2 * step[k])
+        slope[:, k] = (
+            payload_from_link_frame(parameters + step) - payload_from_link_frame(parameters - step)
+        ) / (2 * step[k])
     return slope @ covariance @ slope.T
 
 
-def told_moments(body: np.ndarray, half: np.ndarray) -> np.ndarray:
+def identified_moments(body: np.ndarray, half: np.ndarray) -> np.ndarray:
     """Which of the six moments (6,) of a body (10,) are told by intervals of `half` their width (6,).
 
     The moments about the axes are where none of their intervals reaches zero, which every body's are above; a product then is where its

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.estimation import Estimate, Parameters
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import PARALLEL, declared
 
 FRICTION = ("viscous", "coulomb", "torque_offset")
@@ -111,7 +111,7 @@ def _free(found: Estimate, kept: tuple[str, ...]) -> np.ndarray:
             columns.append(column)
     for number, name in enumerate(kept):
         key = name.rpartition(".")[2].partition("_at_")[0]
-        of_drive = key not in INERTIAL
+        of_drive = key not in LINK_PARAMETERS
         lacking = of_drive and name not in found.parameters
         if lacking or (of_drive and not classic and key in FRICTION):
             columns.append(np.eye(len(kept))[number])
@@ -121,4 +121,4 @@ def _free(found: Estimate, kept: tuple[str, ...]) -> np.ndarray:
 def _classic(name: str) -> bool:
     """Whether a parameter is of a link, or of the classic terms of a drive."""
     key = name.rpartition(".")[2].partition("_at_")[0]
-    return key in INERTIAL or key.startswith("com_") or key in ("rotor_inertia", *FRICTION, *PARALLEL)
+    return key in LINK_PARAMETERS or key.startswith("com_") or key in ("rotor_inertia", *FRICTION, *PARALLEL)

@@ -7,13 +7,13 @@ from .covariance import (
     covariance_of_scores,
     mixed_covariance,
     offset_scores,
-    rows_of,
+    parameter_rows,
     score_covariance,
 )
 from .cross_validation import Fold, fold_numbers, folds, prediction_errors, solutions
-from .cutoff_selection import CutoffChoice, Piece, choose_cutoff, pieces
+from .cutoff_selection import CutoffChoice, LogSegment, choose_cutoff, pieces
 from .scores import Scores
-from .triangular_factor import Triangle, stacked, triangular
+from .triangular_factor import TriangularFactor, stacked, triangular
 
 __all__ = [
     "Batch",
@@ -21,12 +21,12 @@ __all__ = [
     "CutoffChoice",
     "ExperimentSystem",
     "Fold",
-    "Piece",
+    "LogSegment",
     "RegressionData",
     "Rows",
     "Scores",
     "Subsystem",
-    "Triangle",
+    "TriangularFactor",
     "batch_covariance",
     "batch_length",
     "batched",
@@ -39,11 +39,11 @@ __all__ = [
     "mixed_covariance",
     "observe",
     "offset_scores",
+    "parameter_rows",
     "pieces",
     "prediction_errors",
     "reduced",
     "rows",
-    "rows_of",
     "score_covariance",
     "solutions",
     "stacked",

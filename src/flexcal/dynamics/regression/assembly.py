@@ -11,9 +11,9 @@ import numpy as np
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.inverse_model import BaseParameters, Equations
 from flexcal.dynamics.regression.batches import BATCHES, Batch, ExperimentSystem, experiment_system, reduced
-from flexcal.dynamics.regression.triangular_factor import Triangle
+from flexcal.dynamics.regression.triangular_factor import TriangularFactor
 from flexcal.dynamics.signals import Experiment, Window
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 
 _SILENT = 1e-9
 """A column smaller than this beside the largest of its kind is zero."""
@@ -31,7 +31,7 @@ class Subsystem:
     equation: int
     experiment: int
     members: np.ndarray
-    triangle: Triangle
+    triangle: TriangularFactor
     undriven: bool = False
 
     def floored(self, sigma: float) -> float:
@@ -64,7 +64,7 @@ class RegressionData:
         size = np.zeros(len(self.names))
         for s in self.subsystems:
             size[s.members] = np.hypot(size[s.members], np.linalg.norm(s.triangle.matrix, axis=0))
-        links = len(INERTIAL) * self.observation.model.n
+        links = len(LINK_PARAMETERS) * self.observation.model.n
         kinds = [name.rpartition(".")[2] for name in self.names]
         largest: dict[str, float] = {}
         for kind, norm in zip(kinds, size, strict=True):
@@ -100,7 +100,7 @@ class RegressionData:
             asked = s.triangle.right
             if s.undriven:
                 driven[s.equation] = False
-                links = s.members < len(INERTIAL) * self.observation.model.n
+                links = s.members < len(LINK_PARAMETERS) * self.observation.model.n
                 asked = s.triangle.matrix[:, links] @ parameters[s.members[links]]
             size[s.equation] += np.sum(asked**2)
         return math.sqrt(missed[driven].sum() / size[driven].sum()), np.sqrt(
@@ -151,6 +151,6 @@ def batches_each(experiments: int) -> int:
     return max(1, min(BATCHES, _ALL_BATCHES // max(1, experiments)))
 
 
-def _merged(system: ExperimentSystem, equation: int) -> Triangle:
+def _merged(system: ExperimentSystem, equation: int) -> TriangularFactor:
     factor = reduced([batch.factors[equation] for batch in system.batches])
-    return Triangle.padded(factor, sum(batch.rows for batch in system.batches))
+    return TriangularFactor.padded(factor, sum(batch.rows for batch in system.batches))

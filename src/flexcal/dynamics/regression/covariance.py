@@ -45,7 +45,7 @@ def batch_covariance(
     system weighted by `noise` (one a subsystem), whose mean squared error is `variance`.
     """
     members = data.observation.members
-    seen = [np.vstack([rows_of(root, kept, own), np.zeros(len(kept))]) for own in members]
+    seen = [np.vstack([parameter_rows(root, kept, own), np.zeros(len(kept))]) for own in members]
     missed = [np.append(-parameters[own], 1.0) for own in members]
     offsets = offset_scores(data.observation, kept, root)
     return score_covariance(data.batches, noise, seen, missed, root, variance, offsets)
@@ -59,7 +59,7 @@ def offset_scores(observation: Equations, kept: Sequence[int], root: np.ndarray)
     return np.linalg.solve(root, np.eye(len(kept))[:, offsets]) if offsets else None
 
 
-def rows_of(matrix: np.ndarray, kept: Sequence[int], members: np.ndarray) -> np.ndarray:
+def parameter_rows(matrix: np.ndarray, kept: Sequence[int], members: np.ndarray) -> np.ndarray:
     """The rows (m, k) of a matrix (k, k) that belong to `members`, of which `kept` have one; zero for the others."""
     found = np.zeros((len(members), matrix.shape[1]))
     _, at, rows = np.intersect1d(members, kept, return_indices=True)

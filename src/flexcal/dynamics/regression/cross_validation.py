@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.dynamics.regression.batches import ExperimentSystem, reduced
-from flexcal.dynamics.regression.triangular_factor import Triangle, widened
+from flexcal.dynamics.regression.triangular_factor import TriangularFactor, widened
 from flexcal.errors import FlexcalError
 
 FOLDS = 10
@@ -147,6 +147,6 @@ def _pieces(systems: Sequence[ExperimentSystem], purge_rows: int) -> list[_Piece
 
 
 def _noise(system: np.ndarray, rows: int, known: np.ndarray) -> float:
-    sigma, _ = Triangle.padded(reduced([system[:, np.append(known, True)]]), rows).noise()
+    sigma, _ = TriangularFactor.padded(reduced([system[:, np.append(known, True)]]), rows).noise()
     size = float(np.linalg.norm(system[:, -1])) / math.sqrt(rows)
     return sigma if sigma > 0 else size or 1.0

@@ -14,7 +14,7 @@ _TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class Triangle:
+class TriangularFactor:
     """R (k + 1, k + 1) of the QR of [W, Y], W (rows, k) and Y (rows,), sufficient for least squares.
 
     Triangles of the same columns add up: R of two systems is R of their R stacked. No product WᵀW is ever formed.
@@ -24,23 +24,23 @@ class Triangle:
     rows: int
 
     @classmethod
-    def of(cls, matrix: np.ndarray, right: np.ndarray) -> Triangle:
+    def of(cls, matrix: np.ndarray, right: np.ndarray) -> TriangularFactor:
         """Of W (rows, k) and Y (rows,)."""
         return cls(triangular(np.column_stack([matrix, right])), len(right))
 
     @classmethod
-    def padded(cls, factor: np.ndarray, rows: int) -> Triangle:
+    def padded(cls, factor: np.ndarray, rows: int) -> TriangularFactor:
         """Of a factor (·, k + 1) with no more than k + 1 rows, which stands for so many `rows`."""
         size = factor.shape[1]
         return cls(np.vstack([factor, np.zeros((size - len(factor), size))]), rows)
 
     @classmethod
-    def empty(cls, columns: int) -> Triangle:
+    def empty(cls, columns: int) -> TriangularFactor:
         """Of no rows."""
         return cls(np.zeros((columns + 1, columns + 1)), 0)
 
-    def __add__(self, other: Triangle) -> Triangle:
-        return Triangle(triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
+    def __add__(self, other: TriangularFactor) -> TriangularFactor:
+        return TriangularFactor(triangular(np.vstack([self.factor, other.factor])), self.rows + other.rows)
 
     @property
     def matrix(self) -> np.ndarray:
@@ -56,9 +56,9 @@ class Triangle:
         """‖Y − W · parameters‖ for `parameters` (k,)."""
         return float(np.linalg.norm(self.right - self.matrix @ parameters))
 
-    def part(self, columns: np.ndarray) -> Triangle:
+    def part(self, columns: np.ndarray) -> TriangularFactor:
         """With the numbered `columns` of W alone."""
-        return Triangle(self.factor[:, [*columns, -1]], self.rows)
+        return TriangularFactor(self.factor[:, [*columns, -1]], self.rows)
 
     def noise(self, scale: np.ndarray | None = None) -> tuple[float, int]:
         """σ̂ of Eq. 2.28 of this system alone, and its rank; NaN without more rows than that.
@@ -76,11 +76,13 @@ class Triangle:
         return (float(np.linalg.norm(left) / np.sqrt(freedom)) if freedom > 0 else np.nan), rank
 
 
-def stacked(triangles: Iterable[Triangle], members: Iterable[np.ndarray], columns: int) -> Triangle:
+def stacked(
+    triangles: Iterable[TriangularFactor], members: Iterable[np.ndarray], columns: int
+) -> TriangularFactor:
     """One system of all `columns` from triangles that know only their `members` of them."""
-    total = Triangle.empty(columns)
+    total = TriangularFactor.empty(columns)
     for triangle, numbers in zip(triangles, members, strict=True):
-        total = total + Triangle(widened(triangle.factor, numbers, columns), triangle.rows)
+        total = total + TriangularFactor(widened(triangle.factor, numbers, columns), triangle.rows)
     return total
 
 

@@ -29,7 +29,7 @@ _EXACT = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
-class BlockErrors:
+class CrossValidatedErrors:
     """Root mean square torques of the motors (n,) in blocks of time, N m: as `measured`, what the `physical` parameters from the other
     blocks miss, and what these miss `together` with the processes learned there.
 
@@ -47,7 +47,7 @@ def learn_residual(
     systems: Sequence[ExperimentSystem],
     estimate: Estimate,
     progress: Progress = silent,
-) -> tuple[LearnedResidual, BlockErrors]:
+) -> tuple[LearnedResidual, CrossValidatedErrors]:
     """What `estimate` misses in the rows of its fit, of which `systems` are the equations; the estimate stays as it is.
 
     Of ten blocks of time each is predicted from the others, less those within a filter's length: by physical parameters (the estimate's,
@@ -87,7 +87,7 @@ def learn_residual(
         float(np.linalg.norm(v[tested] @ shares))
         for v in (states.torque, missed, np.where(worth, left, missed))
     )
-    errors = BlockErrors(measured, physical, together, (before / total, after / total))
+    errors = CrossValidatedErrors(measured, physical, together, (before / total, after / total))
     return LearnedResidual(tuple(motors), shares), errors
 
 

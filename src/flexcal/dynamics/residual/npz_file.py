@@ -31,7 +31,7 @@ _FORMS = {
 }
 
 
-def require_learned_place(path: Path) -> None:
+def require_residual_path(path: Path) -> None:
     """Raise `InputError` where a file stands at `path` that no flexcal wrote."""
     refuse_irregular(path)
     refuse_foreign(path, _FORMS.keys())

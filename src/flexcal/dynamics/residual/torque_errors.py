@@ -15,7 +15,7 @@ _NORMAL = 1.959964
 
 
 @dataclass(frozen=True, eq=False)
-class ResidualErrors:
+class LearnedTorqueErrors:
     """Norms of the joints' torques (n,), N m: as `measured`, what the `physical` parameters miss, and what is missed with the learned
     torque added; and the share of rows `inside` (n,) the 95 % intervals of what is predicted then."""
 
@@ -33,7 +33,7 @@ class ResidualErrors:
 
 def residual_errors(
     learned: LearnedResidual, recorded: RecordedRows, parameters: np.ndarray
-) -> ResidualErrors:
+) -> LearnedTorqueErrors:
     """In one pass over the recorded rows, by the estimate of `parameters` (p,)."""
     squares, inside, count = np.zeros((3, len(learned.motors))), np.zeros(len(learned.motors)), 0
     for states in motor_states(recorded, parameters[None]):
@@ -44,4 +44,4 @@ def residual_errors(
         inside += np.sum(np.abs(missed - added) <= _NORMAL * std, axis=0)
         count += len(states)
     measured, physical, together = np.sqrt(squares)
-    return ResidualErrors(measured, physical, together, inside / count)
+    return LearnedTorqueErrors(measured, physical, together, inside / count)

@@ -25,23 +25,23 @@ _SMALL = 1 / 8
 
 
 @dataclass(frozen=True, eq=False)
-class CarriedWeight:
-    """Sums over samples `of_weight` (n,) and `of_torque` (n,) of the squares, (N m)², and `of_both` (n,) of the products.
+class GravityTorqueCheck:
+    """Sums over samples `weight_squares` (n,) and `torque_squares` (n,) of the squares, (N m)², and `of_both` (n,) of the products.
 
     The weight is that of the links, and of what a log says that they hold; zero at joints with a declared spring, which may balance it.
     """
 
-    of_weight: np.ndarray
-    of_torque: np.ndarray
+    weight_squares: np.ndarray
+    torque_squares: np.ndarray
     of_both: np.ndarray
 
     @classmethod
-    def empty(cls, joints: int) -> CarriedWeight:
+    def empty(cls, joints: int) -> GravityTorqueCheck:
         """Of no samples."""
         return cls(*np.zeros((3, joints)))
 
     @classmethod
-    def of(cls, recording: Recording, model: RobotModel) -> CarriedWeight:
+    def of(cls, recording: Recording, model: RobotModel) -> GravityTorqueCheck:
         """Of some samples, evenly spread."""
         some = slice(None, None, max(1, len(recording) // _POSES))
         held = None if recording.payload is None else recording.payload[some]
@@ -52,32 +52,34 @@ class CarriedWeight:
         weight[:, [name in balanced for name in model.joint_names]] = 0.0
         return cls(*(np.sum(x, axis=0) for x in (weight**2, torque**2, weight * torque)))
 
-    def __add__(self, other: CarriedWeight) -> CarriedWeight:
-        return CarriedWeight(
-            self.of_weight + other.of_weight, self.of_torque + other.of_torque, self.of_both + other.of_both
+    def __add__(self, other: GravityTorqueCheck) -> GravityTorqueCheck:
+        return GravityTorqueCheck(
+            self.weight_squares + other.weight_squares,
+            self.torque_squares + other.torque_squares,
+            self.of_both + other.of_both,
         )
 
     @property
     def heaviest(self) -> int:
         """The joint whose weight is largest."""
-        return int(np.argmax(self.of_weight))
+        return int(np.argmax(self.weight_squares))
 
     @property
     def share(self) -> float:
         """Of its weight that the torques of the heaviest joint follow; 1 where nothing weighs."""
         k = self.heaviest
-        return float(abs(self.of_both[k]) / self.of_weight[k]) if self.of_weight[k] > 0 else 1.0
+        return float(abs(self.of_both[k]) / self.weight_squares[k]) if self.weight_squares[k] > 0 else 1.0
 
     @property
     def reversed(self) -> int | None:
         """The first joint of some weight whose torques do not hold it but pull it down; None where there is none."""
-        heavy = self.of_weight > _HEAVY**2 * self.of_weight.max()
-        told = self.of_torque < _LIVELY**2 * self.of_weight
-        against = self.of_both < _AGAINST * np.sqrt(self.of_weight * self.of_torque)
+        heavy = self.weight_squares > _HEAVY**2 * self.weight_squares.max()
+        told = self.torque_squares < _LIVELY**2 * self.weight_squares
+        against = self.of_both < _AGAINST * np.sqrt(self.weight_squares * self.torque_squares)
         return next((int(k) for k in np.flatnonzero(heavy & told & against)), None)
 
     @property
-    def by_motors(self) -> bool:
+    def on_motor_side(self) -> bool:
         """Whether the torques are too weak for joints, and too small for friction to be the reason."""
         k = self.heaviest
-        return self.share < _TOO_WEAK and bool(self.of_torque[k] < _SMALL**2 * self.of_weight[k])
+        return self.share < _TOO_WEAK and bool(self.torque_squares[k] < _SMALL**2 * self.weight_squares[k])

@@ -13,7 +13,7 @@ import numpy as np
 
 from flexcal.data.recordings import Recording, TimeSummary, read_recording_blocks
 from flexcal.dynamics.signals.external_torques import external_torque
-from flexcal.dynamics.signals.gravity_torque_check import CarriedWeight
+from flexcal.dynamics.signals.gravity_torque_check import GravityTorqueCheck
 from flexcal.dynamics.signals.log_faults import MOVES, LogFaults
 from flexcal.dynamics.signals.motion import FilteredPositions, Motion, filtered_positions
 from flexcal.errors import FlexcalError, InputError
@@ -47,7 +47,7 @@ class JointLog:
     spans: tuple[tuple[float, float], ...]
     time_stamps: str
     payload: float | None
-    weight: CarriedWeight
+    weight: GravityTorqueCheck
     wrench: bool = False
     watch: Callable[[float], None] | None = None
 
@@ -64,7 +64,7 @@ class JointLog:
         summary, steps = TimeSummary(), []
         held: list[float] = []
         sensed: list[bool] = []
-        carried = [CarriedWeight.empty(model.n)]
+        carried = [GravityTorqueCheck.empty(model.n)]
 
         def watched() -> Iterator[Recording]:
             for recording in log_blocks(path, model):
@@ -79,7 +79,7 @@ class JointLog:
                 if recording.payload is not None:
                     held.append(float(recording.payload[0]))
                 sensed.append(recording.force is not None)
-                carried.append(CarriedWeight.of(recording, model))
+                carried.append(GravityTorqueCheck.of(recording, model))
                 faults.add(recording)
                 yield recording
             faults.check()

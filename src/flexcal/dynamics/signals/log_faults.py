@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.data.recordings import Recording
 from flexcal.data.tables import Signal, mapped_signals
-from flexcal.dynamics.signals.saturation import CutEnds
+from flexcal.dynamics.signals.saturation import SaturationDetector
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
@@ -114,7 +114,7 @@ class _Sensors:
             self._names += [
                 f"column {name}" for name, others in zip(signal.columns, mixed, strict=True) if others
             ]
-        self.seen = {name: CutEnds() for name in self._names}
+        self.seen = {name: SaturationDetector() for name in self._names}
 
     def add(self, values: np.ndarray, time_step: float) -> None:
         """The block (N, n) that follows; an offset of the signal shifts it, but no limit."""

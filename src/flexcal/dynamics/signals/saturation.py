@@ -35,7 +35,7 @@ _LARGE = 0.5
 
 
 @dataclass(frozen=True)
-class Plateau:
+class SaturatedRun:
     """At most so many `samples` in a row at `value`, entered or left at up to `speed` (1/s); half of them further out it is `drop` away."""
 
     value: float
@@ -43,9 +43,9 @@ class Plateau:
     speed: float
     drop: float
 
-    def merged(self, other: Plateau) -> Plateau:
+    def merged(self, other: SaturatedRun) -> SaturatedRun:
         """With that of another part of the signal at the same value."""
-        return Plateau(
+        return SaturatedRun(
             self.value,
             max(self.samples, other.samples),
             max(self.speed, other.speed),
@@ -53,11 +53,11 @@ class Plateau:
         )
 
 
-class CutEnds:
+class SaturationDetector:
     """Takes one signal block by block; runs across the border of two blocks count as two."""
 
     def __init__(self) -> None:
-        self._ends: dict[int, Plateau] = {}
+        self._ends: dict[int, SaturatedRun] = {}
         self._top_speed, self._usual_change = 0.0, 0.0
         self._samples, self._changes = 0, 1
         self._resolution = np.inf
@@ -92,18 +92,18 @@ class CutEnds:
         return self._ends[1].value - self._ends[-1].value
 
     @property
-    def held(self) -> Plateau | None:
+    def held(self) -> SaturatedRun | None:
         """The longest stay at an extreme that is no chance, and not near zero."""
         size = max(abs(end.value) for end in self._ends.values())
         return next((end for end in self._long() if abs(end.value) >= _LARGE * size), None)
 
     @property
-    def cut(self) -> Plateau | None:
+    def cut(self) -> SaturatedRun | None:
         """The longest stay at an extreme into or out of which the signal runs too fast to have stopped by itself."""
         fast = max(_FAST * self._top_speed, _HARD * self._usual_change)
         return next((end for end in self._long() if end.speed > fast), None)
 
-    def _long(self) -> list[Plateau]:
+    def _long(self) -> list[SaturatedRun]:
         least = max(_SAMPLES, _USUAL * self._samples / self._changes)
         far = _STEPS * self._resolution
         return [end for end in self._ends.values() if end.samples >= least and end.drop > far]
@@ -111,7 +111,7 @@ class CutEnds:
 
 def _plateau(
     values: np.ndarray, sign: int, same: np.ndarray, overshoot: float, speed: np.ndarray, reach: int
-) -> Plateau:
+) -> SaturatedRun:
     """The longest stay at the largest (`sign` 1) or smallest value, with the highest speed at any.
 
     `same` (N - 1,) are the samples followed by their like, `speed` is that over `reach` samples from each on. Where time stamps were
@@ -123,7 +123,7 @@ def _plateau(
     borders = np.flatnonzero(np.diff(np.concatenate([[False], same, [False]])))
     starts, ends = borders[::2], borders[1::2] + 1
     if not len(starts):
-        return Plateau(extreme, 1, 0.0, 0.0)
+        return SaturatedRun(extreme, 1, 0.0, 0.0)
     k = int(np.argmax(ends - starts))
     count = int(ends[k] - starts[k])
     around = values[max(0, starts[k] - count // 2) : ends[k] + count // 2]
@@ -135,4 +135,4 @@ def _plateau(
     beside = np.concatenate([first - reach - 1, first - reach, last - 1, last])
     fastest = float(speed[beside[(beside >= 0) & (beside < len(speed))]].max(initial=0.0))
     value = float(values[starts[k]])
-    return Plateau(value, count, fastest, float(np.abs(around - value).max()))
+    return SaturatedRun(value, count, fastest, float(np.abs(around - value).max()))

@@ -1,11 +1,11 @@
 from .experiment import SimulatedExperiment
-from .integration_steps import ForwardSteps, forward_steps
-from .state_transition import ForwardModel, ForwardModels
+from .integration_steps import IntegrationSteps, discretise_motion
+from .state_transition import StateTransition, StateTransitions
 
 __all__ = [
-    "ForwardModel",
-    "ForwardModels",
-    "ForwardSteps",
+    "IntegrationSteps",
     "SimulatedExperiment",
-    "forward_steps",
+    "StateTransition",
+    "StateTransitions",
+    "discretise_motion",
 ]

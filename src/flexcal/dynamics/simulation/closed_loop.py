@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.simulation.rigid_robot import SimulatedRobot
+from flexcal.dynamics.simulation.rigid_robot import RigidRobotSimulator
 from flexcal.errors import FlexcalError
 
 _STEP = 1.0
@@ -52,7 +52,7 @@ class ClosedLoop:
     targets.
     """
 
-    def __init__(self, robot: SimulatedRobot, step: float, natural: float) -> None:
+    def __init__(self, robot: RigidRobotSimulator, step: float, natural: float) -> None:
         self._robot, self._natural = robot, natural
         self._declared = robot.model.controller
         fastest = natural if self._declared is None else self._declared.rate_hz

@@ -13,7 +13,7 @@ from flexcal.data.recordings import Decimation, LowPass
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.signals import BESIDE, Experiment, Motion, differences, smoothed, stretches
 from flexcal.dynamics.simulation.closed_loop import ClosedLoop, Target
-from flexcal.dynamics.simulation.rigid_robot import SimulatedRobot
+from flexcal.dynamics.simulation.rigid_robot import RigidRobotSimulator
 
 _PATH = 0.1
 """Cut-off of the path that is tracked, over the rate of the rows: noise enters it by so much less of their band."""
@@ -72,7 +72,7 @@ class SimulatedExperiment:
 
     def blocks(self) -> Iterator[Motion]:
         """The simulated motion in parts that follow each other, with the measured torques, the external ones among them."""
-        robot = SimulatedRobot(self.observation, self.parameters, self.name)
+        robot = RigidRobotSimulator(self.observation, self.parameters, self.name)
         for stretch, part in zip(stretches(self.experiment.blocks()), self._parts, strict=True):
             yield from stretch if part.low_pass is None else self._simulated(stretch, robot, part.low_pass)
 
@@ -106,7 +106,7 @@ class SimulatedExperiment:
         return tuple(found)
 
     def _simulated(
-        self, motions: Iterator[Motion], robot: SimulatedRobot, low_pass: LowPass
+        self, motions: Iterator[Motion], robot: RigidRobotSimulator, low_pass: LowPass
     ) -> Iterator[Motion]:
         """The same of motions without gaps; friction of the `robot` remembers those before."""
         n, rests = self.observation.model.n, self.top_speed == 0

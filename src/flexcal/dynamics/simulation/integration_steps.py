@@ -21,7 +21,7 @@ _SHIFT = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class ForwardSteps:
+class IntegrationSteps:
     """Steps of `length` h (s) that follow each other, each with what holds in its middle, in the mean of its samples.
 
     Samples are `spacing` (s) apart. `torque` (N, n), the external one included, and `state` (N, 2, n), q and q̇; `columns` (N, n, p) are W
@@ -63,9 +63,9 @@ class ForwardSteps:
         return columns(self.observation, motion, dict(self.memory)) @ parameters
 
 
-def forward_steps(
+def discretise_motion(
     observation: Observation, experiment: Experiment, window: Window, slowest: np.ndarray
-) -> Iterator[ForwardSteps]:
+) -> Iterator[IntegrationSteps]:
     """The steps of an experiment inside a window, some at a time; a robot slower than `slowest` (n,) at all joints stands.
 
     Friction that remembers does so from the start of the experiment on.
@@ -105,7 +105,7 @@ def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndar
 
 def _steps(
     observation: Observation, motion: Motion, stride: int, memory: Memory, slowest: np.ndarray
-) -> ForwardSteps:
+) -> IntegrationSteps:
     middle = Motion(
         _means(motion.time, stride),
         _means(motion.q, stride),
@@ -125,7 +125,7 @@ def _steps(
     stands = [bool(still[k : k + stride + 1].all(axis=1).any()) for k in range(0, len(motion) - 1, stride)]
     spacing = float(motion.time[1] - motion.time[0])
     at = slice(None, None, stride)
-    return ForwardSteps(
+    return IntegrationSteps(
         stride * spacing,
         spacing,
         middle.torque,

@@ -9,14 +9,14 @@ import numpy as np
 from flexcal.dynamics.inverse_model import Memory, Observation
 from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.vibration import ElasticArm
 
 _PINOCCHIO = [0, 1, 2, 3, 4, 5, 7, 6, 8, 9]
 """Pinocchio's order of the ten parameters, which has Iyy before Ixz; it takes those that no body has, too."""
 
 
-class SimulatedRobot:
+class RigidRobotSimulator:
     """Mass matrix and torques for `parameters` (p,) of an observation: links in Pinocchio, drives by their terms.
 
     Springs do not yield in it. `name` is what messages call the experiment; terms with a memory take it for one that goes on.
@@ -26,11 +26,14 @@ class SimulatedRobot:
         import pinocchio as pin
 
         self.model, self.name = observation.model, name
-        links = len(INERTIAL) * self.model.n
+        links = len(LINK_PARAMETERS) * self.model.n
         rigid = replace(self.model, bearing_frames={})
         self._arm = ElasticArm(rigid, 0.0)
         for body, turn, own in zip(
-            self._arm.bodies, self._arm.turns, parameters[:links].reshape(-1, len(INERTIAL)), strict=True
+            self._arm.bodies,
+            self._arm.turns,
+            parameters[:links].reshape(-1, len(LINK_PARAMETERS)),
+            strict=True,
         ):
             link = pin.Inertia.FromDynamicParameters(own[_PINOCCHIO])
             self._arm.model.inertias[body] = pin.SE3(turn.T, np.zeros(3)).act(link)

@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.dynamics.simulation.integration_steps import ForwardSteps
+from flexcal.dynamics.simulation.integration_steps import IntegrationSteps
 from flexcal.errors import FlexcalError
 
 
 @dataclass(frozen=True, eq=False)
-class ForwardModel:
+class StateTransition:
     """`predicted` (2 n,) is [q, q̇] at the end of a step; `by_state` (2 n, 2 n), `by_parameters` (2 n, p) and `by_torque` (2 n, n) are
     its derivatives."""
 
@@ -22,7 +22,7 @@ class ForwardModel:
 
 
 @dataclass(frozen=True, eq=False)
-class ForwardModels:
+class StateTransitions:
     """The models of all `steps` with the mass matrix and the slopes of the torques of the parameters `about` (p,).
 
     W has the `accelerations` (N, n), rad/s²: the measured ones, smoothed, as their noise biases inertias towards zero. Whatever they
@@ -30,14 +30,14 @@ class ForwardModels:
     step's samples that which moves the position, and that which moves the velocity.
     """
 
-    steps: ForwardSteps
+    steps: IntegrationSteps
     about: np.ndarray
     slopes: np.ndarray
     accelerations: np.ndarray
     corrections: np.ndarray
 
     @classmethod
-    def of(cls, steps: ForwardSteps, about: np.ndarray, reach: int) -> ForwardModels:
+    def of(cls, steps: IntegrationSteps, about: np.ndarray, reach: int) -> StateTransitions:
         """With accelerations smoothed over so many samples: `reach`, to either side."""
         width = max(1, round(reach * steps.spacing / steps.length))
         weights = np.hanning(2 * width + 1)[1:-1]
@@ -48,7 +48,7 @@ class ForwardModels:
         smooth = (inner[:-1] / inner[-1]).T
         return cls(steps, about, steps.slopes(about), smooth, _corrections(smooth, steps))
 
-    def step(self, k: int, state: np.ndarray, parameters: np.ndarray) -> ForwardModel:
+    def step(self, k: int, state: np.ndarray, parameters: np.ndarray) -> StateTransition:
         """Step `k` from `state` (2 n,) with `parameters` (p,); raises `FlexcalError` where M is not positive definite."""
         steps, h = self.steps, self.steps.length
         n = len(state) // 2
@@ -73,10 +73,10 @@ class ForwardModels:
         predicted = np.concatenate(
             [q + h * dq + 0.5 * h**2 * (ddq + for_position), dq + h * (ddq + for_speed)]
         )
-        return ForwardModel(predicted, by_state, -onward @ columns, onward)
+        return StateTransition(predicted, by_state, -onward @ columns, onward)
 
 
-def _corrections(accelerations: np.ndarray, steps: ForwardSteps) -> np.ndarray:
+def _corrections(accelerations: np.ndarray, steps: IntegrationSteps) -> np.ndarray:
     """Of the trapezoidal mean over samples, which exceeds that of the motion by a″/12 times the square of their spacing, and of a position
     that a constant acceleration would move: a changing one moves it by a′h/6 less. Both would count as (ωh)²/12 of the inertia."""
     if len(accelerations) < 3:

@@ -13,11 +13,11 @@ from flexcal.elasticity.response_model import (
     ExperimentEffect,
     ModelError,
     ResponseModel,
-    StageOneResidual,
+    ResponseResidual,
     Tolerances,
     Weighting,
     experiment_effects,
-    stage_one_parameters,
+    stiffness_parameters,
 )
 from flexcal.elasticity.time_periodic import ReferenceMotion
 from flexcal.estimation import Estimate, Parameters, Problem, solve
@@ -57,7 +57,7 @@ class ResponseData:
     def parameters(self, model: RobotModel) -> tuple[Parameters, np.ndarray]:
         """Parameters of stage 1 and their joint prior covariance (p, p); raises `FlexcalError` where responses do not fit the robot."""
         return model.posterior.prior(
-            stage_one_parameters(
+            stiffness_parameters(
                 model,
                 self.responses,
                 inertias_known=self.inertias_known,
@@ -74,7 +74,7 @@ class ResponseFit:
     `effects` are those of the experiment in every pose, added to what `residual.model` predicts at rest; `error` what the model leaves out.
     """
 
-    residual: StageOneResidual
+    residual: ResponseResidual
     effects: tuple[ExperimentEffect, ...]
     error: ModelError | None
     problem: Problem
@@ -125,7 +125,7 @@ def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float)
         predicting = predicting.with_loaded_drives(x, plan)
         if plan.reference_amplitude > 0:
             effects = experiment_effects(predicting, x, ReferenceMotion.of(plan))
-    residual = StageOneResidual.of(predicting, responses, data.weighting)
+    residual = ResponseResidual.of(predicting, responses, data.weighting)
     residual = residual.shifted(predicting, [effect.shift for effect in effects])
     error = ModelError.of(residual, responses, x, effects, data.tolerances) if data.tolerances.any else None
     problem = _problem(residual, error, parameters, prior)
@@ -135,7 +135,7 @@ def _fit(model: RobotModel, data: ResponseData, x: np.ndarray, tolerance: float)
 
 
 def _problem(
-    residual: StageOneResidual, error: ModelError | None, parameters: Parameters, prior: np.ndarray
+    residual: ResponseResidual, error: ModelError | None, parameters: Parameters, prior: np.ndarray
 ) -> Problem:
     def whiten(rows: np.ndarray) -> np.ndarray:
         return rows if error is None else error.whiten(rows)

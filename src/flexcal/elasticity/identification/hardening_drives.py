@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
-from flexcal.elasticity.identification.score_test import asks_for
-from flexcal.elasticity.response_model import ResponseModel, StageOneResidual, hardening_name
+from flexcal.elasticity.identification.score_test import score_test_rejects
+from flexcal.elasticity.response_model import ResponseModel, ResponseResidual, hardening_name
 from flexcal.model.robot import RobotModel
 
 
@@ -21,8 +21,8 @@ def with_hardening(model: RobotModel, data: ResponseData, fit: ResponseFit) -> R
     parameters = wider.parameters(model)[0]
     x = parameters.coordinates(fit.estimate.values)
     predicting = ResponseModel.of(model, data.responses, parameters).with_loaded_drives(x, data.plan)
-    residual = StageOneResidual.of(predicting, data.responses, data.weighting)
+    residual = ResponseResidual.of(predicting, data.responses, data.weighting)
     residual = residual.shifted(predicting, [effect.shift for effect in fit.effects])
     numbers = [parameters.index(hardening_name(joint.name)) for joint in model.driven]
     columns = residual.linearise(x)[1][:, numbers] * parameters.prior_std()[numbers]
-    return wider if asks_for(fit, data, fit.whiten(columns)) else data
+    return wider if score_test_rejects(fit, data, fit.whiten(columns)) else data

@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
-from flexcal.elasticity.identification.score_test import asks_for
+from flexcal.elasticity.identification.score_test import score_test_rejects
 from flexcal.elasticity.response_model import Prediction, ResponseModel, held_inertia_name
-from flexcal.estimation import profile_rise
+from flexcal.estimation import profile_cost_increase
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import RobotModel
 from flexcal.model.vibration import linearise
@@ -26,13 +26,13 @@ INDIFFERENT = 2.0
 
 
 @dataclass(frozen=True)
-class HeldJoints:
+class CompliantHeldJoints:
     """Rigid revolute joints that may give way, by index, each with a spring (N m/rad, N m s/rad) whose mode is at the highest line."""
 
     springs: dict[int, tuple[float, float]]
 
     @classmethod
-    def of(cls, model: RobotModel, responses: Sequence[FrequencyResponse]) -> HeldJoints:
+    def of(cls, model: RobotModel, responses: Sequence[FrequencyResponse]) -> CompliantHeldJoints:
         """Every rigid revolute joint of `model`; the inertia about its axis is the median over the poses of `responses`."""
         rigid = [
             i
@@ -56,16 +56,16 @@ class HeldJoints:
             }
         )
 
-    def only(self, joints: Sequence[int]) -> HeldJoints:
+    def only(self, joints: Sequence[int]) -> CompliantHeldJoints:
         """Some of them."""
-        return HeldJoints({i: self.springs[i] for i in joints})
+        return CompliantHeldJoints({i: self.springs[i] for i in joints})
 
     def asked_for(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> bool:
         """Whether the residual of `fit`, with all these joints rigid, holds what their compliances would add to the responses.
 
         Rao's score test by their compliances.
         """
-        return bool(self.springs) and asks_for(fit, data, fit.whiten(self._shifts(model, fit)))
+        return bool(self.springs) and score_test_rejects(fit, data, fit.whiten(self._shifts(model, fit)))
 
     def _shifts(self, model: RobotModel, fit: ResponseFit) -> np.ndarray:
         """Change (m, k) of the residual by each compliance, in units of that of `springs`, by a forward difference from rigid."""
@@ -109,4 +109,4 @@ def _worth(model: RobotModel, fit: ResponseFit, joint: int) -> float:
     rigid = start.copy()
     rigid[numbers[0]] += np.log(NEARLY_RIGID)
     own_prior = 0.5 * float(distance @ distance)
-    return 2 * (profile_rise(problem, fit.estimate, rigid, numbers) + own_prior)
+    return 2 * (profile_cost_increase(problem, fit.estimate, rigid, numbers) + own_prior)

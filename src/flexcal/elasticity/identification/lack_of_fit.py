@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.elasticity.identification.fit import ResponseFit
 from flexcal.estimation import Misfit
 from flexcal.frequency.periodic import FrequencyResponse
-from flexcal.model.robot import INERTIALS, RobotModel
+from flexcal.model.robot import MASS_AND_COM, RobotModel
 
 BAND_LINES = 8
 """Neighbouring lines over which the residual is averaged."""
@@ -34,7 +34,7 @@ CERTAIN = 1e-3
 """Chance of so large a move of masses and centres of mass where the model is right."""
 
 
-def moved_inertials(fit: ResponseFit) -> float:
+def inertial_shift(fit: ResponseFit) -> float:
     """How far masses and centres of mass moved, root mean square in standard deviations of what was known of them; 0 where by chance.
 
     Where the model is right the squared distance, in the metric of the prior covariance, is at most χ² distributed with as many degrees of
@@ -43,7 +43,7 @@ def moved_inertials(fit: ResponseFit) -> float:
     from scipy.special import chdtri
 
     parameters = fit.estimate.parameters
-    own = [k for k, name in enumerate(parameters.names) if name.rpartition(".")[2] in INERTIALS]
+    own = [k for k, name in enumerate(parameters.names) if name.rpartition(".")[2] in MASS_AND_COM]
     if not own:
         return 0.0
     assert fit.problem.prior_covariance is not None
@@ -54,7 +54,7 @@ def moved_inertials(fit: ResponseFit) -> float:
     return float(np.sqrt(square / len(own))) if square > chdtri(len(own), CERTAIN) else 0.0
 
 
-def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> Misfit | None:
+def find_misfit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> Misfit | None:
     """Where the residual of `fit` exceeds what noise and model error explain; None where it does not."""
     powers = _line_powers(fit)
     smooth = [_band_means(power) for power in powers]
@@ -70,7 +70,7 @@ def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> M
     error = np.abs(response.stacked - fit.predicted()[worst])[band] / response.stacked_std[band]
     outputs = (*response.joints, *(f"sensor {name}" for name in response.sensors))
     axis = outputs[int(np.argmax(np.mean(error**2, axis=(0, 2))))]
-    far = far_springs(fit)
+    far = implausible_springs(fit)
     return Misfit(
         reduced_chi2=float(estimate.reduced_chi2),
         peak=peak,
@@ -79,12 +79,12 @@ def misfit_of_fit(fit: ResponseFit, responses: Sequence[FrequencyResponse]) -> M
         high_hz=float(response.frequencies_hz[band][-1]),
         axis=axis,
         far=far,
-        inertials=moved_inertials(fit),
+        inertials=inertial_shift(fit),
         severe=peak > SEVERE or estimate.reduced_chi2 > SEVERE_CHI2 or bool(far),
     )
 
 
-def far_springs(fit: ResponseFit) -> tuple[str, ...]:
+def implausible_springs(fit: ResponseFit) -> tuple[str, ...]:
     """Names of the stiffnesses that ended clearly, by two standard deviations, more than a factor of `FAR` from the robot that the fit
     started with."""
     robot, stds = fit.residual.model.robot, np.sqrt(np.diag(fit.estimate.covariance))

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.estimation import LOG_STD_LIMIT, Estimate, Problem, profile_rise
+from flexcal.estimation import LOG_STD_LIMIT, Estimate, Problem, profile_cost_increase
 
 WELL_KNOWN = 0.1
 """Posterior standard deviation of a log stiffness below which twice the value lies five standard deviations of the compliance away."""
 
 
-def profile_stretch(problem: Problem, fitted: Estimate) -> np.ndarray:
+def profile_std_ratio(problem: Problem, fitted: Estimate) -> np.ndarray:
     """By how much (p,) the profile is wider than the posterior's curvature, at least 1; `fitted` is the optimum of `problem`.
 
     A stiffness that counts as known to a factor of two is held at twice its value and all others are fitted again. The response is
@@ -27,6 +27,6 @@ def profile_stretch(problem: Problem, fitted: Estimate) -> np.ndarray:
             continue
         held = x.copy()
         held[number] += np.log(2.0)
-        rise = profile_rise(problem, fitted, held, [number])
+        rise = profile_cost_increase(problem, fitted, held, [number])
         stretch[number] = max(1.0, 0.5 / (std * np.sqrt(max(2.0 * rise, 1e-3))))
     return stretch

@@ -7,7 +7,7 @@ import numpy as np
 from flexcal.elasticity.identification.fit import ResponseData, ResponseFit
 
 
-def asks_for(fit: ResponseFit, data: ResponseData, columns: np.ndarray) -> bool:
+def score_test_rejects(fit: ResponseFit, data: ResponseData, columns: np.ndarray) -> bool:
     """Whether `fit` asks for parameters that would change its whitened residual by `columns` (m, k).
 
     With C the columns orthogonal to those of all fitted parameters, T = rᵀ C (Cᵀ C)⁻¹ Cᵀ r is χ² of k degrees of freedom, times the

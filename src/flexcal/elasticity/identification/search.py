@@ -8,7 +8,7 @@ from typing import Protocol
 
 import numpy as np
 
-from flexcal.elasticity.response_model import ResponseModel, StageOneResidual, element_scale
+from flexcal.elasticity.response_model import ResponseModel, ResponseResidual, element_scale
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameters, Problem, solve
 from flexcal.frequency.periodic import FrequencyResponse
@@ -69,7 +69,7 @@ class MultiStart:
     ) -> np.ndarray:
         """The best end point; see the class."""
         thinned = thin(responses, self.lines)
-        residual = StageOneResidual.of(
+        residual = ResponseResidual.of(
             ResponseModel.of(robot, thinned, parameters), thinned, TemperedWeighting(self.sigma)
         )
         problem = Problem(parameters, residual.linearise, residual.residual, prior)

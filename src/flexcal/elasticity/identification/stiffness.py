@@ -18,9 +18,9 @@ from flexcal.elasticity.identification.fit import (
     fit_responses,
 )
 from flexcal.elasticity.identification.hardening_drives import with_hardening
-from flexcal.elasticity.identification.held_joints import HeldJoints
-from flexcal.elasticity.identification.lack_of_fit import misfit_of_fit, misfit_std
-from flexcal.elasticity.identification.profile_std import profile_stretch
+from flexcal.elasticity.identification.held_joints import CompliantHeldJoints
+from flexcal.elasticity.identification.lack_of_fit import find_misfit, misfit_std
+from flexcal.elasticity.identification.profile_std import profile_std_ratio
 from flexcal.elasticity.identification.search import MultiStart, Search
 from flexcal.elasticity.response_model import (
     CovarianceWeighting,
@@ -30,9 +30,9 @@ from flexcal.elasticity.response_model import (
     check_sensors,
     held_inertia_name,
 )
-from flexcal.estimation import Estimate, known_to_a_factor_of_two, solve
+from flexcal.estimation import Estimate, is_log_identified, solve
 from flexcal.frequency.periodic import FrequencyResponse
-from flexcal.model.robot import INERTIALS, RobotModel, spring_names
+from flexcal.model.robot import MASS_AND_COM, RobotModel, spring_names
 from flexcal.progress import Progress, silent
 
 SPRING_VALUES = (".stiffness", ".damping", ".hardening")
@@ -150,7 +150,7 @@ def identify_stiffness(
     progress("fitting", 0.3)
 
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
-        held = HeldJoints.of(robot, responses)
+        held = CompliantHeldJoints.of(robot, responses)
         fit = None
         if held.asked_for(robot, data, begun):
             robot, fit = _with_held_joints(robot, held, data, search, rng, progress)
@@ -184,7 +184,7 @@ def identify_stiffness(
 
 def _with_held_joints(
     model: RobotModel,
-    held: HeldJoints,
+    held: CompliantHeldJoints,
     data: ResponseData,
     search: Search,
     rng: np.random.Generator,
@@ -223,7 +223,7 @@ def _searched_fit(
         lambda _, share: progress("fitting", 0.3 + 0.2 * share),
     )
     first = first_fit(model, data, x)
-    if misfit_of_fit(first, data.responses) is not None:
+    if find_misfit(first, data.responses) is not None:
         rotors = {held_inertia_name(e.name): float(model.rotor_inertia[e.index]) for e in model.elastic}
         moving = [(item.name, rotors.get(item.name, item.value)) for item in parameters.with_coordinates(x)]
         second = first_fit(model, data, parameters.coordinates(dict(moving)))
@@ -255,7 +255,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     covariance = posterior + (data.tolerances.inflation(data.responses) - 1.0) * from_data
     std = np.sqrt(np.diag(posterior))
     excess = max(1.0, fitted.reduced_chi2 if fitted.degrees_of_freedom > 0 else 1.0)
-    misfit = misfit_of_fit(fit, data.responses)
+    misfit = find_misfit(fit, data.responses)
     wider = std
     if problem.groups is not None and len(np.unique(problem.groups)) > len(fitted.parameters) + 1:
         robust = solve(problem, starts=fit.x[None], covariance="sandwich", tolerance=FINE)
@@ -263,11 +263,11 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     if misfit is not None:
         wider = np.maximum(wider, misfit_std(fit, misfit))
     factor = np.divide(wider, std, out=np.ones_like(std), where=std > 0)
-    factor = np.maximum(factor, np.sqrt(excess)) * profile_stretch(problem, fitted)
+    factor = np.maximum(factor, np.sqrt(excess)) * profile_std_ratio(problem, fitted)
     springs = np.array([name.endswith(SPRING_VALUES) for name in fitted.parameters.names])
     alone = np.where(springs, (factor**2 - excess) * np.diag(covariance), 0.0)
     covariance = excess * covariance + np.diag(alone) + _by_torque_constants(fit)
-    sized = known_to_a_factor_of_two(fitted.parameters, covariance)
+    sized = is_log_identified(fitted.parameters, covariance)
     small = {
         name: flag and size
         for name, flag, size in zip(fitted.parameters.names, fitted.identifiable, sized, strict=True)
@@ -276,7 +276,7 @@ def _widened(fit: ResponseFit, data: ResponseData) -> Estimate:
     known = tuple(
         flag
         and small.get(name.replace(".damping", ".stiffness"), True)
-        and not (absorbing and name.rpartition(".")[2] in INERTIALS)
+        and not (absorbing and name.rpartition(".")[2] in MASS_AND_COM)
         for name, flag in small.items()
     )
     return replace(fitted, covariance=covariance, identifiable=known, misfit=misfit)

@@ -1,20 +1,20 @@
 from .experiment_effect import ExperimentEffect, experiment_effects
 from .model_error import ModelError, Tolerances
 from .parameter_names import hardening_name, held_inertia_name
-from .parameters import check_responses, check_sensors, stage_one_parameters
+from .parameters import check_responses, check_sensors, stiffness_parameters
 from .prediction import Prediction, ResponseModel
-from .residual import CLUSTER_LINES, StageOneResidual, element_scale
-from .weighting import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
+from .residual import CLUSTER_LINES, ResponseResidual, element_scale
+from .weighting import CovarianceWeighting, ResonanceWeighting, UniformWeighting, Weighting
 
 __all__ = [
     "CLUSTER_LINES",
     "CovarianceWeighting",
     "ExperimentEffect",
     "ModelError",
-    "PaperWeighting",
     "Prediction",
+    "ResonanceWeighting",
     "ResponseModel",
-    "StageOneResidual",
+    "ResponseResidual",
     "Tolerances",
     "UniformWeighting",
     "Weighting",
@@ -24,5 +24,5 @@ __all__ = [
     "experiment_effects",
     "hardening_name",
     "held_inertia_name",
-    "stage_one_parameters",
+    "stiffness_parameters",
 ]

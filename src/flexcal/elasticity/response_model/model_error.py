@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.elasticity.response_model.experiment_effect import ExperimentEffect
 from flexcal.elasticity.response_model.parameter_names import pose_labels, viscous_name
 from flexcal.elasticity.response_model.prediction import Prediction, ResponseModel
-from flexcal.elasticity.response_model.residual import StageOneResidual
+from flexcal.elasticity.response_model.residual import ResponseResidual
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import (
     ANGLE_TOLERANCE,
@@ -19,7 +19,12 @@ from flexcal.model.robot import (
     LENGTH_TOLERANCE,
     SHARED_DISTORTION,
 )
-from flexcal.model.vibration import KNOT_OCTAVES, flatness_shifts, friction_shifts, over_frequency
+from flexcal.model.vibration import (
+    KNOT_OCTAVES,
+    friction_response_change,
+    over_frequency,
+    sensitivity_response_change,
+)
 
 
 @dataclass(frozen=True)
@@ -96,7 +101,7 @@ class ModelError:
     @classmethod
     def of(
         cls,
-        residual: StageOneResidual,
+        residual: ResponseResidual,
         responses: Sequence[FrequencyResponse],
         x: np.ndarray,
         effects: Sequence[ExperimentEffect],
@@ -115,7 +120,7 @@ class ModelError:
         for k, (pose, response, label) in enumerate(zip(residual.poses, responses, labels, strict=True)):
             nominal = predictions[k].response
             viscous = np.array([values[viscous_name(joint, label)] for joint in response.joints])
-            change = friction_shifts(
+            change = friction_response_change(
                 nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave
             )
             number = list(model.poses[k].gaps.values())
@@ -130,7 +135,7 @@ class ModelError:
             uneven = np.zeros((*nominal.shape, 0))
             if tolerances.flatness:
                 sensors = model.poses[k].sensors
-                uneven = flatness_shifts(
+                uneven = sensitivity_response_change(
                     nominal,
                     response.frequencies_hz,
                     sensors,

@@ -36,7 +36,7 @@ HARDENING_STD = 0.3
 """Prior of a drive's hardening, 1σ."""
 
 
-def stage_one_parameters(
+def stiffness_parameters(
     model: RobotModel,
     responses: Sequence[FrequencyResponse],
     *,

@@ -14,7 +14,7 @@ from flexcal.elasticity.response_model.parameter_names import (
     pose_labels,
     viscous_name,
 )
-from flexcal.elasticity.time_periodic import DriveTorque, Hardened
+from flexcal.elasticity.time_periodic import DriveTorque, HardenedStiffness
 from flexcal.estimation import Parameters
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.model.robot import ArmSensor, RobotModel, mounting_names, sensitivity_name, sensor_delay_name
@@ -118,11 +118,11 @@ class PoseModel:
         half_gap[list(self.gaps)] = natural[list(self.gaps.values())]
         return 1.0 + self.gap_compliance * half_gap
 
-    def _hardened(self, natural: np.ndarray) -> Hardened:
+    def _hardened(self, natural: np.ndarray) -> HardenedStiffness:
         """All drives harden, or none."""
         if self.torque is None or not self.hardening:
             none = np.zeros_like(self.gap_compliance)
-            return Hardened(none + 1.0, none, none)
+            return HardenedStiffness(none + 1.0, none, none)
         numbers = np.array([self.hardening[axis] for axis in sorted(self.hardening)])
         return self.torque.hardened(natural[numbers[:, 1]], natural[numbers[:, 0]])
 

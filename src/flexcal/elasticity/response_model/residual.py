@@ -70,7 +70,7 @@ class PoseResidual:
 
 
 @dataclass(frozen=True, eq=False)
-class StageOneResidual:
+class ResponseResidual:
     """The residual of all poses as a function of the estimation coordinates."""
 
     model: ResponseModel
@@ -79,14 +79,14 @@ class StageOneResidual:
     @classmethod
     def of(
         cls, model: ResponseModel, responses: Sequence[FrequencyResponse], weighting: Weighting
-    ) -> StageOneResidual:
+    ) -> ResponseResidual:
         """For measured responses, in the order of the model's poses."""
         return cls(model, tuple(PoseResidual.of(response, weighting) for response in responses))
 
-    def shifted(self, model: ResponseModel, shifts: Sequence[np.ndarray]) -> StageOneResidual:
+    def shifted(self, model: ResponseModel, shifts: Sequence[np.ndarray]) -> ResponseResidual:
         """The same measurements against `model`, with known changes (L, m, n) added to what it predicts in every pose."""
         poses = [replace(pose, shift=shift) for pose, shift in zip(self.poses, shifts, strict=True)]
-        return StageOneResidual(model, tuple(poses))
+        return ResponseResidual(model, tuple(poses))
 
     def residual(self, x: np.ndarray) -> np.ndarray:
         """All rows (m,), pose by pose."""

@@ -42,7 +42,7 @@ class UniformWeighting:
 
 
 @dataclass(frozen=True)
-class PaperWeighting:
+class ResonanceWeighting:
     """The paper's weights: uniform, amplified near poles and zeros of the diagonal elements, reduced for the others.
 
     The paper says no more than that. Here the error of G_ii is multiplied by up to `emphasis` within about `width` (relative

@@ -1,4 +1,4 @@
-from .drive_torque import DriveTorque, Hardened
+from .drive_torque import DriveTorque, HardenedStiffness
 from .friction_pulses import FrictionPulses
 from .harmonic_balance import reference_shift
 from .reference_motion import ReferenceMotion
@@ -6,7 +6,7 @@ from .reference_motion import ReferenceMotion
 __all__ = [
     "DriveTorque",
     "FrictionPulses",
-    "Hardened",
+    "HardenedStiffness",
     "ReferenceMotion",
     "reference_shift",
 ]

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.time_periodic.reference_motion import ReferenceMotion
 from flexcal.model.robot import RobotModel
-from flexcal.model.statics import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_of
+from flexcal.model.statics import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_from_torque
 from flexcal.model.vibration import ElasticArm, linearise, multisine_torque
 
 PHASES = 64
@@ -17,7 +17,7 @@ PHASES = 64
 
 
 @dataclass(frozen=True, eq=False)
-class Hardened:
+class HardenedStiffness:
     """Stiffness over that at no load along the reference motion, `ratio` (phases, E), and its derivatives by the hardening and by the
     logarithm of the stiffness."""
 
@@ -60,17 +60,17 @@ class DriveTorque:
         density = np.exp(-0.5 * (self.slow / self.size) ** 2) / (np.sqrt(2 * np.pi) * self.size)
         return 2 * self.stiffness * density
 
-    def hardened(self, stiffness: np.ndarray, hardening: np.ndarray) -> Hardened:
+    def hardened(self, stiffness: np.ndarray, hardening: np.ndarray) -> HardenedStiffness:
         """Drives of some `stiffness` (E,) N m/rad at no load and `hardening` (E,) along the reference motion.
 
         The torque k θ (1 + h (θ/θ₁)²) of a twist with the mean θ̄ and Gaussian about it, 1σ s, has the equivalent stiffness
         k (1 + 3 h (θ̄² + s²)/θ₁²) (Bussgang 1952); θ̄ is the twist under the slow torque.
         """
-        twist, size = twist_of(self.slow, stiffness, hardening), self.size / stiffness
+        twist, size = twist_from_torque(self.slow, stiffness, hardening), self.size / stiffness
         square = 3 * (twist**2 + size**2) / REFERENCE_TWIST**2
         falls = 6 * twist * twist_by_hardening(twist, hardening) / REFERENCE_TWIST**2
         linear = self.slow / stiffness / tangent_ratio(twist, hardening)  # -∂θ̄/∂log k
-        return Hardened(
+        return HardenedStiffness(
             1 + hardening * square,
             square + hardening * falls,
             -6 * hardening * (twist * linear + size**2) / REFERENCE_TWIST**2,

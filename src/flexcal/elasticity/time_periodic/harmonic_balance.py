@@ -16,7 +16,7 @@ import numpy as np
 from flexcal.elasticity.time_periodic.moving_sensors import MovingSensor, harmonics
 from flexcal.elasticity.time_periodic.reference_motion import ArmState, ReferenceMotion
 from flexcal.model.robot import ArmSensor, RobotModel
-from flexcal.model.vibration import ElasticArm, drive_pull, linearise, transfer_matrix
+from flexcal.model.vibration import ElasticArm, drive_stretch, linearise, transfer_matrix
 
 ARM_SIDEBANDS, GAP_SIDEBANDS = 2, 6
 """Multiples of the reference frequency that are balanced on either side of the excited line, without and with open gaps."""
@@ -55,7 +55,7 @@ def reference_shift(
     damping[2 * sidebands] += rest.damping
     stiffness[2 * sidebands] += rest.stiffness
     if opening is not None:
-        pull = drive_pull(robot, rest)
+        pull = drive_stretch(robot, rest)
         released = np.einsum("kg,dg,eg->kgde", harmonics(opening, 2 * sidebands), pull, pull)
         released[2 * sidebands] = 0.0
         stiffness -= np.einsum("g,kgde->kde", [drive.stiffness[2] for drive in robot.driven], released)

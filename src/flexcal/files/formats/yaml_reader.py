@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats.yaml_document import parse_document
 from flexcal.files.formats.yaml_writer import write_yaml
-from flexcal.files.structuring import Keys, MisfitError, structure
+from flexcal.files.structuring import Keys, StructureError, structure
 from flexcal.files.transaction import current
 
 __all__ = ["YamlFile", "read_yaml", "read_yaml_file", "write_yaml"]
@@ -44,7 +44,7 @@ class YamlFile:
         """The document as a `cls`; raises `InputError` with file and line where it does not fit."""
         try:
             return structure(self.data, cls)
-        except MisfitError as problem:
+        except StructureError as problem:
             keys, sentence = min(problem.failures, key=lambda failure: self.line(*failure[0]))
             raise self.error(keys, sentence) from problem
 

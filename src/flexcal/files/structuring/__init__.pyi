@@ -1,11 +1,11 @@
 from .converter import structure
-from .faults import MisfitError
+from .faults import StructureError
 from .keys import Keys, dotted, file_key
 from .wording import suggestion
 
 __all__ = [
     "Keys",
-    "MisfitError",
+    "StructureError",
     "dotted",
     "file_key",
     "structure",

@@ -10,7 +10,7 @@ from types import UnionType
 from typing import TYPE_CHECKING, Any, Literal, TypeVar, Union, get_args, get_origin
 
 from flexcal.files.structuring.arrays import array, is_array, joint_indices
-from flexcal.files.structuring.faults import MisfitError, Nested, Unfit, failures
+from flexcal.files.structuring.faults import Fault, Nested, StructureError, failures
 from flexcal.files.structuring.keys import file_key
 from flexcal.files.structuring.scalars import boolean, integer, literal, number, text
 from flexcal.files.structuring.unions import union_hook
@@ -23,7 +23,7 @@ T = TypeVar("T")
 
 
 def structure(data: Any, cls: type[T]) -> T:
-    """`data` as a `cls`; raises `MisfitError` with all that does not fit.
+    """`data` as a `cls`; raises `StructureError` with all that does not fit.
 
     A `FlexcalError` or `ValueError` of a dataclass's `__post_init__` counts as a misfit of its mapping.
     """
@@ -33,7 +33,7 @@ def structure(data: Any, cls: type[T]) -> T:
         found = failures(problem, ())
         if any(failure is None for failure in found):
             raise
-        raise MisfitError([failure for failure in found if failure is not None]) from problem
+        raise StructureError([failure for failure in found if failure is not None]) from problem
 
 
 @functools.cache
@@ -80,7 +80,7 @@ def _guarded(kind: type, hook: Any) -> Any:
         if not isinstance(value, kind):
             expected = "a list" if kind is list else "a mapping (key: value)"
             how = " (write [ ] around its entries, or a line with - before each)" if kind is list else ""
-            raise Unfit(f"{expected} is expected{how}, not {describe(value)}")
+            raise Fault(f"{expected} is expected{how}, not {describe(value)}")
         return hook(value, cls)
 
     return structure
@@ -112,7 +112,7 @@ def _fixed_tuple_hook(cls: Any, converter: Converter) -> Any:
 
     def structure(value: list[Any], _: Any) -> tuple[Any, ...]:
         if len(value) != len(members):
-            raise Unfit(f"{len(members)} items are expected, not {len(value)}")
+            raise Fault(f"{len(members)} items are expected, not {len(value)}")
         return tuple(
             _at(i, converter, item, member)
             for i, (item, member) in enumerate(zip(value, members, strict=True))

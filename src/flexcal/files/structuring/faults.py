@@ -10,7 +10,7 @@ from flexcal.files.structuring.keys import Keys, dotted, file_key, known_keys
 from flexcal.files.structuring.wording import suggestion
 
 
-class MisfitError(FlexcalError):
+class StructureError(FlexcalError):
     """Data that does not fit a class; `failures` pairs the keys leading to a fault with a sentence."""
 
     def __init__(self, failures: list[tuple[Keys, str]]):
@@ -18,7 +18,7 @@ class MisfitError(FlexcalError):
         self.failures = failures
 
 
-class Unfit(ValueError):
+class Fault(ValueError):
     """A value that does not fit its field; the message is a sentence without place."""
 
 
@@ -63,7 +63,7 @@ def failures(problem: BaseException, keys: Keys) -> list[tuple[Keys, str] | None
             else:
                 found.extend(failures(inner, place))
         return found
-    if isinstance(problem, (Unfit, FlexcalError, ValueError, TypeError)):
+    if isinstance(problem, (Fault, FlexcalError, ValueError, TypeError)):
         subject = f"{dotted(keys)}: " if keys else ""
         sentence = str(problem)
         return [(keys, subject + sentence + ("" if sentence.endswith((".", "?")) else "."))]

@@ -5,46 +5,46 @@ from __future__ import annotations
 import math
 from typing import Any, get_args
 
-from flexcal.files.structuring.faults import Unfit
+from flexcal.files.structuring.faults import Fault
 from flexcal.files.structuring.wording import describe, suggestion
 from flexcal.units import LARGEST
 
 
 def number(value: Any) -> float:
-    """A finite number below `units.LARGEST`; raises `Unfit`, as all below."""
+    """A finite number below `units.LARGEST`; raises `Fault`, as all below."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise Unfit(f"a number is expected, not {describe(value)}")
+        raise Fault(f"a number is expected, not {describe(value)}")
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise Unfit(f"a finite number is expected, not {describe(value)}")
+        raise Fault(f"a finite number is expected, not {describe(value)}")
     if abs(number) > LARGEST:
-        raise Unfit(f"a number below {LARGEST:.0e} is expected, not {number:g}")
+        raise Fault(f"a number below {LARGEST:.0e} is expected, not {number:g}")
     return number
 
 
 def integer(value: Any) -> int:
     """A whole number of at most 8 bytes."""
     if isinstance(value, bool) or not isinstance(value, int):
-        raise Unfit(f"a whole number is expected, not {describe(value)}")
+        raise Fault(f"a whole number is expected, not {describe(value)}")
     if not -(2**63) <= value < 2**63:
-        raise Unfit(f"a whole number of at most 8 bytes is expected, not {value:.3g}")
+        raise Fault(f"a whole number of at most 8 bytes is expected, not {value:.3g}")
     return value
 
 
 def text(value: Any) -> str:
     """A text."""
     if not isinstance(value, str):
-        raise Unfit(f"a text is expected, not {describe(value)}")
+        raise Fault(f"a text is expected, not {describe(value)}")
     return value
 
 
 def boolean(value: Any) -> bool:
     """True or false."""
     if not isinstance(value, bool):
-        raise Unfit(f"true or false is expected, not {describe(value)}")
+        raise Fault(f"true or false is expected, not {describe(value)}")
     return value
 
 
@@ -56,4 +56,4 @@ def literal(value: Any, cls: Any) -> Any:
             return choice
     near = suggestion(value, [str(choice) for choice in choices]) if isinstance(value, str) else ""
     listed = ", ".join(f"'{choice}'" for choice in choices)
-    raise Unfit(f"{describe(value)} is none of {listed}{near}")
+    raise Fault(f"{describe(value)} is none of {listed}{near}")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, get_args, get_origin
 
 import numpy as np
 
-from flexcal.files.structuring.faults import Unfit
+from flexcal.files.structuring.faults import Fault
 from flexcal.files.structuring.keys import known_keys
 from flexcal.files.structuring.wording import describe
 
@@ -30,7 +30,7 @@ def union_hook(cls: Any, converter: Converter) -> Any:
         )
         if not fitting:
             expected = " or ".join(_expected(member) for member in members if member is not NoneType)
-            raise Unfit(f"{expected} is expected, not {describe(value)}")
+            raise Fault(f"{expected} is expected, not {describe(value)}")
         for member in fitting[:-1]:
             try:
                 return converter.structure(value, member)

@@ -21,7 +21,7 @@ _POSTPONED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
 @contextmanager
-def undisturbed() -> Iterator[None]:
+def deferred_signals() -> Iterator[None]:
     """Within the block, exceptions that handlers of Ctrl-C and other signals would raise wait until its end."""
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -91,7 +91,7 @@ class Publication:
         folder = Path(os.path.realpath(folder))
         if folder not in self._stages:
             settle(folder)
-            with undisturbed():
+            with deferred_signals():
                 self._made += [path for path in (folder, *folder.parents) if not path.exists()]
                 folder.mkdir(parents=True, exist_ok=True)
                 self._stages[folder] = Stage.open(folder, verb, names)
@@ -143,7 +143,7 @@ class Publication:
         """
         whole = False
         try:
-            with undisturbed():
+            with deferred_signals():
                 with ExitStack() as locks:
                     for folder in sorted(self._stages):
                         locks.enter_context(locked(folder))
@@ -193,7 +193,7 @@ class Publication:
         """Drop the files that wait, unless they have been published."""
         if self._done:
             return
-        with undisturbed():
+        with deferred_signals():
             for stage in self._stages.values():
                 stage.remove()
             for folder in self._made:

@@ -29,7 +29,7 @@ _RANK_TOLERANCE = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class LocalFit:
+class LocalPolynomialFit:
     """`response` (L, n_y, n_u); the covariance of its vec (column-major) is `gain` (L, n_u, n_u) ⊗ `scatter` (L, n_y, n_y).
 
     `scatter` is that of the outputs about the fit, with `degrees_of_freedom`.
@@ -41,7 +41,7 @@ class LocalFit:
     degrees_of_freedom: int
 
 
-def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> LocalFit:
+def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> LocalPolynomialFit:
     """The fit to the spectra of E experiments at L lines, U (E, L, n_u) and Y (E, L, n_y), from the `count` lines around each.
 
     Raises `FlexcalError` where these are too few, or where the excitation does not tell the inputs apart.
@@ -76,7 +76,9 @@ def local_polynomial(inputs: np.ndarray, outputs: np.ndarray, count: int) -> Loc
     response = np.swapaxes(inverse @ projected / scale[:, 0, 0, :, None], -1, -2)
     gain = inverse @ np.swapaxes(inverse, -1, -2).conj() / (scale[:, 0, 0, :, None] * scale[:, 0, 0, None, :])
     residual = y - q @ projected
-    return LocalFit(response, gain, np.swapaxes(residual, -1, -2) @ residual.conj() / freedom, freedom)
+    return LocalPolynomialFit(
+        response, gain, np.swapaxes(residual, -1, -2) @ residual.conj() / freedom, freedom
+    )
 
 
 def without_transient(

@@ -1,20 +1,20 @@
-from .assignment import PlacedColumns
+from .assignment import ColumnAssignment
 from .excitation_records import ResponseRecords, read_response_records
 from .map_option import apply_map
 from .nominal_consistency import Misfit, check_nominal
-from .recognition import Guess, LeftOut, guess_columns, reasons_of
+from .recognition import Guess, LeaveOutErrors, guess_columns, reasons_unused
 from .rtde_names import TOOL
 
 __all__ = [
     "TOOL",
+    "ColumnAssignment",
     "Guess",
-    "LeftOut",
+    "LeaveOutErrors",
     "Misfit",
-    "PlacedColumns",
     "ResponseRecords",
     "apply_map",
     "check_nominal",
     "guess_columns",
     "read_response_records",
-    "reasons_of",
+    "reasons_unused",
 ]

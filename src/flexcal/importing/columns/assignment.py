@@ -14,7 +14,7 @@ NUMBERED = ("pose",)
 
 
 @dataclass(frozen=True)
-class PlacedColumns:
+class ColumnAssignment:
     """SI = (gain · column + offset) · unit, one entry a column; `why` says how the columns and their units were recognised."""
 
     quantity: str
@@ -27,7 +27,7 @@ class PlacedColumns:
     @classmethod
     def plain(
         cls, quantity: str, columns: tuple[str, ...], units: tuple[str | None, ...], why: str
-    ) -> PlacedColumns:
+    ) -> ColumnAssignment:
         """Columns that only have another name and unit."""
         n = len(columns)
         return cls(quantity, columns, units, why, (1.0,) * n, (0.0,) * n)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from flexcal.data.tables import UNITS, standard_columns
 from flexcal.errors import InputError
 from flexcal.files.structuring import suggestion
-from flexcal.importing.columns.assignment import NUMBERED, PlacedColumns
-from flexcal.importing.columns.recognition import Guess, LeftOut, place
+from flexcal.importing.columns.assignment import NUMBERED, ColumnAssignment
+from flexcal.importing.columns.recognition import Guess, LeaveOutErrors, place
 from flexcal.importing.tables import ForeignTable, parse_name, unit_of
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: 
     taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
     reasons = {left.column: left.why for left in guess.left_out}
     left = tuple(
-        LeftOut(column, reasons.get(column, "not mapped"))
+        LeaveOutErrors(column, reasons.get(column, "not mapped"))
         for column in foreign.table.columns
         if column not in taken
     )
@@ -125,11 +125,11 @@ def _no_column(entry: str, column: str, foreign: ForeignTable) -> InputError:
 def _said(
     quantity: str,
     entries: dict[int, tuple[str, str | None, float, float]],
-    guessed: PlacedColumns | None,
+    guessed: ColumnAssignment | None,
     names: Sequence[str],
     foreign: ForeignTable,
     model: RobotModel,
-) -> PlacedColumns:
+) -> ColumnAssignment:
     """What was said, and what was guessed of the rest; a unit that was not said is that of the name, else the guessed one."""
     missing = [name for i, name in enumerate(names) if i not in entries]
     if missing and guessed is None:
@@ -150,4 +150,4 @@ def _said(
         unit or (name if name in known else other)
         for unit, name, other in zip(units, named, usual, strict=True)
     )
-    return PlacedColumns(quantity, columns, either, "--map", gains, offsets)
+    return ColumnAssignment(quantity, columns, either, "--map", gains, offsets)

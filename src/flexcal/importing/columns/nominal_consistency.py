@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexcal.importing.columns.assignment import PlacedColumns
+from flexcal.importing.columns.assignment import ColumnAssignment
 from flexcal.importing.tables import parse_name
 from flexcal.model.kinematics import point_kinematics
 from flexcal.units import DEGREE
@@ -66,7 +66,7 @@ class Misfit:
 
 
 def check_nominal(
-    model: RobotModel, q: np.ndarray, xyz: np.ndarray, placed: PlacedColumns, *, point: str | None = None
+    model: RobotModel, q: np.ndarray, xyz: np.ndarray, placed: ColumnAssignment, *, point: str | None = None
 ) -> Misfit | None:
     """Register the nominal robot at `q` (N, n) rad or m with points `xyz` (N, 3), m, of one station and target.
 
@@ -143,7 +143,7 @@ class _Change:
 
 
 def _explained(
-    model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray, placed: PlacedColumns, found: Misfit
+    model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray, placed: ColumnAssignment, found: Misfit
 ) -> Misfit:
     """The misfit with the simplest explanation that makes good most of it, with the point where it was declared if one does so."""
     enough = min(_MADE_GOOD * found.moved_rms, _ODD * model.reach)
@@ -205,7 +205,7 @@ def _signs_and_zeros(model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndar
     return min(alike, key=lambda change: np.sum(change.signs < 0) + 1.5 * np.sum(change.zeros != 0))
 
 
-def _said(model: RobotModel, placed: PlacedColumns, change: _Change) -> dict[str, Any]:
+def _said(model: RobotModel, placed: ColumnAssignment, change: _Change) -> dict[str, Any]:
     """`proposal` and `options` of a misfit that a change explains."""
     words, options = [], []
     if change.mirrored:
@@ -227,7 +227,7 @@ def _said(model: RobotModel, placed: PlacedColumns, change: _Change) -> dict[str
     return {"proposal": "; ".join(words), "options": tuple(options)}
 
 
-def _source(placed: PlacedColumns, i: int, sign: float, zero: float) -> str:
+def _source(placed: ColumnAssignment, i: int, sign: float, zero: float) -> str:
     """Column `i` as --map has it, with another sign, and a zero in rad."""
     column, unit = placed.columns[i], placed.units[i]
     gain = sign * placed.gains[i]

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexcal.data.tables import TIMESTAMP, UNITS, VECTORS
-from flexcal.importing.columns.assignment import PlacedColumns
+from flexcal.importing.columns.assignment import ColumnAssignment
 from flexcal.importing.columns.joints import joint_quantities
 from flexcal.importing.columns.rtde_names import rtde_columns
 from flexcal.importing.columns.unit_inference import joint_units, point_unit, pose_time_unit, time_unit
@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LeftOut:
+class LeaveOutErrors:
     """A column that is not imported, and why."""
 
     column: str
@@ -43,12 +43,12 @@ class LeftOut:
 class Guess:
     """Recognised columns by quantity, texts such as `target` by their name, and all other columns."""
 
-    placed: Mapping[str, PlacedColumns]
+    placed: Mapping[str, ColumnAssignment]
     texts: Mapping[str, str]
-    left_out: tuple[LeftOut, ...]
+    left_out: tuple[LeaveOutErrors, ...]
 
 
-def reasons_of(left_out: Sequence[LeftOut]) -> list[str]:
+def reasons_unused(left_out: Sequence[LeaveOutErrors]) -> list[str]:
     """Columns that were left out, grouped by reason."""
     by_reason: dict[str, list[str]] = {}
     for left in left_out:
@@ -114,7 +114,7 @@ def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
 
 
 def _left(
-    names: Sequence[ColumnName], placed: Mapping[str, PlacedColumns], reasons: Mapping[str, str]
+    names: Sequence[ColumnName], placed: Mapping[str, ColumnAssignment], reasons: Mapping[str, str]
 ) -> list[ColumnName]:
     """The columns that are nothing yet."""
     taken = {column for found in placed.values() for column in found.columns}
@@ -123,13 +123,13 @@ def _left(
 
 def _guess(
     foreign: ForeignTable,
-    placed: Mapping[str, PlacedColumns],
+    placed: Mapping[str, ColumnAssignment],
     texts: Mapping[str, str],
     reasons: Mapping[str, str],
 ) -> Guess:
     taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
     left = tuple(
-        LeftOut(column, reasons.get(column, "not recognised"))
+        LeaveOutErrors(column, reasons.get(column, "not recognised"))
         for column in foreign.table.columns
         if column not in taken
     )
@@ -139,7 +139,7 @@ def _guess(
 def _by_order(foreign: ForeignTable, model: RobotModel) -> Guess:
     """Without names: a whole number that counts up or none, the joints, then a point or none."""
     names, n = list(foreign.numbers), model.n
-    placed: dict[str, PlacedColumns] = {}
+    placed: dict[str, ColumnAssignment] = {}
     rest = names
     if names and (np.diff(foreign.numbers[names[0]]) == 1).all():
         placed["pose"] = place(foreign, model, "pose", (names[0],), "their order")
@@ -224,27 +224,29 @@ def place(
     why: str,
     *,
     points: bool = False,
-) -> PlacedColumns:
+) -> ColumnAssignment:
     """`columns` as a quantity, with the units that the file says, else those that their magnitude or their kind tells.
 
     With `points` a time is that of a measured pose, else of a sample.
     """
     if quantity == "t" and columns[0] in foreign.times:
-        return PlacedColumns.plain(quantity, columns, (TIMESTAMP,), "timestamps, as seconds from the first")
+        return ColumnAssignment.plain(
+            quantity, columns, (TIMESTAMP,), "timestamps, as seconds from the first"
+        )
     said = [parse_name(column, foreign.units.get(column)).unit for column in columns]
     known = UNITS.get(quantity, {})
     if all(unit in known for unit in said):
-        return PlacedColumns.plain(quantity, columns, tuple(said), f"{why}; the unit stands there")
+        return ColumnAssignment.plain(quantity, columns, tuple(said), f"{why}; the unit stands there")
     values = np.stack([foreign.numbers[column] for column in columns], axis=1)
     if quantity in ("q", "qa"):
         units = joint_units(model, values)
-        return PlacedColumns.plain(quantity, columns, units, f"{why}; the unit by the joints' limits")
+        return ColumnAssignment.plain(quantity, columns, units, f"{why}; the unit by the joints' limits")
     if quantity == "xyz":
         units = (point_unit(model, values),) * 3
-        return PlacedColumns.plain(quantity, columns, units, f"{why}; the unit by the robot's reach")
+        return ColumnAssignment.plain(quantity, columns, units, f"{why}; the unit by the robot's reach")
     if quantity == "t":
         unit = (pose_time_unit if points else time_unit)(values[:, 0])
-        return PlacedColumns.plain(quantity, columns, (unit,), f"{why}; the unit by the rate")
+        return ColumnAssignment.plain(quantity, columns, (unit,), f"{why}; the unit by the rate")
     default = next(iter(known), None)
     taken = f"; taken to be in {default}" if default else ""
-    return PlacedColumns.plain(quantity, columns, (default,) * len(columns), f"{why}{taken}")
+    return ColumnAssignment.plain(quantity, columns, (default,) * len(columns), f"{why}{taken}")

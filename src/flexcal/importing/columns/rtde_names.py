@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from flexcal.importing.columns.assignment import PlacedColumns
+from flexcal.importing.columns.assignment import ColumnAssignment
 from flexcal.importing.columns.unit_inference import joint_units
 from flexcal.importing.tables import ForeignTable
 
@@ -42,7 +42,7 @@ _SLOWEST = 1.1
 
 def rtde_columns(
     foreign: ForeignTable, model: RobotModel, reasons: dict[str, str]
-) -> dict[str, PlacedColumns]:
+) -> dict[str, ColumnAssignment]:
     """What the columns are where they have these names, positions of six joints among them; nothing otherwise.
 
     The tool's position counts as a measured point only where no time says that this is a log. `reasons` gets the columns of that
@@ -53,23 +53,23 @@ def rtde_columns(
         return {}
     columns = _of_joints("actual_q")
     units = joint_units(model, np.stack([there[column] for column in columns], axis=1))
-    found = {"q": PlacedColumns.plain("q", columns, units, f"{_WHY}; the unit by the joints' limits")}
+    found = {"q": ColumnAssignment.plain("q", columns, units, f"{_WHY}; the unit by the joints' limits")}
     for quantity, stem, unit in _OF_JOINTS:
         columns = _of_joints(stem)
         if set(columns) <= there.keys():
-            found[quantity] = PlacedColumns.plain(quantity, columns, (unit,) * JOINTS, _WHY)
+            found[quantity] = ColumnAssignment.plain(quantity, columns, (unit,) * JOINTS, _WHY)
     for stem, why in _REASONS.items():
         reasons |= {column: why for column in _of_joints(stem) if column in there}
     steps = []
     if TIME in there and TIME not in foreign.times:
-        found["t"] = PlacedColumns.plain("t", (TIME,), ("s",), _WHY)
+        found["t"] = ColumnAssignment.plain("t", (TIME,), ("s",), _WHY)
     if TIME in there:
         steps = np.diff(there[TIME])
     if set(TOOL) <= there.keys():
         if len(steps) and np.median(steps) <= _SLOWEST:
             reasons |= dict.fromkeys(TOOL, _IN_LOG)
         else:
-            found["xyz"] = PlacedColumns.plain("xyz", TOOL, ("m",) * 3, f"{_WHY}; not measured")
+            found["xyz"] = ColumnAssignment.plain("xyz", TOOL, ("m",) * 3, f"{_WHY}; not measured")
         reasons |= {column: _TURN for column in _of_joints("actual_TCP_pose")[3:] if column in there}
     return found
 

@@ -13,33 +13,33 @@ import numpy as np
 
 from flexcal.calibration.accuracy import PoseRepeatability, repeatability
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import EvenSample
+from flexcal.calibration.fit import StratifiedSample
 from flexcal.calibration.verification import (
     ErrorCovariance,
     ErrorScale,
     Verification,
     best_placement,
-    enough_for_points,
+    can_register,
+    can_register_with_points,
     error_scale,
-    registrable,
     rigid_placement,
-    robot_before,
+    uncalibrated_model,
     verify_jointly,
 )
-from flexcal.compensation import wanted_pose
+from flexcal.compensation import desired_pose
 from flexcal.data.poses import PoseSet, ToolTargets, read_targets
 from flexcal.errors import InputError
 from flexcal.files.formats import sha256_of
 from flexcal.jobs.accuracy.verification import verification_poses
-from flexcal.jobs.calibration import fitted_among
-from flexcal.jobs.inputs import CalibratedRobot, calibrated_robot, unmeasured_remark
+from flexcal.jobs.calibration import already_fitted
+from flexcal.jobs.inputs import CalibratedRobot, calibrated_robot, unmeasured_targets_remark
 from flexcal.model.parts import vector_rotation
 from flexcal.model.robot import RobotModel
 from flexcal.model.statics import carried_mass, points_kinematics
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
 from flexcal.report.pages import CertificateStudy, write_certificate
-from flexcal.report.results import NOT_GIVEN, Particulars
+from flexcal.report.results import NOT_GIVEN, MeasurementDetails
 from flexcal.units import MILLIMETRE
 
 _FAR = 0.25
@@ -47,7 +47,7 @@ _FAR = 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Visited:
+class MeasuredTargets:
     """Measured `poses`, their `errors` (N, 3) m from their targets, and `centres` (P, 3) m, those of the barycentres of `numbers` (P,).
 
     `visits` is None where no target was visited twice.
@@ -81,20 +81,20 @@ class Visited:
 class RobotCertificate:
     """Before and after at the same targets; `refitted`: after, with instrument and point registered by best fit, as before.
 
-    `before` are the robot's own errors, `declared` and `registered` the others of `RobotBefore`. `verification` and `scale`: the
+    `before` are the robot's own errors, `declared` and `registered` the others of `UncalibratedRobot`. `verification` and `scale`: the
     measurements after against what the calibration predicts, of a `sample` where there are very many. `command`: the command line.
     """
 
     robot: CalibratedRobot
-    declared: Visited | None
-    registered: Visited
-    before: Visited
-    after: Visited
-    refitted: Visited
-    uncompared: int
+    declared: MeasuredTargets | None
+    registered: MeasuredTargets
+    before: MeasuredTargets
+    after: MeasuredTargets
+    refitted: MeasuredTargets
+    unmatched_targets: int
     verification: Verification
     scale: ErrorScale
-    sample: EvenSample | None
+    sample: StratifiedSample | None
     files: Mapping[str, str]
     fitted: tuple[str, ...]
     command: str = ""
@@ -115,10 +115,10 @@ class RobotCertificate:
     @property
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
-        remarks = list(unmeasured_remark(self.robot, self.after.poses.targets))
-        if self.uncompared:
+        remarks = list(unmeasured_targets_remark(self.robot, self.after.poses.targets))
+        if self.unmatched_targets:
             remarks.append(
-                f"targets that were measured only before or only after are not compared: {self.uncompared}"
+                f"targets that were measured only before or only after are not compared: {self.unmatched_targets}"
             )
         if self.sample is not None:
             remarks.append(
@@ -184,7 +184,7 @@ def certify_robot(
     out: Path,
     *,
     estimates: Path | None = None,
-    particulars: Particulars = NOT_GIVEN,
+    particulars: MeasurementDetails = NOT_GIVEN,
     command: str = "",
     progress: Progress = silent,
 ) -> RobotCertificate:
@@ -205,7 +205,7 @@ def certify_robot(
     progress("reading", 0.0)
     wanted = read_targets(targets, model)
     base, as_declared = (
-        wanted_pose(model, nominal, wanted).position for nominal in (calibrated.found, calibrated.nominal)
+        desired_pose(model, nominal, wanted).position for nominal in (calibrated.found, calibrated.nominal)
     )
     sets = {file: verification_poses(calibrated, [file]) for file in (before, after)}
     rows = {file: _rows(file, poses, targets, wanted) for file, poses in sets.items()}
@@ -226,17 +226,17 @@ def certify_robot(
         points = base[rows[file][kept]]
         visited[file] = (poses if kept.all() else poses.subset(kept), points)
         del poses
-    if not all(registrable(poses) for poses, _ in visited.values()):
+    if not all(can_register(poses) for poses, _ in visited.values()):
         raise InputError(
             f"{len(common)} targets were measured before and after; four or more that do not lie on a line are needed."
         )
-    sample = EvenSample.of(visited[after][0])
+    sample = StratifiedSample.of(visited[after][0])
     judged = slice(None) if sample is None else sample.rows
     known, covariance = verify_jointly(model, visited[after][0].subset(judged))
     there = _visited(visited[after][0], _placed(model, *visited[after]))
     start = visited[before][0]
     declared = as_declared[rows[before][np.isin(wanted.pose[rows[before]], common)]]
-    placed = robot_before(calibrated.nominal, start).declared
+    placed = uncalibrated_model(calibrated.nominal, start).declared
     result = RobotCertificate(
         calibrated,
         None if placed is None else _visited(start, _placed(placed, start, declared)),
@@ -252,7 +252,7 @@ def certify_robot(
             [robot, calibrated.nominal.urdf],
             {"estimates": calibrated.stored, "targets": targets, "before": before, "after": after},
         ),
-        fitted_among(calibrated, [after], visited[after][0]),
+        already_fitted(calibrated, [after], visited[after][0]),
         command,
     )
     progress("comparing", 1.0)
@@ -305,21 +305,21 @@ def _registered(poses: PoseSet, points: np.ndarray) -> np.ndarray:
 
 def _best_fit(nominal: RobotModel, poses: PoseSet, points: np.ndarray) -> np.ndarray:
     """As `_registered`, with the place of the measured point on the tool found too, where the poses are enough for that."""
-    if not enough_for_points(poses):
+    if not can_register_with_points(poses):
         return _registered(poses, points)
     turn = points_kinematics(nominal, poses.q, None, poses.target, jacobians=False).orientation
     return best_placement(poses, points, turn).expected(poses, points, turn)
 
 
-def _visited(poses: PoseSet, targets: np.ndarray) -> Visited:
+def _visited(poses: PoseSet, targets: np.ndarray) -> MeasuredTargets:
     errors = poses.position - targets
     numbers, own, counts = np.unique(poses.pose, return_inverse=True, return_counts=True)
     centres = np.array([np.bincount(own, coordinate) for coordinate in errors.T]).T / counts[:, None]
     visits = repeatability(poses) if len(numbers) < len(poses) else None
-    return Visited(poses, errors, numbers, centres, visits)
+    return MeasuredTargets(poses, errors, numbers, centres, visits)
 
 
-def _measured_noise(visited: Visited, covariance: ErrorCovariance) -> ErrorCovariance:
+def _measured_noise(visited: MeasuredTargets, covariance: ErrorCovariance) -> ErrorCovariance:
     """The covariance with the scatter that was seen from visit to visit in place of the predicted one, where there were several visits."""
     if visited.visits is None:
         return covariance

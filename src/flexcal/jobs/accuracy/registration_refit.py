@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.verification import Refit, Refitted, Verification, refitted
+from flexcal.calibration.verification import Refit, RefittedVerification, Verification, refitted
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
@@ -34,7 +34,7 @@ _CHANGED = {
 }
 
 
-def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Refitted | None:
+def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> RefittedVerification | None:
     """The refit that reduces the leave-one-out errors to less than half; None where there is none.
 
     The remaining errors have to be about as large as predicted, or a tenth of those before, because a refit also reduces errors of a
@@ -43,7 +43,7 @@ def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Re
     rms = _rms(found)
     if found.all.mean < _MUCH:
         return None
-    best: Refitted | None = None
+    best: RefittedVerification | None = None
     tried: Sequence[tuple[Refit, ...]] = (("station",), ("point",), ("station", "point"))
     for what in tried:
         try:
@@ -57,14 +57,17 @@ def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Re
     return best if best is not None and _explains(best, rms) else None
 
 
-def _explains(best: Refitted, rms: float) -> bool:
+def _explains(best: RefittedVerification, rms: float) -> bool:
     left = _rms(best.result)
     predicted = float(np.sqrt(np.mean(best.result.expected_rms**2)))
     return left < _TENTH * rms or (best.covariance.independent is not None and left < 2 * predicted)
 
 
 def refit_remarks(
-    found: Verification, poses: PoseSet, refit: Refitted | None, better: Refitted | None
+    found: Verification,
+    poses: PoseSet,
+    refit: RefittedVerification | None,
+    better: RefittedVerification | None,
 ) -> tuple[str, ...]:
     """One sentence on a refit that was made or is proposed."""
     if refit is not None:
@@ -81,7 +84,7 @@ def refit_remarks(
     )
 
 
-def refit_document(refit: Refitted | None, poses: int) -> dict[str, Any] | None:
+def refit_document(refit: RefittedVerification | None, poses: int) -> dict[str, Any] | None:
     """For results.json."""
     if refit is None:
         return None
@@ -95,7 +98,7 @@ def refit_document(refit: Refitted | None, poses: int) -> dict[str, Any] | None:
     }
 
 
-def _poses(refit: Refitted) -> int:
+def _poses(refit: RefittedVerification) -> int:
     return -(-refit.parameters // 3)
 
 

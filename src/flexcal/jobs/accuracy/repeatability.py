@@ -11,24 +11,24 @@ import numpy as np
 
 from flexcal.calibration.accuracy import (
     CYCLES,
-    VISITS_A_SET,
+    VISITS_PER_SET,
     PoseDrift,
     PoseRepeatability,
-    common_way,
-    drift_of_poses,
+    common_displacement,
     noise_repeatability,
+    pose_drifts,
     repeatability,
 )
 from flexcal.calibration.measurement import predicted_positions
-from flexcal.calibration.verification import robot_before
+from flexcal.calibration.verification import uncalibrated_model
 from flexcal.data.poses import PoseSet, read_poses
 from flexcal.files.formats import provenance
-from flexcal.jobs.calibration import unused_columns
+from flexcal.jobs.calibration import ignored_columns_remarks
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     calibrated_robot,
-    found_station,
-    require_distinct,
+    is_station_identified,
+    require_distinct_files,
     stored_estimates,
 )
 from flexcal.jobs.result_files import write_results
@@ -58,10 +58,10 @@ class RobotRepeatability:
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
         timed = self.poses.time is not None
-        remarks = list(unused_columns(replace(self.poses, time=None)))
+        remarks = list(ignored_columns_remarks(replace(self.poses, time=None)))
         if timed and not self.drifts:
             remarks.append(
-                f"drift is evaluated at poses with {2 * VISITS_A_SET} visits or more, with times that increase from row to row "
+                f"drift is evaluated at poses with {2 * VISITS_PER_SET} visits or more, with times that increase from row to row "
                 "and file to file"
             )
         fewest = min(len(pose.rows) for pose in self.visited)
@@ -129,7 +129,7 @@ class RobotRepeatability:
                     "certain": drift.certain,
                 }
             )
-        together, apart = common_way(self.drifts)
+        together, apart = common_displacement(self.drifts)
         keys = ["drp_mm", *(f"dap_{kind}_mm" for kind in self.errors)]
         return {
             **{key: _spread([item[key] for item in each]) for key in keys},
@@ -166,7 +166,7 @@ def repeat_robot(
     `estimates` is an estimates.yaml, or a folder with one; without, that beside robot.yaml is used where it holds a calibration. Raises
     `FlexcalError` where no pose was visited twice, or a file does not fit.
     """
-    require_distinct(files)
+    require_distinct_files(files)
     nominal = RobotModel.from_yaml(robot, estimates=False)
     progress("reading", 0.0)
     poses = read_poses(list(files), nominal, require_motion=False)
@@ -176,16 +176,16 @@ def repeat_robot(
     progress("visits", 0.5)
     calibrated = _calibrated(robot, estimates, nominal)
     errors: dict[str, np.ndarray] = {}
-    before = robot_before(nominal, poses).errors(poses).robots_own
+    before = uncalibrated_model(nominal, poses).errors(poses).robots_own
     if before is not None:
         errors["nominal"] = before
-    if calibrated is not None and all(found_station(calibrated.model, s) for s in poses.stations):
+    if calibrated is not None and all(is_station_identified(calibrated.model, s) for s in poses.stations):
         errors["calibrated"] = poses.position - predicted_positions(calibrated.model, poses)
     progress("visits", 1.0)
     stored = None if calibrated is None else calibrated.stored
     blocks = () if calibrated is None else tuple(calibrated.blocks)
     origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
-    result = RobotRepeatability(poses, visited, errors, drift_of_poses(poses, visited), origin, command)
+    result = RobotRepeatability(poses, visited, errors, pose_drifts(poses, visited), origin, command)
     if out is not None:
         document = result.document()
         write_results(out, document)

@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import EvenSample, all_errors
+from flexcal.calibration.fit import StratifiedSample, all_errors
 from flexcal.calibration.measurement import require_points
 from flexcal.calibration.verification import (
     CALIBRATED,
     ErrorCovariance,
-    ErrorsBefore,
     MeasuredPoints,
     Refit,
-    Refitted,
+    RefittedVerification,
+    UncalibratedErrors,
     Verification,
     arms_at,
     errors_before,
     prediction_document,
     refitted,
-    robot_before,
+    uncalibrated_model,
     verify_jointly,
 )
 from flexcal.data.poses import PoseSet, read_poses
@@ -33,13 +33,18 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_document, refit_remarks
 from flexcal.jobs.calibration import (
-    fitted_among,
+    already_fitted,
+    ignored_columns_remarks,
     outside_ranges,
-    sample_document,
-    unused_columns,
-    verified_sample,
+    subsample_document,
+    verification_subsample_remark,
 )
-from flexcal.jobs.inputs import CalibratedRobot, calibrated_robot, found_station, require_distinct
+from flexcal.jobs.inputs import (
+    CalibratedRobot,
+    calibrated_robot,
+    is_station_identified,
+    require_distinct_files,
+)
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import write_arm, write_points, write_results
 from flexcal.model.robot import RobotModel
@@ -65,16 +70,16 @@ class RobotVerification:
     poses: PoseSet
     result: Verification
     covariance: ErrorCovariance
-    before: ErrorsBefore
-    refit: Refitted | None
+    before: UncalibratedErrors
+    refit: RefittedVerification | None
     as_calibrated: Verification | None
-    better: Refitted | None
+    better: RefittedVerification | None
     uncalibrated: tuple[str, ...]
     outside: str
     fitted: tuple[str, ...]
     provenance: Mapping[str, str]
     command: str = ""
-    sample: EvenSample | None = None
+    sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
 
     @property
@@ -89,8 +94,8 @@ class RobotVerification:
     def remarks(self) -> tuple[str, ...]:
         """One sentence each."""
         remarks = [
-            *verified_sample(self.sample, self.everywhere),
-            *unused_columns(self.poses),
+            *verification_subsample_remark(self.sample, self.everywhere),
+            *ignored_columns_remarks(self.poses),
             *([self.outside] if self.outside else []),
             *refit_remarks(self.result, self.poses, self.refit, self.better),
         ]
@@ -146,7 +151,7 @@ class RobotVerification:
             },
             "prediction": prediction_document(result, self.covariance),
             "ambiguous_poses": int(result.ambiguous.sum()),
-            "sample": sample_document(self.sample, self.everywhere),
+            "sample": subsample_document(self.sample, self.everywhere),
             "fitted": list(self.fitted),
             "remarks": list(self.remarks),
             "provenance": dict(self.provenance),
@@ -171,20 +176,20 @@ def verify_robot(
     with `out`, results.json, points.csv, arm.npz and report.html are left in that folder. Raises `FlexcalError` where there is no
     calibration, a station stands where no calibration pose was measured and is not refitted, or a file does not fit.
     """
-    require_distinct(files)
+    require_distinct_files(files)
     calibrated = calibrated_robot(robot, estimates, "verify")
     bare, blocks = calibrated.nominal, calibrated.blocks
     progress("reading", 0.0)
     measured = verification_poses(calibrated, files, placed_again="station" in refit)
-    sample = EvenSample.of(measured)
+    sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     progress("reading", 1.0)
     unmeasured = tuple(name for name in poses.targets if name not in calibrated.measured)
     model = calibrated.probable if unmeasured else calibrated.model
-    before = robot_before(bare, poses).errors(poses)
+    before = uncalibrated_model(bare, poses).errors(poses)
     origin = provenance([robot, bare.urdf, *files], None, calibrated.stored, tuple(blocks))
-    fitted = fitted_among(calibrated, files, poses)
-    known = all(found_station(model, station) for station in poses.stations)
+    fitted = already_fitted(calibrated, files, poses)
+    known = all(is_station_identified(model, station) for station in poses.stations)
     stands = verify_jointly(model, poses) if known else None
     anew = refitted(model, poses, refit) if refit else None
     found = stands if anew is None else (anew.result, anew.covariance)
@@ -226,7 +231,7 @@ def verification_poses(
     poses = read_poses(list(files), model, require_motion=False)
     require_points(poses, " and ".join(str(file) for file in files))
     for station in poses.stations:
-        if not placed_again and not found_station(model, station):
+        if not placed_again and not is_station_identified(model, station):
             raise FlexcalError(
                 f"the station '{station}' was not calibrated, so its position is unknown; add poses measured from there to the "
                 "calibration, "

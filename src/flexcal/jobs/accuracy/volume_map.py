@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from flexcal.calibration.accuracy import AccuracyMap, accuracy_map, error_sources, random_poses_in
-from flexcal.calibration.fit import EvenSample
+from flexcal.calibration.fit import StratifiedSample
 from flexcal.calibration.measurement import Propagation, propagation
 from flexcal.calibration.verification import (
-    ErrorsBefore,
     ErrorScale,
+    UncalibratedErrors,
     Verification,
     error_scale,
-    robot_before,
+    uncalibrated_model,
     verify_jointly,
 )
 from flexcal.data.plans import page_beside
@@ -27,14 +27,14 @@ from flexcal.errors import InputError, naming
 from flexcal.files.formats import provenance
 from flexcal.jobs.accuracy.registration_refit import proposed_refit, refit_remarks
 from flexcal.jobs.accuracy.verification import verification_poses
-from flexcal.jobs.calibration import fitted_among, outside_ranges
+from flexcal.jobs.calibration import already_fitted, outside_ranges
 from flexcal.jobs.experiments import box_corners, working_file, working_volume
 from flexcal.jobs.inputs import (
     CalibratedRobot,
     calibrated_robot,
-    found_station,
-    require_distinct,
-    unmeasured_remark,
+    is_station_identified,
+    require_distinct_files,
+    unmeasured_targets_remark,
 )
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
@@ -65,13 +65,13 @@ class RobotMap:
     sources: dict[str, float]
     worst_sources: dict[str, np.ndarray]
     scale: ErrorScale | None
-    before: ErrorsBefore | None
+    before: UncalibratedErrors | None
     unmeasured: tuple[str, ...]
     fitted: tuple[str, ...]
     outside: str
     provenance: Mapping[str, str]
     command: str = ""
-    sample: EvenSample | None = None
+    sample: StratifiedSample | None = None
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -130,7 +130,7 @@ class RobotMap:
             if scale is None
             else {
                 **scale.document(),
-                "applied": applied_factor(scale),
+                "applied": error_scale_factor(scale),
                 "fitted": list(self.fitted),
             },
             "verdict": self.trust.document(),
@@ -140,7 +140,7 @@ class RobotMap:
         }
 
 
-def applied_factor(scale: ErrorScale | None) -> float:
+def error_scale_factor(scale: ErrorScale | None) -> float:
     """What the map is multiplied by: the factor where errors are larger than chance allows; never less than one."""
     return scale.factor if scale is not None and scale.low > 1 else 1.0
 
@@ -166,15 +166,15 @@ def map_accuracy(
     """
     if out.suffix not in (".html", ".csv", ".parquet"):
         raise InputError(f"{out} must end in .html, .csv or .parquet; give another --out.")
-    require_distinct(verification)
+    require_distinct_files(verification)
     calibrated = calibrated_robot(robot, estimates, "map")
     model = calibrated.model
-    stations = [s for s in model.stations if found_station(model, s)]
+    stations = [s for s in model.stations if is_station_identified(model, s)]
     reach = propagation(model, station=stations[0] if stations else None, payload=payload)
     scale, before, study, fitted, sample = _verified(calibrated, verification)
     rng = np.random.default_rng([seed, 7])
     box, q = _poses(reach, working, count, seed, rng, progress)
-    found = accuracy_map(reach, q, progress=progress).scaled(applied_factor(scale))
+    found = accuracy_map(reach, q, progress=progress).scaled(error_scale_factor(scale))
     worst = _worst(found)
     some = q[rng.permutation(len(q))[:_SOURCE_POSES]]
     shares = {kind: float(values.mean()) for kind, values in error_sources(reach, some).items()}
@@ -195,7 +195,7 @@ def map_accuracy(
         sources,
         scale,
         before,
-        unmeasured_remark(calibrated, [reach.target]),
+        unmeasured_targets_remark(calibrated, [reach.target]),
         fitted,
         outside_ranges(calibrated, q),
         origin,
@@ -233,23 +233,29 @@ def _poses(
 
 def _verified(
     calibrated: CalibratedRobot, files: Sequence[Path]
-) -> tuple[ErrorScale | None, ErrorsBefore | None, Verification | None, tuple[str, ...], EvenSample | None]:
+) -> tuple[
+    ErrorScale | None,
+    UncalibratedErrors | None,
+    Verification | None,
+    tuple[str, ...],
+    StratifiedSample | None,
+]:
     """How large errors at the poses of the `files` are against their prediction, those before, the verification, what was fitted, and which
     of very many poses were taken."""
     if not files:
         return None, None, None, (), None
     poses = verification_poses(calibrated, files)
-    sample = EvenSample.of(poses)
+    sample = StratifiedSample.of(poses)
     poses = poses if sample is None else poses.subset(sample.rows)
     found, covariance = verify_jointly(calibrated.model, poses)
     if (moved := proposed_refit(calibrated.model, poses, found)) is not None:
         (said,) = refit_remarks(found, poses, None, moved)
         named = " and ".join(str(file) for file in files)
         raise InputError(f"{named} cannot verify the map: {said}; give points measured as the calibration's.")
-    before = robot_before(calibrated.nominal, poses).errors(poses)
+    before = uncalibrated_model(calibrated.nominal, poses).errors(poses)
     with naming(files[0]):
         scale = error_scale(found, covariance)
-    return scale, before, found, fitted_among(calibrated, files, poses), sample
+    return scale, before, found, already_fitted(calibrated, files, poses), sample
 
 
 def _worst(found: AccuracyMap) -> np.ndarray:

@@ -1,16 +1,16 @@
-from .fitted_measurements import fitted_among, measurement_digests
-from .ignored_columns import unused_columns
+from .fitted_measurements import already_fitted, measurement_digests
+from .ignored_columns import ignored_columns_remarks
 from .job import RobotCalibration, calibrate_robot
 from .joint_ranges import outside_ranges
-from .subsample import sample_document, verified_sample
+from .subsample import subsample_document, verification_subsample_remark
 
 __all__ = [
     "RobotCalibration",
+    "already_fitted",
     "calibrate_robot",
-    "fitted_among",
+    "ignored_columns_remarks",
     "measurement_digests",
     "outside_ranges",
-    "sample_document",
-    "unused_columns",
-    "verified_sample",
+    "subsample_document",
+    "verification_subsample_remark",
 ]

@@ -26,7 +26,7 @@ def _digests(poses: PoseSet) -> Iterator[str]:
     return (f"{zlib.crc32(row.tobytes()):08x}" for row in rows)
 
 
-def fitted_among(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
+def already_fitted(calibrated: CalibratedRobot, files: Sequence[Path], poses: PoseSet) -> tuple[str, ...]:
     """Those of the `files`, or how many of the `poses` in them, that the calibration was fitted to, in words."""
     estimate = calibrated.blocks["calibration"]
     known = estimate.provenance.values()

@@ -5,7 +5,7 @@ from __future__ import annotations
 from flexcal.data.poses import PoseSet
 
 
-def unused_columns(poses: PoseSet) -> tuple[str, ...]:
+def ignored_columns_remarks(poses: PoseSet) -> tuple[str, ...]:
     """One sentence a quantity that is there and has no effect."""
     remarks = []
     if poses.torque is not None:

@@ -10,13 +10,19 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import BearingAxes, Drift, compare_bearings, gravity_loads, hardly_fits
+from flexcal.calibration.diagnostics import (
+    BearingAxes,
+    Drift,
+    compare_bearings,
+    gravity_loads,
+    is_implausible,
+)
 from flexcal.calibration.error_model import TRANSMISSION, ErrorStatistics
 from flexcal.calibration.fit import (
     PER_JOINT,
     Calibration,
-    EvenSample,
     LossName,
+    StratifiedSample,
     all_errors,
     calibrate,
     point_uncertainty,
@@ -33,11 +39,11 @@ from flexcal.calibration.term_selection import (
 from flexcal.calibration.verification import (
     CALIBRATED,
     RIGID,
-    ErrorsBefore,
     MeasuredPoints,
+    UncalibratedErrors,
     arms_at,
     errors_before,
-    robot_before,
+    uncalibrated_model,
 )
 from flexcal.data.poses import read_poses
 from flexcal.errors import FlexcalError
@@ -46,13 +52,13 @@ from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.remarks import calibration_remarks, outliers_of
-from flexcal.jobs.calibration.subsample import fitted_sample, sample_document
-from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, require_distinct
+from flexcal.jobs.calibration.subsample import calibration_subsample_remark, subsample_document
+from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, require_distinct_files
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import (
+    estimates_target,
     identifiability_block,
     identifiability_spectrum,
-    place_of_block,
     plain,
     quantities,
     store_block,
@@ -83,7 +89,7 @@ class RobotCalibration:
     errors of `selected` at all of them.
     """
 
-    before: ErrorsBefore
+    before: UncalibratedErrors
     rigid: Calibration
     selection: TermSelection | None
     selected: Calibration
@@ -93,7 +99,7 @@ class RobotCalibration:
     bearings: BearingAxes | None = None
     stiffness: Estimate | None = None
     validated: CrossValidation | None = None
-    sample: EvenSample | None = None
+    sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
 
     @property
@@ -169,11 +175,11 @@ class RobotCalibration:
                 "sigma_given": selected.poses.sigma_given,
                 "sigma_mm": float(np.sqrt(np.mean(selected.poses.sigma**2))) / MILLIMETRE,
                 "ambiguous_poses": int(selected.ambiguous.sum()),
-                "hardly_fits": hardly_fits(selected),
+                "is_implausible": is_implausible(selected),
             },
             "variances": selected.variances,
             "drift": drift.document(),
-            "sample": sample_document(self.sample, self.everywhere),
+            "sample": subsample_document(self.sample, self.everywhere),
             "outliers": [
                 {"pose": o.pose, "target": o.target, "error_mm": o.error / MILLIMETRE}
                 for o in outliers_of(selected)
@@ -181,7 +187,7 @@ class RobotCalibration:
             "bearings": bearings_block(self.bearings),
             "stage1": None if self.stiffness is None else {"misfit": misfit_document(self.stiffness.misfit)},
             "remarks": [
-                *fitted_sample(self.sample, self.everywhere),
+                *calibration_subsample_remark(self.sample, self.everywhere),
                 *([chosen.remark] if chosen and chosen.remark else []),
                 *calibration_remarks(selected, bearings if blamed else ()),
                 *(() if blamed else bearings),
@@ -219,15 +225,15 @@ def calibrate_robot(
     robot.yaml changes. Raises `FlexcalError` as reading and `calibrate` do; nothing is written then.
     """
     progress("reading", 0.0)
-    require_distinct(files)
+    require_distinct_files(files)
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="calibration") if source.exists() else {}
-    target = place_of_block(source, out, "calibration")
+    target = estimates_target(source, out, "calibration")
     model = with_blocks(bare, blocks, source)
     measured = read_poses(list(files), model)
     require_points(measured, " and ".join(str(file) for file in files))
-    sample = EvenSample.of(measured)
+    sample = StratifiedSample.of(measured)
     poses = measured if sample is None else measured.subset(sample.rows)
     wanted = _terms(model, terms)
     progress("reading", 1.0)
@@ -277,7 +283,7 @@ def calibrate_robot(
         ranges=joint_extents(selected.model, selected.poses.q),
         measurements=measurement_digests(poses),
     )
-    before = robot_before(model, poses).errors(poses)
+    before = uncalibrated_model(model, poses).errors(poses)
     result = RobotCalibration(
         before,
         rigid,

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import Drift, hardly_fits, moved_far, scattered
+from flexcal.calibration.diagnostics import Drift, implausible_shifts, is_implausible, residuals_implausible
 from flexcal.calibration.fit import Calibration
-from flexcal.jobs.calibration.ignored_columns import unused_columns
+from flexcal.jobs.calibration.ignored_columns import ignored_columns_remarks
 from flexcal.units import MILLIMETRE
 
 _LOOK = (
@@ -43,7 +43,7 @@ def outliers_of(fit: Calibration) -> tuple[Outlier, ...]:
 
 def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[str, ...]:
     """One sentence each, the most important last; a known `cause` of a bad fit precedes its consequences."""
-    remarks = [*unused_columns(fit.poses), *_nominal_springs(fit)]
+    remarks = [*ignored_columns_remarks(fit.poses), *_nominal_springs(fit)]
     if fit.ambiguous.any():
         remarks.append(f"the flank of a backlash is uncertain at {fit.ambiguous.sum()} poses")
     outliers = outliers_of(fit)
@@ -59,12 +59,12 @@ def calibration_remarks(fit: Calibration, cause: Sequence[str] = ()) -> tuple[st
             "robot or instrument warmed up, or position and measuring order are correlated"
         )
     remarks += cause
-    far = moved_far(fit)
+    far = implausible_shifts(fit)
     if far:
         named = [f"{m.name} ({m.start:.4g} to {m.value:.4g} {m.unit})" for m in far[:_SHOWN]]
         more = f" and {len(far) - _SHOWN} others" if len(far) > _SHOWN else ""
         remarks.append(f"implausibly far from the nominal value: {', '.join(named)}{more}")
-    if hardly_fits(fit) and not cause:
+    if is_implausible(fit) and not cause:
         remarks.append(_LOOK)
     if not fit.estimate.converged:
         remarks.append(
@@ -107,7 +107,7 @@ def _noise(fit: Calibration) -> Sequence[str]:
     remarks = []
     if instrument is None or stated is None:
         text = f"no sigma in the files: scatter of instrument and robot together about the fit is {robot:.3f} mm per coordinate (1σ)"
-        remarks.append(f"{text}, which is too large for noise" if scattered(fit) else text)
+        remarks.append(f"{text}, which is too large for noise" if residuals_implausible(fit) else text)
     elif instrument < _OVERSTATED * stated:
         remarks.append(
             f"the stated sigma of {stated:.3g} mm is {stated / np.hypot(instrument, robot):.3g} times the scatter of the points; the "

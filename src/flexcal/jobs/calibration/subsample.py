@@ -5,18 +5,22 @@ from __future__ import annotations
 from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
-from flexcal.calibration.fit import EvenSample
+from flexcal.calibration.fit import StratifiedSample
 from flexcal.units import MILLIMETRE
 
 
-def sample_document(sample: EvenSample | None, everywhere: ErrorStatistics | None) -> dict[str, Any] | None:
+def subsample_document(
+    sample: StratifiedSample | None, everywhere: ErrorStatistics | None
+) -> dict[str, Any] | None:
     """The block `sample` of results.json; null where every point was taken."""
     if sample is None or everywhere is None:
         return None
     return {"points": sample.total, "taken": len(sample.rows), "all": everywhere.in_millimetres()}
 
 
-def fitted_sample(sample: EvenSample | None, everywhere: ErrorStatistics | None) -> list[str]:
+def calibration_subsample_remark(
+    sample: StratifiedSample | None, everywhere: ErrorStatistics | None
+) -> list[str]:
     """One sentence of a calibration."""
     if sample is None or everywhere is None:
         return []
@@ -26,7 +30,9 @@ def fitted_sample(sample: EvenSample | None, everywhere: ErrorStatistics | None)
     ]
 
 
-def verified_sample(sample: EvenSample | None, everywhere: ErrorStatistics | None) -> list[str]:
+def verification_subsample_remark(
+    sample: StratifiedSample | None, everywhere: ErrorStatistics | None
+) -> list[str]:
     """One sentence of a verification."""
     if sample is None or everywhere is None:
         return []

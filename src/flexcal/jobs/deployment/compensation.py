@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.fit import POINT_KNOWN, point_uncertainty
+from flexcal.calibration.fit import KNOWN_POINT_STD, point_uncertainty
 from flexcal.compensation import Compensation, best_posture, compensate
 from flexcal.data.poses import ToolTargets, read_targets, write_commands
 from flexcal.data.tables import TableFile, open_table
 from flexcal.errors import FlexcalError, InputError
-from flexcal.jobs.inputs import calibrated_robot, found_station
+from flexcal.jobs.inputs import calibrated_robot, is_station_identified
 from flexcal.model.kinematics import found_xyz, joint_limits
-from flexcal.model.robot import RobotModel, with_frame
+from flexcal.model.robot import RobotModel, with_point_at_frame
 from flexcal.model.statics import points_kinematics
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
@@ -70,7 +70,7 @@ class RobotCompensation:
     def lost_points(self) -> dict[str, float]:
         """1σ (m) of the measured points whose place on the tool the calibration did not find."""
         every = {name: point_uncertainty(self.model, name) for name in self.measured}
-        return {name: std for name, std in every.items() if std > POINT_KNOWN}
+        return {name: std for name, std in every.items() if std > KNOWN_POINT_STD}
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `error_before_mm` is how far the real tool would be off with the nominal commands."""
@@ -125,12 +125,12 @@ def compensate_robot(
         if frame is not None:
             raise InputError("--target and --frame exclude each other; give one of them.")
     model, nominal = (
-        robot_ if frame is None else with_frame(robot_, frame)
+        robot_ if frame is None else with_point_at_frame(robot_, frame)
         for robot_ in (calibrated.probable, calibrated.found)
     )
     targets = _of_point(read_targets(file, model), file, target if frame is None else frame)
     for station in dict.fromkeys([] if targets.station is None else targets.station.tolist()):
-        if not found_station(model, station):
+        if not is_station_identified(model, station):
             raise InputError(
                 f"{file}: the station '{station}' was not calibrated, so its position is unknown; give points in the base frame."
             )

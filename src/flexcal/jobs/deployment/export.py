@@ -11,8 +11,8 @@ from flexcal.calibration.fit import probable_robots
 from flexcal.errors import InputError
 from flexcal.export import (
     Convention,
-    Exported,
-    Rendered,
+    ExportedFile,
+    RenderedModel,
     render_dh,
     render_json,
     render_kinematics,
@@ -46,7 +46,7 @@ class Exportable:
         return undetermined_offsets(self.nominal, self.measured, base=registered)
 
 
-Render = Callable[[Exportable], Rendered]
+Render = Callable[[Exportable], RenderedModel]
 """A robot to the text of a file."""
 
 
@@ -54,7 +54,7 @@ Render = Callable[[Exportable], Rendered]
 class ExportedRobot:
     """What was written; `calibrated` is False where there is no calibration: where the joints are is as in the nominal robot."""
 
-    export: Exported
+    export: ExportedFile
     calibrated: bool
 
     def document(self) -> dict[str, Any]:
@@ -114,7 +114,7 @@ def export_dh(
 ) -> ExportedRobot:
     """Write the Denavit-Hartenberg table of the chain to a point; see `render_dh`."""
 
-    def render(robot_: Exportable) -> Rendered:
+    def render(robot_: Exportable) -> RenderedModel:
         return render_dh(
             robot_.model,
             robot_.nominal,
@@ -137,7 +137,7 @@ def export_offsets(
 ) -> ExportedRobot:
     """Write the best joint offsets of the chain to a point; see `render_offsets`."""
 
-    def render(robot_: Exportable) -> Rendered:
+    def render(robot_: Exportable) -> RenderedModel:
         return render_offsets(
             robot_.model,
             robot_.nominal,

@@ -7,7 +7,6 @@ from typing import Literal
 
 from flexcal.dynamics.estimators import (
     RecordedRows,
-    column_errors,
     direct_and_inverse,
     energy_least_squares,
     feasible_least_squares,
@@ -15,9 +14,10 @@ from flexcal.dynamics.estimators import (
     instrumental_variables,
     kalman_filter,
     maximum_likelihood,
-    noisy_logs,
     ordinary_least_squares,
+    perturbed_logs,
     power_least_squares,
+    regressor_errors,
     total_least_squares,
     weighted_least_squares,
 )
@@ -38,7 +38,9 @@ ESTIMATORS: dict[EstimatorName, Estimator] = {
     "didim": direct_and_inverse,
     "energy": lambda _, recorded: energy_least_squares(recorded),
     "power": lambda _, recorded: power_least_squares(recorded),
-    "tls": lambda data, recorded: total_least_squares(data, column_errors(recorded, noisy_logs(recorded))),
+    "tls": lambda data, recorded: total_least_squares(
+        data, regressor_errors(recorded, perturbed_logs(recorded))
+    ),
     "ml": maximum_likelihood,
     "ekf": kalman_filter,
 }

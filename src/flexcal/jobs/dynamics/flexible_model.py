@@ -21,7 +21,7 @@ _KNOWING: tuple[EstimatorName, ...] = ("wls", "ols", "sdp", "irls")
 """Estimators that take any equations, those of motors too; the others are of rigid robots."""
 
 
-def drive_springs(
+def require_flexible_drives(
     model: RobotModel, logs: Sequence[Path], estimator: EstimatorName
 ) -> tuple[DriveSpring, ...]:
     """The drives of the elastic joints.
@@ -62,7 +62,7 @@ def drive_springs(
     return springs
 
 
-def bearing_springs(model: RobotModel, logs: Sequence[Path]) -> tuple[BearingSpring, ...]:
+def require_flexible_bearings(model: RobotModel, logs: Sequence[Path]) -> tuple[BearingSpring, ...]:
     """The bearings' springs, where the logs have the tilts; none where they have not.
 
     Raises `InputError` for tilts in some logs alone, about one axis alone, of no bearings, beside a force sensor, or larger than bearings

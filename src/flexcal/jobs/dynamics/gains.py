@@ -17,16 +17,16 @@ from flexcal.dynamics.signals import Window
 from flexcal.errors import FlexcalError, InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance
-from flexcal.jobs.inputs import require_distinct
+from flexcal.jobs.inputs import require_distinct_files
 from flexcal.jobs.logs import (
-    LogPart,
-    log_payloads,
-    log_systems,
+    LogSegment,
+    assemble_log_systems,
+    choose_preprocessing,
+    payload_masses,
+    preprocessing_document,
     read_logs,
     require_no_wrenches,
     scratch_folder,
-    treatment_of,
-    used_signals,
 )
 from flexcal.jobs.result_files import quantities, write_results
 from flexcal.model.robot import RobotModel
@@ -36,7 +36,7 @@ from flexcal.report.results import ParameterChanges, parameter_changes
 
 
 @dataclass(frozen=True)
-class HalfGains:
+class SplitHalfGains:
     """Factors of the gains from each half alone, and how they differ."""
 
     changes: ParameterChanges
@@ -57,7 +57,7 @@ def half_gains(
     base: BaseParameters,
     systems: Sequence[ExperimentSystem],
     payloads: Sequence[float],
-) -> HalfGains | None:
+) -> SplitHalfGains | None:
     """`drive_gains` from the first and the second half of every recording; None where a half alone does not determine them."""
     if min(len(system.batches) for system in systems) < 2:
         return None
@@ -67,7 +67,7 @@ def half_gains(
     except FlexcalError:
         return None
     changes = parameter_changes(first, second)
-    return HalfGains(changes) if changes.changes else None
+    return SplitHalfGains(changes) if changes.changes else None
 
 
 def _halves(system: ExperimentSystem) -> tuple[ExperimentSystem, ExperimentSystem]:
@@ -80,11 +80,12 @@ class IdentifiedGains:
     """Drive gains: `factors` to the `declared` gains (n,) of `signals: tau:`, which are 1 where there are none.
 
     `halves` are the factors from each half of the recordings, None where a half alone does not determine them. `payloads` are kg by log,
-    `signals` as `used_signals` has them; `provenance` has all files with their hashes, `command` the command line, where there was one.
+    `signals` as `preprocessing_document` has them; `provenance` has all files with their hashes, `command` the command line, where there
+    was one.
     """
 
     factors: Estimate
-    halves: HalfGains | None
+    halves: SplitHalfGains | None
     declared: np.ndarray
     payloads: tuple[float, ...]
     signals: Mapping[str, Any]
@@ -140,17 +141,17 @@ def identify_gains(
     `FlexcalError` where the logs do not fit the robot, a matrix of `signals:` mixes the torques of several columns, a log does not say
     whether the payload was held, and as `drive_gains` does.
     """
-    require_distinct(logs)
+    require_distinct_files(logs)
     model = RobotModel.from_yaml(robot, estimates=False)
     declared = _declared(model)
-    treatment = treatment_of(model, logs)
+    treatment = choose_preprocessing(model, logs)
     observation = Observation(model, CLASSIC)
     with scratch_folder() as folder:
         read = read_logs(logs, model, treatment, folder, jobs=jobs)
-        payloads = log_payloads(read, model)
+        payloads = payload_masses(read, model)
         require_no_wrenches(read)
-        parts = [LogPart(log, Window()) for log in read]
-        systems = log_systems(
+        parts = [LogSegment(log, Window()) for log in read]
+        systems = assemble_log_systems(
             parts, observation, treatment, batches=batches_each(len(logs)), jobs=jobs, progress=progress
         )
     base = BaseParameters.of(observation)
@@ -159,7 +160,7 @@ def identify_gains(
         half_gains(observation, base, systems, payloads),
         declared,
         tuple(payloads),
-        used_signals(treatment, read),
+        preprocessing_document(treatment, read),
         model.name,
         provenance([robot, model.urdf, *logs]),
         command,

@@ -15,7 +15,7 @@ from flexcal.dynamics.signals import LogFaults, external_torque
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance, read_estimates
-from flexcal.jobs.result_files import place_of_block, quantities, store_block, write_results
+from flexcal.jobs.result_files import estimates_target, quantities, store_block, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
@@ -69,7 +69,7 @@ def identify_robot_inertials(
     """
     nominal = RobotModel.from_yaml(robot, estimates=False)
     source = nominal.path.parent / nominal.config.estimates
-    target = place_of_block(source, out, "dynamics")
+    target = estimates_target(source, out, "dynamics")
     cell = FolderCell(folder, nominal)
     plan = cell.plan
     if not isinstance(plan, TrajectoryPlan):
@@ -78,7 +78,7 @@ def identify_robot_inertials(
             f"{folder / PLAN} is a plan of kind '{plan.kind}', not of trajectories; give the folder to 'flexcal {verb}'."
         )
     files = [existing_file(folder, label.name) for label in labels(plan)]
-    recordings, estimate = identify_recorded(
+    recordings, estimate = identify_inertials_from_recordings(
         nominal, plan, _checked(cell.record(plan), files, nominal), progress
     )
     error = trajectory_error(nominal.with_estimate(estimate), plan, recordings)
@@ -102,7 +102,7 @@ def identify_robot_inertials(
     return found
 
 
-def identify_recorded(
+def identify_inertials_from_recordings(
     nominal: RobotModel, plan: TrajectoryPlan, recordings: Iterable[Recording], progress: Progress
 ) -> tuple[Sequence[Recording], Estimate]:
     """The recordings of a plan as they come, and what they tell of a robot with its own prior."""

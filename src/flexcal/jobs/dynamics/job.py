@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from flexcal.dynamics.diagnostics import ExternalExcess, essential_parameters, external_share, weight_shares
-from flexcal.dynamics.drives import with_nominal_spread, with_play
+from flexcal.dynamics.drives import with_backlash, with_nominal_uncertainty
 from flexcal.dynamics.friction import select_friction
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation, SensorOffset
 from flexcal.dynamics.regression import RegressionData
@@ -16,12 +16,18 @@ from flexcal.dynamics.residual import require_scikit_learn
 from flexcal.errors import InputError
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.dynamics.estimators import ESTIMATORS, EstimatorName
-from flexcal.jobs.dynamics.flexible_model import bearing_springs, drive_springs
+from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import RobotDynamics
-from flexcal.jobs.inputs import require_distinct
-from flexcal.jobs.logs import DividedLogs, scratch_folder, treatment_of, used_signals, weight_faults
-from flexcal.jobs.result_files import place_of_block, store_block, write_predictions, write_results
+from flexcal.jobs.inputs import require_distinct_files
+from flexcal.jobs.logs import (
+    HoldOutLogs,
+    choose_preprocessing,
+    preprocessing_document,
+    scratch_folder,
+    weight_faults,
+)
+from flexcal.jobs.result_files import estimates_target, store_block, write_predictions, write_results
 from flexcal.model.robot import RobotModel, with_blocks
 from flexcal.progress import Progress, silent
 
@@ -58,20 +64,20 @@ def identify_robot_dynamics(
     if learn_residual:
         _require_rigid_and_learnable(flexible)
     begun = time.perf_counter()
-    require_distinct(logs, validate)
+    require_distinct_files(logs, validate)
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="dynamics") if source.exists() else {}
-    target = place_of_block(source, out, "dynamics")
+    target = estimates_target(source, out, "dynamics")
     if learn_residual:
         LearnedDynamics.require_place(target)
     model = with_blocks(bare, blocks, source)
-    springs = drive_springs(model, [*logs, *validate], estimator) if flexible else ()
-    bearings = bearing_springs(model, [*logs, *validate]) if flexible else ()
-    treatment = treatment_of(model, logs, flexible=flexible)
+    springs = require_flexible_drives(model, [*logs, *validate], estimator) if flexible else ()
+    bearings = require_flexible_bearings(model, [*logs, *validate]) if flexible else ()
+    treatment = choose_preprocessing(model, logs, flexible=flexible)
 
     with scratch_folder() as folder:
-        divided = DividedLogs.read(
+        divided = HoldOutLogs.read(
             logs,
             validate,
             hold_out,
@@ -87,7 +93,7 @@ def identify_robot_dynamics(
         sensor = model.config.force_sensor
         shifted = sensor is not None and sensor.offset == "estimated"
         terms = (*friction.terms, SensorOffset()) if shifted else friction.terms
-        observation = with_play(Observation(model, terms, springs, bearings), divided.equations)
+        observation = with_backlash(Observation(model, terms, springs, bearings), divided.equations)
         base = BaseParameters.of(observation)
         systems = divided.equations(observation)
         train = RegressionData.of(observation, base, systems)
@@ -95,7 +101,7 @@ def identify_robot_dynamics(
         if divided.unseen:
             held_out = RegressionData.of(observation, base, divided.unseen_equations(observation))
         rows = divided.rows(observation, base)
-        estimate = with_nominal_spread(train, ESTIMATORS[estimator](train, rows))
+        estimate = with_nominal_uncertainty(train, ESTIMATORS[estimator](train, rows))
         essential = essential_parameters(train, estimate)
         if friction.spread is not None:
             estimate = friction.spread.widened(estimate)
@@ -129,7 +135,7 @@ def identify_robot_dynamics(
             friction=friction,
             motors=observation.motors,
             treatment=treatment,
-            signals=used_signals(treatment, divided.logs),
+            signals=preprocessing_document(treatment, divided.logs),
             weight_faults=tuple(weight_faults(divided.logs, model)),
             weight_shares={} if accept_weight else weight_shares(train, estimate),
             external=external,

@@ -12,11 +12,11 @@ from flexcal.dynamics.estimators import RecordedRows
 from flexcal.dynamics.regression import ExperimentSystem
 from flexcal.dynamics.residual import (
     LEARNED,
-    BlockErrors,
+    CrossValidatedErrors,
     LearnedResidual,
-    ResidualErrors,
+    LearnedTorqueErrors,
     learn_residual,
-    require_learned_place,
+    require_residual_path,
     residual_errors,
     write_learned_residual,
 )
@@ -29,9 +29,9 @@ class LearnedDynamics:
     """What was learned, and the torques missed with and without it: in left-out blocks of the fit, in all of the fit, and held out."""
 
     learned: LearnedResidual
-    blocks: BlockErrors
-    train: ResidualErrors
-    held_out: ResidualErrors | None
+    blocks: CrossValidatedErrors
+    train: LearnedTorqueErrors
+    held_out: LearnedTorqueErrors | None
 
     @classmethod
     def of(
@@ -51,7 +51,7 @@ class LearnedDynamics:
     @staticmethod
     def require_place(estimates: Path) -> None:
         """Raise `InputError` where another program's file stands where it would be written, beside the file `estimates`."""
-        require_learned_place(estimates.with_name(LEARNED))
+        require_residual_path(estimates.with_name(LEARNED))
 
     def file(self, estimates: Path) -> Path | None:
         """Where it is written: beside the file `estimates`, and nowhere where nothing was learned."""

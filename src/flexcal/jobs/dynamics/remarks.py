@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from flexcal.dynamics.drives import attenuation
+from flexcal.dynamics.drives import stiffness_attenuation
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
 from flexcal.jobs.dynamics.estimators import EstimatorName
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 
 _CLEAR = 5.0
 """Standard deviations from zero, at least, of a stiffness that is worth a sentence."""
 
 
-def undeclared_springs(data: RegressionData, estimate: Estimate) -> Iterator[str]:
+def undeclared_spring_remarks(data: RegressionData, estimate: Estimate) -> Iterator[str]:
     """A sentence for every joint whose identified `cable_stiffness` is clearly not zero: stiffness, rest and what to declare."""
     model = data.observation.model
     known = {entry.joint: entry.stiffness for entry in model.config.dynamics.joint_springs}
@@ -55,7 +55,9 @@ def dynamics_remarks(data: RegressionData, estimate: Estimate) -> tuple[str, ...
     structural = {base.names[i] for i in base.kept}
     absorbed = {entry.name: entry.absorbed_by for entry in estimate.dropped}
     silent = set(data.silent)
-    drives = [name for name in data.names[len(INERTIAL) * data.observation.model.n :] if name not in silent]
+    drives = [
+        name for name in data.names[len(LINK_PARAMETERS) * data.observation.model.n :] if name not in silent
+    ]
     remarks = [
         f"{joint}: {', '.join(keys)} keep their values: these recordings do not excite them"
         for joint, keys in _by_joint(data.silent).items()
@@ -76,7 +78,7 @@ def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: Estimato
         notes.append(
             f"robot.yaml declares no controller: {estimator} simulated one that tracks the recorded path, gains proportional to inertia"
         )
-    return (*notes, *undeclared_springs(data, estimate), *_attenuated(data, estimate))
+    return (*notes, *undeclared_spring_remarks(data, estimate), *_attenuated(data, estimate))
 
 
 def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:
@@ -105,7 +107,7 @@ def _by_joint(names: tuple[str, ...]) -> dict[str, list[str]]:
 
 
 def _attenuated(data: RegressionData, estimate: Estimate) -> Iterator[str]:
-    for name, share in attenuation(data, estimate).items():
+    for name, share in stiffness_attenuation(data, estimate).items():
         if share * estimate.values[name] > _LARGEST_ATTENUATION * (estimate.std(name) or 0.0):
             yield (
                 f"encoder noise on either side of the drive may have reduced {name} by up to {100 * share:.2g} %, "

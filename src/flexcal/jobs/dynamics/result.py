@@ -8,7 +8,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, WeightShare
+from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
@@ -17,7 +17,7 @@ from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
 from flexcal.jobs.logs import Treatment
 from flexcal.jobs.result_files import dropped_parameters, quantities
-from flexcal.model.parts import is_body
+from flexcal.model.parts import is_physically_consistent
 from flexcal.model.robot import torque_units
 from flexcal.report.checks import Trust
 from flexcal.report.pages import dynamics_checks
@@ -28,10 +28,11 @@ class RobotDynamics:
     """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
-    whose motors have equations of their own; `signals` are as `used_signals` has them. `weight_faults` are torques unlike the links' weight
-    that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was accepted. `external`
-    tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what was learned beside the
-    estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the command line, where there was one.
+    whose motors have equations of their own; `signals` are as `preprocessing_document` has them. `weight_faults` are torques unlike the
+    links' weight that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was
+    accepted. `external` tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what
+    was learned beside the estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the command
+    line, where there was one.
     """
 
     estimate: Estimate
@@ -47,7 +48,7 @@ class RobotDynamics:
     treatment: Treatment
     signals: Mapping[str, Any]
     weight_faults: tuple[str, ...]
-    weight_shares: Mapping[str, WeightShare]
+    weight_shares: Mapping[str, GravityRatio]
     external: ExternalShare | None
     learned: LearnedDynamics | None
     seconds: float
@@ -59,7 +60,7 @@ class RobotDynamics:
     def bodiless(self) -> tuple[str, ...]:
         """The links whose inertials no body can have: right for torques, useless for springs and for a URDF."""
         links = (joint.link for joint in self.train.observation.model.joints)
-        return tuple(link for link in links if not is_body(self.estimate.values, link))
+        return tuple(link for link in links if not is_physically_consistent(self.estimate.values, link))
 
     @cached_property
     def trust(self) -> Trust:

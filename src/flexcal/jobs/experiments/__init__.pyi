@@ -2,7 +2,7 @@ from .candidate_poses import box_corners, working_file, working_volume
 from .frequency_design import plan_frequency_experiments
 from .measurement import measure
 from .next_poses import plan_next_poses
-from .optimised_excitation import PlanName, designed_excitation, response_sensors, unplaced_plan
+from .optimised_excitation import PlanName, optimise_excitation, plan_without_poses, response_sensors
 from .poses import plan_calibration_poses, plan_verification_poses
 from .standard_plans import frequency_plan
 from .trajectories import TrajectoryRequest, exciting_plan, plan_trajectories
@@ -11,17 +11,17 @@ __all__ = [
     "PlanName",
     "TrajectoryRequest",
     "box_corners",
-    "designed_excitation",
     "exciting_plan",
     "frequency_plan",
     "measure",
+    "optimise_excitation",
     "plan_calibration_poses",
     "plan_frequency_experiments",
     "plan_next_poses",
     "plan_trajectories",
     "plan_verification_poses",
+    "plan_without_poses",
     "response_sensors",
-    "unplaced_plan",
     "working_file",
     "working_volume",
 ]

@@ -21,7 +21,7 @@ MOST_GIVEN = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class PoseChoice:
+class CandidatePoses:
     """The candidates `found`, the given `pool` that they come from, if any, where the robot will work (None: anywhere), and the `files` of
     both."""
 
@@ -42,7 +42,7 @@ class PoseChoice:
         rng: np.random.Generator,
         seed: int,
         progress: Progress,
-    ) -> PoseChoice:
+    ) -> CandidatePoses:
         """So many random `candidates`, or those of a file, at least `least`; `working` as in `working_volume`, `payload` in kg.
 
         Raises `FlexcalError` as `pose_candidates`, `read_pose_pool` and `working_volume` do.

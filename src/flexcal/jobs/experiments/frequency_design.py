@@ -11,7 +11,7 @@ import numpy as np
 
 from flexcal.data.plans import MultisinePlan, page_beside, write_plan
 from flexcal.design.frequency import (
-    ChosenPoses,
+    FrequencyPoseSelection,
     Placement,
     PlannedResponses,
     largest_stiffness_std,
@@ -28,12 +28,12 @@ from flexcal.jobs.experiments.optimised_excitation import (
     POSES,
     PlanName,
     declared_sensors,
-    designed_excitation,
+    optimise_excitation,
+    plan_without_poses,
     response_sensors,
-    unplaced_plan,
 )
 from flexcal.jobs.experiments.standard_plans import frequency_plan, read_frequency_poses
-from flexcal.jobs.inputs import robot_origin
+from flexcal.jobs.inputs import robot_provenance
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pages import FrequencyDesignStudy, write_frequency_page
@@ -50,7 +50,7 @@ class DesignedFrequency:
     planned: PlannedResponses
     flat: PlannedResponses
     file: Path
-    choice: ChosenPoses | None = None
+    choice: FrequencyPoseSelection | None = None
     curve: np.ndarray | None = None
     placements: tuple[Placement, ...] = ()
     provenance: Mapping[str, str] = field(default_factory=dict)
@@ -148,9 +148,9 @@ def plan_frequency_experiments(
         if amplitude == "shaped":
             planned = PlannedResponses.of(model, shaped(model, flat), sensors)
     else:
-        plan = unplaced_plan(model, kind, detection_lines=detection_lines, seed=seed)
+        plan = plan_without_poses(model, kind, detection_lines=detection_lines, seed=seed)
         if poses is None:
-            found = designed_excitation(
+            found = optimise_excitation(
                 model, plan, count=choose or POSES, candidates=candidates, sensors=sensors, progress=progress
             )
             flat, planned, choice = found.flat, found.planned, found.choice
@@ -165,7 +165,9 @@ def plan_frequency_experiments(
     curve = None if choice is None else _curve(choice, seed)
     places = payload_placements(model, planned.plan, sensors, progress) if place_payload else ()
     files = [file for file in (poses, declared_sensors(robot)) if file is not None]
-    found = DesignedFrequency(planned, flat, out, choice, curve, places, robot_origin(model, files), command)
+    found = DesignedFrequency(
+        planned, flat, out, choice, curve, places, robot_provenance(model, files), command
+    )
     write_plan(out, planned.plan)
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
     write_frequency_page(page_beside(out), study)
@@ -192,7 +194,7 @@ def _require_all(model: RobotModel, kind: PlanName, poses: Path | None) -> None:
         raise InputError(f"{model.path} " + "; it ".join(missing) + ".")
 
 
-def _curve(choice: ChosenPoses, seed: int) -> np.ndarray:
+def _curve(choice: FrequencyPoseSelection, seed: int) -> np.ndarray:
     most = min(2 * len(choice.poses), choice.drawn)
     counts = np.arange(1, most + 1)
     return np.array([counts, *stiffness_curve(choice, counts, np.random.default_rng([seed, 7]))])

@@ -15,7 +15,7 @@ from flexcal.data.recordings import Recording
 from flexcal.errors import InputError, naming
 from flexcal.files.formats import read_yaml, yaml_text
 from flexcal.jobs.experiments.poses import VERIFICATION
-from flexcal.jobs.inputs import read_fitting_plan
+from flexcal.jobs.inputs import read_plan_for_robot
 from flexcal.jobs.result_files import write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -71,11 +71,11 @@ def measure(
     holds the measurements of another plan.
     """
     model = RobotModel.from_yaml(robot, estimates=False)
-    plan = read_fitting_plan(plan_file, model)
+    plan = read_plan_for_robot(plan_file, model)
     if cell != VIRTUAL and Path(cell).resolve() == out.resolve():
         raise InputError(f"{out} is the folder measured before; give another --out.")
     before = out / PLAN
-    if before.is_file() and yaml_text(read_fitting_plan(before, model)) != yaml_text(plan):
+    if before.is_file() and yaml_text(read_plan_for_robot(before, model)) != yaml_text(plan):
         raise InputError(f"{out} holds what was measured by another plan; give another --out.")
     drawn: dict[str, float] = {}
     source: Cell

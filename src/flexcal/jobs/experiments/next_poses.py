@@ -12,16 +12,16 @@ import numpy as np
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PosePool, read_poses
 from flexcal.design.poses import CriterionName, NextPoses, WorkingVolume, next_poses
-from flexcal.jobs.experiments.candidate_poses import PoseChoice
+from flexcal.jobs.experiments.candidate_poses import CandidatePoses
 from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_pose_plan
-from flexcal.jobs.inputs import robot_origin
+from flexcal.jobs.inputs import robot_provenance
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
-class ContinuedPoses:
+class NextPosesPlan:
     """The next poses, best first, up to where to stop; `plan` and `file` are None where nothing is left to measure.
 
     `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones.
@@ -77,7 +77,7 @@ def plan_next_poses(
     seed: int = 0,
     command: str = "",
     progress: Progress = silent,
-) -> ContinuedPoses:
+) -> NextPosesPlan:
     """Write to `out` the next poses, at most `count`, after the files of `measured` ones; nothing where these are enough.
 
     They end where the predicted tool error is `wanted` (m), or without it where more poses only average. The other arguments are those of
@@ -86,19 +86,17 @@ def plan_next_poses(
     model = RobotModel.from_yaml(robot)
     known = read_poses(measured, model, require_motion=False)
     rng = np.random.default_rng([seed, 7])
-    choice = PoseChoice.of(model, candidates, working, payload, count, rng, seed, progress)
+    choice = CandidatePoses.of(model, candidates, working, payload, count, rng, seed, progress)
     after = next_poses(choice.found, known, count, rng=rng, criterion=criterion)
     stop = after.enough(wanted)
-    origin = robot_origin(model, (*measured, *choice.files))
+    origin = robot_provenance(model, (*measured, *choice.files))
     if stop == 0:
-        return ContinuedPoses(
+        return NextPosesPlan(
             None, None, after, stop, wanted, seed, choice.working, choice.pool, origin, command
         )
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
     after = replace(after, design=design)
-    result = ContinuedPoses(
-        plan, out, after, stop, wanted, seed, choice.working, choice.pool, origin, command
-    )
+    result = NextPosesPlan(plan, out, after, stop, wanted, seed, choice.working, choice.pool, origin, command)
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.data.plans import MultisinePlan
 from flexcal.design.frequency import (
     COMMON_SENSORS,
-    ChosenPoses,
+    FrequencyPoseSelection,
     PlannedResponses,
     ResponseSensors,
     Schedule,
@@ -38,15 +38,15 @@ SCHEDULES = {"designed": Schedule(0.2, 3, 1, 4), "quick": Schedule(0.3125, 3, 1,
 
 
 @dataclass(frozen=True, eq=False)
-class DesignedExcitation:
+class OptimisedExcitation:
     """What was planned, the same with equal amplitudes, and the choice of poses behind both."""
 
     planned: PlannedResponses
     flat: PlannedResponses
-    choice: ChosenPoses
+    choice: FrequencyPoseSelection
 
 
-def designed_excitation(
+def optimise_excitation(
     model: RobotModel,
     plan: MultisinePlan,
     *,
@@ -54,7 +54,7 @@ def designed_excitation(
     candidates: int = CANDIDATES,
     sensors: ResponseSensors = COMMON_SENSORS,
     progress: Progress = silent,
-) -> DesignedExcitation:
+) -> OptimisedExcitation:
     """Choose `count` poses for the flat `plan`, whose own do not count, and the amplitudes in them, for a robot as it is known.
 
     Raises `FlexcalError` as `choose_frequency_poses` does.
@@ -68,10 +68,12 @@ def designed_excitation(
     progress("amplitudes", 0.3)
     planned = PlannedResponses.of(model, shaped(model, flat), sensors)
     progress("amplitudes", 1.0)
-    return DesignedExcitation(planned, flat, choice)
+    return OptimisedExcitation(planned, flat, choice)
 
 
-def unplaced_plan(model: RobotModel, kind: str, *, detection_lines: bool = False, seed: int) -> MultisinePlan:
+def plan_without_poses(
+    model: RobotModel, kind: str, *, detection_lines: bool = False, seed: int
+) -> MultisinePlan:
     """The flat plan `designed` or `quick`, in no pose that counts; payload as declared and reference motion as in the plan `default`."""
     plan = flat_multisine(
         model,

@@ -13,19 +13,19 @@ from flexcal.data.plans import PosePlan, page_beside, write_plan
 from flexcal.data.poses import PosePool
 from flexcal.design.poses import (
     CriterionName,
+    MeasurementOrder,
     PoseCurve,
     PoseDesign,
-    VisitingOrder,
     WorkingVolume,
     choose_poses,
     fewest_poses,
+    measurement_order,
     pose_curve,
     random_poses,
-    visiting_order,
 )
 from flexcal.design.scene import MeasuringSetup
-from flexcal.jobs.experiments.candidate_poses import PoseChoice
-from flexcal.jobs.inputs import robot_origin
+from flexcal.jobs.experiments.candidate_poses import CandidatePoses
+from flexcal.jobs.inputs import robot_provenance
 from flexcal.jobs.result_files import identifiability_block
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
@@ -58,7 +58,7 @@ class DesignedPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class ChosenPoses:
+class FrequencyPoseSelection:
     """A plan of calibration poses, its file, why these, the way through them, and where the robot will work (None: anywhere).
 
     `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `provenance` says what the plan comes from,
@@ -69,7 +69,7 @@ class ChosenPoses:
     file: Path
     design: PoseDesign
     curve: PoseCurve
-    way: VisitingOrder
+    way: MeasurementOrder
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
@@ -154,7 +154,7 @@ def plan_calibration_poses(
     seed: int = 0,
     command: str = "",
     progress: Progress = silent,
-) -> ChosenPoses:
+) -> FrequencyPoseSelection:
     """Choose `count` poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
 
     The poses are in an order of short moves.
@@ -165,16 +165,18 @@ def plan_calibration_poses(
     """
     model = RobotModel.from_yaml(robot)
     rng = np.random.default_rng([seed, 2])
-    choice = PoseChoice.of(model, candidates, working, payload, count, rng, seed, progress)
+    choice = CandidatePoses.of(model, candidates, working, payload, count, rng, seed, progress)
     if wanted is not None:
         count = fewest_poses(choice.found, count, wanted)
     design = choose_poses(choice.found, count, rng=rng, criterion=criterion, progress=progress)
-    way = visiting_order(choice.checker, design.plan.q)
+    way = measurement_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
-    origin = robot_origin(model, choice.files)
-    result = ChosenPoses(plan, out, design, curve, way, seed, choice.working, choice.pool, origin, command)
+    origin = robot_provenance(model, choice.files)
+    result = FrequencyPoseSelection(
+        plan, out, design, curve, way, seed, choice.working, choice.pool, origin, command
+    )
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result
 
@@ -187,7 +189,7 @@ def plan_verification_poses(
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
-    result = DesignedPoses(plan, out, seed, robot_origin(model), command)
+    result = DesignedPoses(plan, out, seed, robot_provenance(model), command)
     write_pose_plan(out, model, plan, result.document(), None)
     return result
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.tables import check_joint_limits, open_table
-from flexcal.design.frequency import flat_multisine, room, share_at_rest
+from flexcal.design.frequency import flat_multisine, room, static_amplitude_share
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
@@ -35,7 +35,7 @@ def frequency_plan(
     anywhere = np.zeros((1, model.n))
     plan = flat_multisine(model, anywhere, name=kind, payload=payload, reference=reference, seed=seed)
     plan = replace(plan, poses=read_frequency_poses(poses_file, kind, model, room(model, reference)))
-    share = float(np.clip(share_at_rest(model, plan), _LEAST, 1.0))
+    share = float(np.clip(static_amplitude_share(model, plan), _LEAST, 1.0))
     return replace(plan, amplitude=share * plan.amplitude)
 
 

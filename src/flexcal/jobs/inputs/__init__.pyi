@@ -1,23 +1,23 @@
-from .distinct_files import require_distinct
+from .distinct_files import require_distinct_files
 from .experiment_files import (
     FREQUENCY_PLAN,
     common_plan,
     example_robot,
     plan_files,
-    read_fitting_plan,
+    read_plan_for_robot,
     read_responses,
     robot_file,
 )
-from .provenance import robot_origin
+from .provenance import robot_provenance
 from .stored_model import (
     TARGETS,
     TARGETS_BETWEEN,
     CalibratedRobot,
     calibrated_robot,
-    found_station,
+    is_station_identified,
     measured_points,
     stored_estimates,
-    unmeasured_remark,
+    unmeasured_targets_remark,
 )
 
 __all__ = [
@@ -28,14 +28,14 @@ __all__ = [
     "calibrated_robot",
     "common_plan",
     "example_robot",
-    "found_station",
+    "is_station_identified",
     "measured_points",
     "plan_files",
-    "read_fitting_plan",
+    "read_plan_for_robot",
     "read_responses",
-    "require_distinct",
+    "require_distinct_files",
     "robot_file",
-    "robot_origin",
+    "robot_provenance",
     "stored_estimates",
-    "unmeasured_remark",
+    "unmeasured_targets_remark",
 ]

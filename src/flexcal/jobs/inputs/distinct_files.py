@@ -9,7 +9,7 @@ from pathlib import Path
 from flexcal.errors import InputError
 
 
-def require_distinct(files: Sequence[Path], unseen: Sequence[Path] = ()) -> None:
+def require_distinct_files(files: Sequence[Path], unseen: Sequence[Path] = ()) -> None:
     """Raises `InputError` for a file, or a copy of it, that stands twice among the `files` of a fit or those `unseen` by it, or in both."""
     for given in (files, unseen):
         for k, file in enumerate(given):

@@ -10,7 +10,7 @@ from flexcal.data.plans import MultisinePlan, Plan, read_plan, read_plan_of
 from flexcal.errors import InputError
 from flexcal.files.formats import to_plain
 from flexcal.frequency.periodic import FrequencyResponse
-from flexcal.jobs.inputs.distinct_files import require_distinct
+from flexcal.jobs.inputs.distinct_files import require_distinct_files
 from flexcal.model.robot import RobotModel
 
 FREQUENCY_PLAN = "frequency_plan.yaml"
@@ -39,7 +39,7 @@ def example_robot(name: str) -> Path:
     )
 
 
-def read_fitting_plan(path: Path, model: RobotModel) -> Plan:
+def read_plan_for_robot(path: Path, model: RobotModel) -> Plan:
     """A plan for this robot; raises `InputError` where it has another number of joints."""
     plan = read_plan(path)
     if plan.joint_count != model.n:
@@ -59,7 +59,7 @@ def read_responses(paths: Sequence[Path], model: RobotModel) -> tuple[list[Path]
                 f"{path} holds no frequency responses (response_pose_1.npz …); run 'flexcal identify response' first."
             )
         files += found
-    require_distinct(files)
+    require_distinct_files(files)
     responses = [FrequencyResponse.load(file) for file in files]
     for file, response in zip(files, responses, strict=True):
         if response.q_mean.size != model.n:

@@ -9,7 +9,7 @@ from flexcal.files.formats import provenance, read_estimates
 from flexcal.model.robot import RobotModel
 
 
-def robot_origin(model: RobotModel, files: Iterable[Path] = ()) -> dict[str, str]:
+def robot_provenance(model: RobotModel, files: Iterable[Path] = ()) -> dict[str, str]:
     """Program, and SHA-256 of robot.yaml, its URDF, all blocks of its estimates where there are some, and the `files`."""
     stored = model.path.parent / model.config.estimates
     blocks = tuple(read_estimates(stored)) if stored.exists() else ()

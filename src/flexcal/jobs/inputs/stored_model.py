@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
-from flexcal.calibration.fit import found_point, probable_robot
+from flexcal.calibration.fit import probable_robot, with_calibrated_points
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import BLOCKS, Block, read_estimates, read_yaml_file
@@ -41,10 +41,10 @@ class CalibratedRobot:
     @cached_property
     def found(self) -> RobotModel:
         """`nominal` with the measured points at their calibrated positions on the tool."""
-        return found_point(self.nominal, self.probable, self.measured)
+        return with_calibrated_points(self.nominal, self.probable, self.measured)
 
 
-def unmeasured_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:
+def unmeasured_targets_remark(calibrated: CalibratedRobot, targets: Iterable[str]) -> tuple[str, ...]:
     """A sentence on those of the `targets` that no calibration pose measured; none where there are none."""
     named = [name for name in targets if name not in calibrated.measured]
     if not named:
@@ -88,7 +88,7 @@ def stored_estimates(nominal: RobotModel, estimates: Path | None) -> Path:
     return estimates
 
 
-def found_station(model: RobotModel, station: str) -> bool:
+def is_station_identified(model: RobotModel, station: str) -> bool:
     """Whether the calibration estimated the placement of this station."""
     return f"station.{station}.x" in model.posterior.parameters
 

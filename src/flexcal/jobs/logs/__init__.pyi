@@ -1,23 +1,23 @@
-from .checks import log_payloads, require_joint_torques, require_no_wrenches, weight_faults
-from .hold_out import DividedLogs
-from .preprocessing import Treatment, signal_sentences, treatment_of, used_signals
-from .regression_systems import LogPart, log_systems, read_logs
+from .checks import payload_masses, require_joint_torques, require_no_wrenches, weight_faults
+from .hold_out import HoldOutLogs
+from .preprocessing import Treatment, choose_preprocessing, preprocessing_document, preprocessing_remarks
+from .regression_systems import LogSegment, assemble_log_systems, read_logs
 from .scratch import scratch_folder
-from .torque_predictions import log_predictions
+from .torque_predictions import predict_log_torques
 
 __all__ = [
-    "DividedLogs",
-    "LogPart",
+    "HoldOutLogs",
+    "LogSegment",
     "Treatment",
-    "log_payloads",
-    "log_predictions",
-    "log_systems",
+    "assemble_log_systems",
+    "choose_preprocessing",
+    "payload_masses",
+    "predict_log_torques",
+    "preprocessing_document",
+    "preprocessing_remarks",
     "read_logs",
     "require_joint_torques",
     "require_no_wrenches",
     "scratch_folder",
-    "signal_sentences",
-    "treatment_of",
-    "used_signals",
     "weight_faults",
 ]

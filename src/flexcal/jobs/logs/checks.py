@@ -9,7 +9,7 @@ from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 
 
-def log_payloads(logs: Sequence[JointLog], model: RobotModel) -> list[float]:
+def payload_masses(logs: Sequence[JointLog], model: RobotModel) -> list[float]:
     """kg, one a log; 0 where robot.yaml declares none. Raises `InputError` for a log that does not say, though one is declared."""
     return [_payload(log, model) for log in logs]
 
@@ -27,7 +27,7 @@ def _payload(log: JointLog, model: RobotModel) -> float:
 
 def require_unloaded(logs: Sequence[JointLog], model: RobotModel) -> None:
     """Raises `InputError` for a log that was recorded with a payload."""
-    for log, held in zip(logs, log_payloads(logs, model), strict=True):
+    for log, held in zip(logs, payload_masses(logs, model), strict=True):
         if held > 0:
             raise InputError(
                 f"{log.path}: recorded with a payload of {held:g} kg, but the robot's own dynamics need logs without; give both kinds to "
@@ -71,7 +71,7 @@ def weight_faults(logs: Sequence[JointLog], model: RobotModel) -> Iterator[str]:
                 "opposite; change its sign by "
                 "`tau: {gain: […]}` under `signals:`, or correct `gravity:` in robot.yaml"
             )
-        elif log.weight.by_motors:
+        elif log.weight.on_motor_side:
             yield (
                 f"{log.path}: the torque of {model.joint_names[log.weight.heaviest]} is only {log.weight.share:.2%} of its "
                 "gravity torque; these look "

@@ -15,14 +15,14 @@ from flexcal.dynamics.signals import JointLog, Window
 from flexcal.estimation import Estimate
 from flexcal.jobs.logs.checks import require_joint_torques, require_unloaded, require_wrenches
 from flexcal.jobs.logs.preprocessing import Treatment
-from flexcal.jobs.logs.regression_systems import LogPart, log_systems, read_logs, split, watched
-from flexcal.jobs.logs.torque_predictions import log_predictions
+from flexcal.jobs.logs.regression_systems import LogSegment, assemble_log_systems, read_logs, split, watched
+from flexcal.jobs.logs.torque_predictions import predict_log_torques
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
 
 
 @dataclass(frozen=True, eq=False)
-class DividedLogs:
+class HoldOutLogs:
     """All `logs`, filtered; the parts of them that are `fitted`, and those `unseen`; each log's time in s `borders` between both.
 
     Equations are made by so many `jobs` (processes).
@@ -30,8 +30,8 @@ class DividedLogs:
 
     logs: tuple[JointLog, ...]
     borders: tuple[float, ...]
-    fitted: tuple[LogPart, ...]
-    unseen: tuple[LogPart, ...]
+    fitted: tuple[LogSegment, ...]
+    unseen: tuple[LogSegment, ...]
     treatment: Treatment
     jobs: int
     progress: Progress
@@ -49,7 +49,7 @@ class DividedLogs:
         accept_weight: bool = False,
         jobs: int,
         progress: Progress,
-    ) -> DividedLogs:
+    ) -> HoldOutLogs:
         """The last share `hold_out` of the time of every log to `fit` is unseen, and so are the logs `validate`.
 
         Filtered logs are files of the folder `scratch`. Raises `InputError` and `FlexcalError` for a log that lies, has a payload, or
@@ -61,13 +61,13 @@ class DividedLogs:
             require_joint_torques([*seen, *others], model)
         require_wrenches([*seen, *others], model)
         windows = [split(log, treatment, hold_out) for log in seen]
-        late = [LogPart(log, w) for log, (_, w) in zip(seen, windows, strict=True) if w is not None]
+        late = [LogSegment(log, w) for log, (_, w) in zip(seen, windows, strict=True) if w is not None]
         borders = [math.inf if w is None else w.start for _, w in windows]
         return cls(
             (*seen, *others),
             (*borders, *(-math.inf for _ in others)),
-            tuple(LogPart(log, early) for log, (early, _) in zip(seen, windows, strict=True)),
-            (*late, *(LogPart(log, Window()) for log in others)),
+            tuple(LogSegment(log, early) for log, (early, _) in zip(seen, windows, strict=True)),
+            (*late, *(LogSegment(log, Window()) for log in others)),
             treatment,
             jobs,
             progress,
@@ -92,16 +92,18 @@ class DividedLogs:
     def predictions(self, observation: Observation, estimate: Estimate) -> list[TorquePrediction]:
         """Of all logs, for the report."""
         predicted = [(observation, estimate.parameters.coordinates())] * len(self.logs)
-        return log_predictions(self.logs, self.borders, predicted, self.treatment, progress=self.progress)
+        return predict_log_torques(self.logs, self.borders, predicted, self.treatment, progress=self.progress)
 
     def _systems(
-        self, parts: Sequence[LogPart], observation: Observation, batches: int
+        self, parts: Sequence[LogSegment], observation: Observation, batches: int
     ) -> list[ExperimentSystem]:
-        return log_systems(
+        return assemble_log_systems(
             parts, observation, self.treatment, batches=batches, jobs=self.jobs, progress=self.progress
         )
 
-    def _rows(self, parts: Sequence[LogPart], observation: Observation, base: BaseParameters) -> RecordedRows:
+    def _rows(
+        self, parts: Sequence[LogSegment], observation: Observation, base: BaseParameters
+    ) -> RecordedRows:
         logs = [part.log for part in watched(parts, "estimating", self.progress)]
         windows = [part.window for part in parts]
         treatment = self.treatment

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.data.recordings import Decimation
-from flexcal.dynamics.regression import CutoffChoice, Piece, choose_cutoff, pieces
+from flexcal.dynamics.regression import CutoffChoice, LogSegment, choose_cutoff, pieces
 from flexcal.dynamics.signals import JointLog, log_blocks, motion_bandwidth
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
@@ -39,7 +39,7 @@ class Treatment:
     choice: CutoffChoice | None = None
 
 
-def treatment_of(
+def choose_preprocessing(
     model: RobotModel, logs: Sequence[Path], *, flexible: bool = False, loaded: Sequence[bool] | None = None
 ) -> Treatment:
     """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
@@ -81,7 +81,7 @@ def _chosen(
     model: RobotModel, logs: Sequence[Path], proposed_hz: float, loaded: Sequence[bool] | None
 ) -> CutoffChoice | None:
     """By cross-validation within the logs of each load."""
-    loads: dict[tuple[bool, float | None], list[Piece]] = {}
+    loads: dict[tuple[bool, float | None], list[LogSegment]] = {}
     for number, log in enumerate(logs):
         for piece in pieces(log_blocks(log, model), _SAMPLES // len(logs), proposed_hz):
             load = (bool(loaded and loaded[number]), piece.payload)
@@ -89,7 +89,7 @@ def _chosen(
     return choose_cutoff(model, list(loads.values()), proposed_hz)
 
 
-def used_signals(treatment: Treatment, logs: Sequence[JointLog]) -> dict[str, Any]:
+def preprocessing_document(treatment: Treatment, logs: Sequence[JointLog]) -> dict[str, Any]:
     """The entry `signals` of results.json: filters, and what was done with the time stamps of each log where they are not uniform."""
     return {
         "cutoff_hz": treatment.cutoff_hz,
@@ -105,7 +105,7 @@ def used_signals(treatment: Treatment, logs: Sequence[JointLog]) -> dict[str, An
     }
 
 
-def signal_sentences(signals: Mapping[str, Any]) -> list[str]:
+def preprocessing_remarks(signals: Mapping[str, Any]) -> list[str]:
     """The same in words: what was proposed and from what, and the treatment of time stamps."""
     said = []
     if signals["proposed"]:

@@ -23,7 +23,7 @@ _LEAST = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
-class LogPart:
+class LogSegment:
     """What of a log lies in a window of time."""
 
     log: JointLog
@@ -48,8 +48,8 @@ def read_logs(
     return read
 
 
-def log_systems(
-    parts: Sequence[LogPart],
+def assemble_log_systems(
+    parts: Sequence[LogSegment],
     observation: Observation,
     treatment: Treatment,
     *,
@@ -90,7 +90,7 @@ def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window,
     return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
 
 
-def watched(parts: Sequence[LogPart], stage: str, progress: Progress) -> list[LogPart]:
+def watched(parts: Sequence[LogSegment], stage: str, progress: Progress) -> list[LogSegment]:
     """The parts, of which every pass over all of them is told to `progress` as a `stage`."""
 
     def told(number: int, until: float) -> Callable[[float], None]:
@@ -105,7 +105,7 @@ def watched(parts: Sequence[LogPart], stage: str, progress: Progress) -> list[Lo
 
 
 def _log_system(
-    part: LogPart, observation: Observation, treatment: Treatment, batches: int
+    part: LogSegment, observation: Observation, treatment: Treatment, batches: int
 ) -> ExperimentSystem:
     return experiment_system(
         observation,

@@ -18,7 +18,7 @@ _FEWEST = 300
 """Points of each joint in one log, at least."""
 
 
-def log_predictions(
+def predict_log_torques(
     logs: Sequence[JointLog],
     held_out_from: Sequence[float],
     predicted: Sequence[tuple[Observation, np.ndarray]],

@@ -10,13 +10,13 @@ from flexcal.jobs.pages.report import OF_CALIBRATION, OF_VERIFICATION, calibrati
 from flexcal.jobs.result_files import read_points, read_results
 from flexcal.report.checks import Trust
 from flexcal.report.pages import CustomerStudy, calibration_checks, verification_checks, write_customer_report
-from flexcal.report.results import Particulars
+from flexcal.report.results import MeasurementDetails
 from flexcal.report.sections import input_files
 
 CUSTOMER = "customer.html"
 
 
-def customer_report(folder: Path, particulars: Particulars) -> Path:
+def customer_report(folder: Path, particulars: MeasurementDetails) -> Path:
     """Write customer.html of a folder of `calibrate` or `verify`.
 
     Raises `InputError` for the folder of another verb, and where a file is not there or cannot be read.

@@ -19,7 +19,7 @@ from flexcal.jobs.result_files import (
     RESULTS,
     VERIFICATION,
     read_arm,
-    read_fitted,
+    read_fitted_responses,
     read_loads,
     read_points,
     read_predictions,
@@ -87,7 +87,7 @@ def report_folder(folder: Path) -> Path:
         elif OF_DEMO in results:
             write_two_stage_report(path, two_stage_study(folder))
         elif _STIFFNESS in results:
-            stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted(folder))
+            stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted_responses(folder))
             write_stiffness_report(path, stiffness)
         elif _EXCITATION in results:
             write_excitation_report(path, ExcitationStudy(results, read_response_arrays(folder)))
@@ -126,7 +126,7 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
         results=results,
         estimates=read_estimates(folder / ESTIMATES),
         plan=read_plan_of(folder / FREQUENCY_PLAN, MultisinePlan),
-        responses=read_fitted(folder),
+        responses=read_fitted_responses(folder),
         points=read_points(folder, sigma=DEFAULT_SIGMA),
         arms=read_arm(folder),
         fresh=fresh,

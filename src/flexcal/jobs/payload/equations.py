@@ -9,17 +9,17 @@ import numpy as np
 
 from flexcal.dynamics.diagnostics import TorquePrediction
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.payload import ArmYield, PayloadEquations, PayloadFit, RobotPrior
+from flexcal.dynamics.payload import FlexibilityCorrection, PayloadEquations, PayloadFit, RobotPrior
 from flexcal.dynamics.regression import RegressionData, batches_each
 from flexcal.dynamics.signals import JointLog, Window
 from flexcal.estimation import Estimate
-from flexcal.jobs.logs import LogPart, Treatment, log_predictions, log_systems
+from flexcal.jobs.logs import LogSegment, Treatment, assemble_log_systems, predict_log_torques
 from flexcal.model.robot import RobotModel
 from flexcal.progress import silent
 
 
 @dataclass(frozen=True, eq=False)
-class PayloadSystem:
+class PayloadLogEquations:
     """The `equations` of `logs`, each of which has its own `observations`, for springs yield along its own motion."""
 
     logs: Sequence[JointLog]
@@ -36,17 +36,21 @@ class PayloadSystem:
         dynamics: Estimate | None,
         sources: tuple[str, ...],
         treatment: Treatment,
-    ) -> PayloadSystem:
-        """With springs that yield under the payload of the `model`; raises `FlexcalError` as `ArmYield` and `experiment_system` do."""
+    ) -> PayloadLogEquations:
+        """With springs that yield under the payload of the `model`; raises `FlexcalError` as `FlexibilityCorrection` and
+        `experiment_system` do.
+        """
         plain = Observation(model, CLASSIC)
         base = BaseParameters.of(plain)
         prior = RobotPrior.of(plain, base, dynamics, sources)
         observations, systems = [], []
         for log, held in zip(logs, loaded, strict=True):
-            wide = Observation(model, (*CLASSIC, ArmYield.of(model, log, sources, None if held else 0.0)))
+            wide = Observation(
+                model, (*CLASSIC, FlexibilityCorrection.of(model, log, sources, None if held else 0.0))
+            )
             observations.append(wide)
-            systems += log_systems(
-                [LogPart(log, Window())],
+            systems += assemble_log_systems(
+                [LogSegment(log, Window())],
                 wide,
                 treatment,
                 batches=batches_each(len(logs)),
@@ -63,6 +67,6 @@ class PayloadSystem:
             (observation, self.equations.coefficients(fit.unknowns, held))
             for observation, held in zip(self.observations, self.equations.loaded, strict=True)
         ]
-        return log_predictions(
+        return predict_log_torques(
             self.logs, [np.inf] * len(self.logs), predicted, self.treatment, progress=silent
         )

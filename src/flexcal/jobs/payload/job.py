@@ -16,22 +16,22 @@ from flexcal.dynamics.signals import JointLog, log_blocks
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, provenance, read_estimates, sha256_of
-from flexcal.jobs.inputs import require_distinct, stored_estimates
+from flexcal.jobs.inputs import require_distinct_files, stored_estimates
 from flexcal.jobs.logs import (
     Treatment,
+    choose_preprocessing,
+    preprocessing_document,
     read_logs,
     require_joint_torques,
     require_no_wrenches,
     scratch_folder,
-    treatment_of,
-    used_signals,
     weight_faults,
 )
-from flexcal.jobs.payload.equations import PayloadSystem
-from flexcal.jobs.payload.planned_recordings import RecordedLogs, recorded_with
-from flexcal.jobs.payload.remarks import declared_body, other_payloads, payload_remarks
+from flexcal.jobs.payload.equations import PayloadLogEquations
+from flexcal.jobs.payload.planned_recordings import PlannedLogs, with_planned_torque
+from flexcal.jobs.payload.remarks import declared_payload, other_payloads, payload_remarks
 from flexcal.jobs.result_files import (
-    place_of_block,
+    estimates_target,
     quantities,
     store_block,
     write_predictions,
@@ -44,7 +44,7 @@ from flexcal.report.checks import Trust, payload_checks
 _ROUGH = 2
 """Fits of an elastic robot before the last one, each with the springs loaded by the payload of the one before."""
 _ROWS_HZ = 6.0
-"""Rows a second of an elastic robot, at most: its springs yield as `ArmYield` has it only well below the first resonance."""
+"""Rows a second of an elastic robot, at most: its springs yield as `FlexibilityCorrection` has it only well below the first resonance."""
 _SENSELESS = 0.5
 """Share of the torques that no robot misses whose torques they are."""
 
@@ -53,7 +53,8 @@ _SENSELESS = 0.5
 class RobotPayload:
     """The `fit` of the recordings `loaded` and `free`, the `model` with it, the robot's other `blocks`, and where the estimate was written.
 
-    `declared` is the robot of robot.yaml alone, `signals` are as `used_signals` has them, `command` the command line, where there was one.
+    `declared` is the robot of robot.yaml alone, `signals` are as `preprocessing_document` has them, `command` the command line, where
+    there was one.
     """
 
     declared: RobotModel
@@ -87,7 +88,7 @@ class RobotPayload:
             "frame": self.frame,
             "recordings": {"loaded": list(self.loaded), "free": list(self.free)},
             "parameters": quantities(fit.estimate),
-            "declared": None if held is None else declared_body(held),
+            "declared": None if held is None else declared_payload(held),
             "declaration": self.declaration,
             "error_percent": {
                 "train": 100 * fit.error,
@@ -145,17 +146,19 @@ def identify_robot_payload(
     says that it holds nothing (or something, of those that are free), is given twice or in the block `dynamics` already, and as
     `identify_payload` does; nothing is written then.
     """
-    loaded, unloaded = RecordedLogs.of(logs), RecordedLogs.of(free)
+    loaded, unloaded = PlannedLogs.of(logs), PlannedLogs.of(free)
     _require_plans(loaded, unloaded)
     every = [*loaded.files, *unloaded.files]
-    require_distinct(every)
-    nominal = recorded_with(RobotModel.from_yaml(robot, estimates=False), [*loaded.plans, *unloaded.plans])
+    require_distinct_files(every)
+    nominal = with_planned_torque(
+        RobotModel.from_yaml(robot, estimates=False), [*loaded.plans, *unloaded.plans]
+    )
     bare, frame = _held(nominal, frame)
     source = stored_estimates(bare, estimates)
     if estimates is not None and not source.exists():
         raise InputError(f"{source} does not exist; give the estimates.yaml of 'flexcal identify dynamics'.")
     blocks = read_estimates(source, without="payload") if source.exists() else {}
-    target = place_of_block(source, out, "payload")
+    target = estimates_target(source, out, "payload")
     if "dynamics" not in blocks and not free:
         raise InputError(
             f"{source} has no block 'dynamics', so payload and robot inertia are not identifiable separately; run 'flexcal identify "
@@ -169,7 +172,9 @@ def identify_robot_payload(
             blocks["dynamics"]
         )  # later blocks keep no covariance of links with drives
     carries = [True] * len(loaded.files) + [False] * len(unloaded.files)
-    treatment = _slow(treatment_of(model, every, flexible=bool(model.elastic), loaded=carries), model, every)
+    treatment = _slow(
+        choose_preprocessing(model, every, flexible=bool(model.elastic), loaded=carries), model, every
+    )
     with scratch_folder() as folder:
         read = read_logs(every, model, treatment, folder, jobs=jobs)
         _require_payloads(read, carries)
@@ -180,10 +185,12 @@ def identify_robot_payload(
         known = blocks.get("dynamics")
         for number in range(_ROUGH if model.elastic else 0):
             progress("payload", number / (_ROUGH + 1))
-            rough = identify_payload(PayloadSystem.of(model, read, carries, known, (), treatment).equations)
+            rough = identify_payload(
+                PayloadLogEquations.of(model, read, carries, known, (), treatment).equations
+            )
             model = model.with_values(rough.estimate.values)
         progress("payload", _ROUGH / (_ROUGH + 1))
-        system = PayloadSystem.of(model, read, carries, known, error_sources(model), treatment)
+        system = PayloadLogEquations.of(model, read, carries, known, error_sources(model), treatment)
         fit = identify_payload(system.equations)
         model = model.with_values(fit.estimate.values)
         predictions = [] if out is None else system.predictions(fit)
@@ -207,7 +214,7 @@ def identify_robot_payload(
         frame=frame,
         fit=replace(fit, estimate=estimate),
         blocks=blocks,
-        signals=used_signals(treatment, read),
+        signals=preprocessing_document(treatment, read),
         loaded=loaded.files,
         free=unloaded.files,
         estimates=target,
@@ -261,7 +268,7 @@ def _require_news(logs: Sequence[Path], blocks: Mapping[Block, Estimate]) -> Non
             )
 
 
-def _require_plans(loaded: RecordedLogs, free: RecordedLogs) -> None:
+def _require_plans(loaded: PlannedLogs, free: PlannedLogs) -> None:
     """Raises `InputError` for trajectories that were planned otherwise than they are given here."""
     if any(plan.payload == 0 for plan in loaded.plans):
         raise InputError(

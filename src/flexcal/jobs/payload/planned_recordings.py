@@ -13,7 +13,7 @@ from flexcal.model.robot import RobotModel
 
 
 @dataclass(frozen=True)
-class RecordedLogs:
+class PlannedLogs:
     """Their `files`; of those in folders the `plans`, which say what a torque is over its sample, and the `plan_files` that have them."""
 
     files: tuple[Path, ...]
@@ -21,7 +21,7 @@ class RecordedLogs:
     plan_files: tuple[Path, ...]
 
     @classmethod
-    def of(cls, paths: Sequence[Path]) -> RecordedLogs:
+    def of(cls, paths: Sequence[Path]) -> PlannedLogs:
         """Files, and folders as 'measure' leaves them; raises `InputError` for a folder that holds no trajectories."""
         files: list[Path] = []
         plans: list[TrajectoryPlan] = []
@@ -36,7 +36,7 @@ class RecordedLogs:
         return cls(tuple(files), tuple(plans), tuple(plan_files))
 
 
-def recorded_with(model: RobotModel, plans: Sequence[TrajectoryPlan]) -> RobotModel:
+def with_planned_torque(model: RobotModel, plans: Sequence[TrajectoryPlan]) -> RobotModel:
     """The robot, its `dynamics: tau:` as the plans have it; raises `InputError` where these differ."""
     torques = sorted({plan.torque for plan in plans})
     if len(torques) > 1:

@@ -48,7 +48,7 @@ def other_payloads(found: Estimate, blocks: Mapping[Block, Estimate]) -> dict[st
     return {name: mass for name, mass in masses.items() if not low <= mass <= high}
 
 
-def declared_body(held: Payload) -> dict[str, float]:
+def declared_payload(held: Payload) -> dict[str, float]:
     """What robot.yaml declares of a payload, by the names of what is identified."""
     values = np.concatenate([[held.mass], held.com, held.moments])
     return {f"payload.{key}": float(value) for key, value in zip(BODY, values, strict=True)}

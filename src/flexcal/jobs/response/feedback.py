@@ -19,19 +19,19 @@ _HARDLY = 0.01
 """Bias that is not worth a warning."""
 
 
-def share_of_lines(share: np.ndarray, periods: int | None) -> np.ndarray:
+def line_noise_share(share: np.ndarray, periods: int | None) -> np.ndarray:
     """Share of noise in lines of a periodic excitation, which noise between them does not reach, from that over all frequencies."""
     return share / (share + (1.0 - share) * (periods or 1))
 
 
-def is_free_of_feedback(pieces: Sequence[ExcitationRecord], at_once: Sequence[bool]) -> bool:
+def references_free_of_feedback(pieces: Sequence[ExcitationRecord], at_once: Sequence[bool]) -> bool:
     """Whether the references of the records carry no noise of the outputs, so that they can be references."""
     found = feedback([replace(piece, inputs=piece.references) for piece in pieces], at_once)
     return found is not None and not found.acts
 
 
 @dataclass(frozen=True)
-class BandFeedback:
+class FeedbackCheck:
     """`acts`: whether a controller acts on the output (None where that cannot be told).
 
     In the band of the response: the median `share` of noise in the input that it feeds back, the `bias` of the response by it, relative
@@ -56,14 +56,14 @@ class BandFeedback:
         references: Sequence[str],
         *,
         guessed: bool,
-    ) -> BandFeedback:
+    ) -> FeedbackCheck:
         """In the band of a response of so many `periods` of a periodic excitation."""
         acts = None if loop is None else loop.acts
         if references or loop is None:
             return cls(acts, reference=", ".join(references), guessed=guessed)
         lines = response.frequencies_hz
         share = loop.share_at(lines)
-        of_lines = share_of_lines(share, periods)
+        of_lines = line_noise_share(share, periods)
         bias = loop.bias_at(lines) * of_lines / np.maximum(share, np.finfo(float).tiny)
         at = int(bias.argmax())
         return cls(

@@ -20,14 +20,14 @@ from flexcal.frequency.arbitrary import (
     with_reference,
 )
 from flexcal.importing.columns import ResponseRecords
-from flexcal.jobs.response.feedback import MOSTLY, is_free_of_feedback, share_of_lines
+from flexcal.jobs.response.feedback import MOSTLY, line_noise_share, references_free_of_feedback
 
 _NARROW = 0.5
 """Share of the band without a reference that one which was not named must explain."""
 
 
 @dataclass(frozen=True, eq=False)
-class ExcitedSpectra:
+class ExcitationSpectra:
     """Of the records `measured` in `pieces` of equal length: the `whole` spectra, which of their bins are `usable` (K,; None for all), the
     feedback of their `loop`, and the `period` of the excitation in samples."""
 
@@ -45,7 +45,7 @@ class ExcitedSpectra:
         return 0.0 if band is None else band[1] - band[0]
 
 
-def excited_spectra(measured: ResponseRecords, hold: Hold) -> ExcitedSpectra:
+def measure_spectra(measured: ResponseRecords, hold: Hold) -> ExcitationSpectra:
     """With the references that were named; with those that were recognised only where a controller acts and they explain the input."""
     pieces = equal_pieces(measured.records)
     at_once = [channel.derivative == 2 for channel in measured.outputs]
@@ -58,7 +58,7 @@ def excited_spectra(measured: ResponseRecords, hold: Hold) -> ExcitedSpectra:
     plain = measured.without_references(
         f"{names} is called like a reference, but seems to carry noise of the output, and is left out; --reference uses it"
     )
-    if not is_free_of_feedback(pieces, at_once):
+    if not references_free_of_feedback(pieces, at_once):
         return _spectra(plain, hold, loop)
     plain = measured.without_references(
         f"{names} is called like a reference, but explains the input in a small part of the band, and is left out; --reference uses it"
@@ -67,7 +67,7 @@ def excited_spectra(measured: ResponseRecords, hold: Hold) -> ExcitedSpectra:
     return direct if explained.width_hz < _NARROW * direct.width_hz else explained
 
 
-def _spectra(measured: ResponseRecords, hold: Hold, loop: Feedback | None) -> ExcitedSpectra:
+def _spectra(measured: ResponseRecords, hold: Hold, loop: Feedback | None) -> ExcitationSpectra:
     pieces = equal_pieces(measured.records)
     periodic = [find_period(r.references if r.references.size else r.inputs) for r in pieces]
     period = periodic[0] if len(set(periodic)) == 1 else None
@@ -76,5 +76,5 @@ def _spectra(measured: ResponseRecords, hold: Hold, loop: Feedback | None) -> Ex
     if measured.references:
         whole, usable = with_reference(whole, references)
     elif loop is not None and loop.acts:
-        usable = share_of_lines(loop.share_at(whole.frequencies_hz), whole.periods) < MOSTLY
-    return ExcitedSpectra(measured, pieces, whole, usable, loop, period)
+        usable = line_noise_share(loop.share_at(whole.frequencies_hz), whole.periods) < MOSTLY
+    return ExcitationSpectra(measured, pieces, whole, usable, loop, period)

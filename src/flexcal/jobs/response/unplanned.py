@@ -39,8 +39,8 @@ from flexcal.frequency.arbitrary import (
     tones,
 )
 from flexcal.importing.columns import ResponseRecords, read_response_records
-from flexcal.jobs.response.feedback import BandFeedback
-from flexcal.jobs.response.spectra import excited_spectra
+from flexcal.jobs.response.feedback import FeedbackCheck
+from flexcal.jobs.response.spectra import measure_spectra
 from flexcal.jobs.result_files import write_response_arrays, write_results
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, excitation_checks
@@ -72,7 +72,7 @@ class IdentifiedExcitation:
     identified: IdentifiedModes
     masses: AxisMasses
     halves: HalfDifference | None
-    fed: BandFeedback
+    fed: FeedbackCheck
     period_s: float | None
     provenance: Mapping[str, str]
     files: tuple[Path, ...]
@@ -252,7 +252,7 @@ def _identified(
     command: str,
     progress: Progress,
 ) -> IdentifiedExcitation:
-    found = excited_spectra(measured, options.hold)
+    found = measure_spectra(measured, options.hold)
     measured, period = found.measured, found.period
     spectra = _in_band(found.whole, found.usable, options.band, files, tones(found.pieces))
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
@@ -264,7 +264,7 @@ def _identified(
         identified=identified,
         masses=masses,
         halves=_halves(spectra, identified),
-        fed=BandFeedback.of(
+        fed=FeedbackCheck.of(
             found.loop,
             identified.response,
             spectra.periods,

@@ -10,8 +10,8 @@ from .document import (
     springs_block,
     write_results,
 )
-from .estimates import ESTIMATES, place_of_block, store_block
-from .fitted_responses import read_fitted, write_fitted
+from .estimates import ESTIMATES, estimates_target, store_block
+from .fitted_responses import read_fitted_responses, write_fitted_responses
 from .points import read_arm, read_loads, read_points, write_arm, write_loads, write_points
 from .response_arrays import read_response_arrays, write_response_arrays
 from .torque_predictions import read_predictions, write_predictions
@@ -22,14 +22,14 @@ __all__ = [
     "RESULTS",
     "VERIFICATION",
     "dropped_parameters",
+    "estimates_target",
     "identifiability_block",
     "identifiability_spectrum",
     "json_text",
-    "place_of_block",
     "plain",
     "quantities",
     "read_arm",
-    "read_fitted",
+    "read_fitted_responses",
     "read_loads",
     "read_points",
     "read_predictions",
@@ -39,7 +39,7 @@ __all__ = [
     "springs_block",
     "store_block",
     "write_arm",
-    "write_fitted",
+    "write_fitted_responses",
     "write_loads",
     "write_points",
     "write_predictions",

@@ -11,7 +11,7 @@ from flexcal.files.formats import Block, require_place, write_estimates
 ESTIMATES = "estimates.yaml"
 
 
-def place_of_block(source: Path, out: Path | None, block: Block) -> Path:
+def estimates_target(source: Path, out: Path | None, block: Block) -> Path:
     """The file into which an identification puts its block: in the folder `out`, else the robot's own `source`.
 
     Raises `InputError` where that cannot take the block, as one that another program wrote.

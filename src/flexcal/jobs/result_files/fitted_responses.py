@@ -19,7 +19,7 @@ _SINGLE = {"complex128": np.complex64, "float64": np.float32}
 """What a figure can show needs no more digits."""
 
 
-def write_fitted(folder: Path, responses: Sequence[FittedResponse]) -> None:
+def write_fitted_responses(folder: Path, responses: Sequence[FittedResponse]) -> None:
     """Leave `responses` as fitted_responses.npz in `folder`, atomically: the fields of `FittedResponse` as `<name>_<pose>`, poses from 1,
     (L, n, n) and (L, S, n) arrays in single precision."""
     arrays: dict[str, np.ndarray] = {"pose": np.array([item.pose + 1 for item in responses])}
@@ -33,8 +33,8 @@ def write_fitted(folder: Path, responses: Sequence[FittedResponse]) -> None:
         np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
 
 
-def read_fitted(folder: Path) -> tuple[FittedResponse, ...]:
-    """What `write_fitted` left; raises `InputError` where the file is not there or not such a one."""
+def read_fitted_responses(folder: Path) -> tuple[FittedResponse, ...]:
+    """What `write_fitted_responses` left; raises `InputError` where the file is not there or not such a one."""
     file = NpzFile(folder / FITTED, "run the verb that writes it again")
     poses = file.read({"pose": ArrayForm("whole", ("poses",))})["pose"]
     return tuple(_response(file, pose) for pose in poses.tolist())

@@ -1,5 +1,5 @@
 from .measurement_import import ImportedFile, import_file
-from .point_declaration import write_point_place
+from .point_declaration import write_point_position
 from .robot_description import init_robot
 from .signals_declaration import add_signals
 
@@ -8,5 +8,5 @@ __all__ = [
     "add_signals",
     "import_file",
     "init_robot",
-    "write_point_place",
+    "write_point_position",
 ]

@@ -21,14 +21,14 @@ from flexcal.data.tables import JOINT_QUANTITIES, Table, check_joint_units, stan
 from flexcal.errors import InputError
 from flexcal.importing.columns import (
     TOOL,
+    ColumnAssignment,
     Guess,
-    LeftOut,
+    LeaveOutErrors,
     Misfit,
-    PlacedColumns,
     apply_map,
     check_nominal,
     guess_columns,
-    reasons_of,
+    reasons_unused,
 )
 from flexcal.importing.readers import read_foreign
 from flexcal.importing.tables import ForeignTable
@@ -61,8 +61,8 @@ class ImportedFile:
 
     file: Path
     kind: Literal["poses", "log", "joints"]
-    placed: tuple[PlacedColumns, ...]
-    left_out: tuple[LeftOut, ...]
+    placed: tuple[ColumnAssignment, ...]
+    left_out: tuple[LeaveOutErrors, ...]
     columns: dict[str, np.ndarray]
     misfit: Misfit | None
     remarks: tuple[str, ...]
@@ -180,7 +180,7 @@ def _kind(
     """What the file holds, and the guess with what belongs to that only, in the order of the columns to write."""
     unsure = [left for left in guess.left_out if "could both be" in left.why]
     if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
-        left = "; ".join(reasons_of(guess.left_out)) or "every column is something else"
+        left = "; ".join(reasons_unused(guess.left_out)) or "every column is something else"
         what = (
             f"the joint positions q1 … q{model.n}"
             if "q" not in guess.placed
@@ -203,14 +203,16 @@ def _kind(
         placed.pop("quaternion")
     what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions only"}[kind]
     left = [
-        LeftOut(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))
+        LeaveOutErrors(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))
         for quantity, item in guess.placed.items()
         if quantity not in placed
         for column in item.columns
     ]
     texts = guess.texts if kind == "poses" else {}
     left += [
-        LeftOut(column, f"no part of {what}") for name, column in guess.texts.items() if name not in texts
+        LeaveOutErrors(column, f"no part of {what}")
+        for name, column in guess.texts.items()
+        if name not in texts
     ]
     return kind, Guess(placed, texts, (*guess.left_out, *left))
 

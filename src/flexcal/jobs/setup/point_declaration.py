@@ -17,7 +17,7 @@ _DIGITS = 6
 """m: micrometres."""
 
 
-def write_point_place(robot: Path, name: str, xyz: np.ndarray) -> None:
+def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
     """Put `xyz` (3,) m in place of the `xyz` of the point `name` under `points:`; comments and everything else stay as they are.
 
     Raises `InputError`, and changes nothing, where the file says it in a way that cannot be replaced.

@@ -16,13 +16,18 @@ from flexcal.elasticity.identification import (
     StiffnessResult,
     identify_stiffness,
 )
-from flexcal.elasticity.response_model import CovarianceWeighting, PaperWeighting, UniformWeighting, Weighting
+from flexcal.elasticity.response_model import (
+    CovarianceWeighting,
+    ResonanceWeighting,
+    UniformWeighting,
+    Weighting,
+)
 from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.inputs import common_plan, plan_files, read_responses
 from flexcal.jobs.result_files import (
     dropped_parameters,
-    place_of_block,
+    estimates_target,
     quantities,
     springs_block,
     store_block,
@@ -39,7 +44,7 @@ SearchName = Literal["multi-start", "population"]
 
 _WEIGHTINGS: dict[WeightingName, Weighting] = {
     "covariance": CovarianceWeighting(),
-    "paper": PaperWeighting(),
+    "paper": ResonanceWeighting(),
     "uniform": UniformWeighting(),
 }
 _SEARCHES: dict[SearchName, Search] = {"multi-start": MultiStart(), "population": PopulationSearch()}
@@ -119,7 +124,7 @@ def identify_robot_stiffness(
     bare = RobotModel.from_yaml(robot, estimates=False)
     source = bare.path.parent / bare.config.estimates
     blocks = read_estimates(source, without="stiffness") if source.exists() else {}
-    target = place_of_block(source, out, "stiffness")
+    target = estimates_target(source, out, "stiffness")
     model = with_blocks(bare, {block: e for block, e in blocks.items() if block == "dynamics"}, source)
     calibrated = blocks.get("calibration")
     if calibrated is not None:
@@ -162,10 +167,10 @@ def identify_robot_stiffness(
     store_block(source, target, blocks, "stiffness", estimate)
     if out is not None:
         from flexcal.jobs.pages import report_folder
-        from flexcal.jobs.result_files import write_fitted
+        from flexcal.jobs.result_files import write_fitted_responses
         from flexcal.report.results import fitted_responses
 
-        write_fitted(out, fitted_responses(result, model))
+        write_fitted_responses(out, fitted_responses(result, model))
         write_results(out, found.document())
         report_folder(out)
     return found

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.diagnostics import Drift, hardly_fits
+from flexcal.calibration.diagnostics import Drift, is_implausible
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.verification import Verification, prediction_document
 from flexcal.estimation import Estimate
-from flexcal.export import Exported
+from flexcal.export import ExportedFile
 from flexcal.jobs.result_files import (
     identifiability_block,
     identifiability_spectrum,
@@ -18,12 +18,12 @@ from flexcal.jobs.result_files import (
     springs_block,
 )
 from flexcal.jobs.stiffness import further_joints
-from flexcal.jobs.two_stage.results import CadAlone, TwoStageRun
+from flexcal.jobs.two_stage.results import CadInertialsRun, TwoStageRun
 from flexcal.report.checks import misfit_document
 from flexcal.units import MILLIMETRE
 
 
-def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
+def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, Any]:
     """The content of results.json."""
     estimate, found, drift = (
         run.stiffness.estimate,
@@ -46,7 +46,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
         "calibration": run.calibration.errors.in_millimetres(),
         "calibration_fit": {
             "reduced_chi2": run.calibration.estimate.reduced_chi2,
-            "hardly_fits": hardly_fits(run.calibration),
+            "is_implausible": is_implausible(run.calibration),
             "nominal": run.before.document()["registered"],
             "rigid": run.rigid[0].errors.in_millimetres(),
             "wrong_flanks": None if run.floor is None else wrong_flanks(run),
@@ -81,7 +81,7 @@ def two_stage_document(run: TwoStageRun, exported: Exported) -> dict[str, Any]:
     }
 
 
-def _cad_alone(run: TwoStageRun, cad: CadAlone) -> dict[str, Any]:
+def _cad_alone(run: TwoStageRun, cad: CadInertialsRun) -> dict[str, Any]:
     """The numbers of both stages without stage 0, under the names of the run's own."""
     kinds = ("stiffness", "damping")
     return {

@@ -18,7 +18,7 @@ from flexcal.calibration.verification import (
     MeasuredPoints,
     arms_at,
     errors_before,
-    robot_before,
+    uncalibrated_model,
     verify,
     verify_jointly,
 )
@@ -36,16 +36,16 @@ from flexcal.frequency.periodic import FrequencyResponse, frequency_responses
 from flexcal.jobs.calibration import measurement_digests
 from flexcal.jobs.experiments import (
     PlanName,
-    designed_excitation,
     frequency_plan,
+    optimise_excitation,
+    plan_without_poses,
     response_sensors,
-    unplaced_plan,
 )
 from flexcal.jobs.pages import report_folder, two_stage_study
 from flexcal.jobs.result_files import (
     VERIFICATION,
     write_arm,
-    write_fitted,
+    write_fitted_responses,
     write_points,
     write_results,
     write_verification,
@@ -53,8 +53,8 @@ from flexcal.jobs.result_files import (
 from flexcal.jobs.two_stage.cells import CellName, open_cell
 from flexcal.jobs.two_stage.document import two_stage_document
 from flexcal.jobs.two_stage.inertial_stage import run_stage_zero
-from flexcal.jobs.two_stage.results import CadAlone, TwoStageRun
-from flexcal.model.robot import INERTIALS, RobotModel
+from flexcal.jobs.two_stage.results import CadInertialsRun, TwoStageRun
+from flexcal.model.robot import MASS_AND_COM, RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
 from flexcal.report.pages import two_stage_checks
@@ -125,8 +125,8 @@ def run_two_stage(
         frequency = frequency_plan(nominal, robot.parent / "frequency_poses.csv", plan, seed)
     else:
         with watch.stage("frequency"):
-            flat = unplaced_plan(believed, plan, seed=seed)
-            frequency = designed_excitation(believed, flat, sensors=response_sensors(robot)).planned.plan
+            flat = plan_without_poses(believed, plan, seed=seed)
+            frequency = optimise_excitation(believed, flat, sensors=response_sensors(robot)).planned.plan
     write_plan(out / "frequency_plan.yaml", frequency)
     with watch.stage("frequency"):
         responses = tuple(
@@ -189,7 +189,7 @@ def run_two_stage(
         floor = None
         if cell == "virtual":
             floor = ErrorStatistics.of(exact.position - predict(nominal.with_values(known), exact).position)
-        placed = robot_before(nominal, measured)
+        placed = uncalibrated_model(nominal, measured)
         assert placed.registered is not None and placed.own is not None
         measured_verification, measured_covariance = verify_jointly(calibration.model, seen)
         run = TwoStageRun(
@@ -222,12 +222,12 @@ def run_two_stage(
             springs = stage_one(nominal, "cad_alone")
             fitted = calibrate(springs.robot(nominal), measured)
             run = replace(
-                run, cad_alone=CadAlone(springs, fitted, verify(fitted.model, exact, noise_free=True))
+                run, cad_alone=CadInertialsRun(springs, fitted, verify(fitted.model, exact, noise_free=True))
             )
             progress("cad_alone", 1.0)
     run = replace(run, results=two_stage_document(run, exported))
     progress("report", 0.0)
-    write_fitted(out, fitted_responses(stiffness, nominal))
+    write_fitted_responses(out, fitted_responses(stiffness, nominal))
     write_verification(out / VERIFICATION, run)
     points = MeasuredPoints(
         measured, errors_before(run.before) | {CALIBRATED: calibration.residuals}, calibration.ambiguous
@@ -279,4 +279,4 @@ def _store(
 
 
 def _inertias(truth: dict[str, float]) -> dict[str, float]:
-    return {name: value for name, value in truth.items() if name.rpartition(".")[2] in INERTIALS}
+    return {name: value for name, value in truth.items() if name.rpartition(".")[2] in MASS_AND_COM}

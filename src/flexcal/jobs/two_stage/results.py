@@ -8,7 +8,7 @@ from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.calibration.fit import Calibration
-from flexcal.calibration.verification import ErrorCovariance, ErrorsBefore, Verification
+from flexcal.calibration.verification import ErrorCovariance, UncalibratedErrors, Verification
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.poses import PoseSet
 from flexcal.elasticity.identification import StiffnessResult
@@ -20,7 +20,7 @@ from flexcal.report.checks import Trust
 
 
 @dataclass(frozen=True, eq=False)
-class CadAlone:
+class CadInertialsRun:
     """Both stages fitted again, to the same data, with the inertials of CAD in place of those that trajectories identified."""
 
     stiffness: StiffnessResult
@@ -49,7 +49,7 @@ class TwoStageRun:
     stiffness: StiffnessResult
     calibration: Calibration
     rigid: tuple[Calibration, ...]
-    before: ErrorsBefore
+    before: UncalibratedErrors
     verification_poses: PoseSet
     nominal_verification: Verification
     own_verification: Verification
@@ -60,7 +60,7 @@ class TwoStageRun:
     floor: ErrorStatistics | None
     truth: Mapping[str, float]
     dynamics: Estimate | None = None
-    cad_alone: CadAlone | None = None
+    cad_alone: CadInertialsRun | None = None
     seconds: Mapping[str, float] = field(default_factory=dict)
     results: Mapping[str, Any] = field(default_factory=dict)
     trust: Trust = field(default_factory=Trust)

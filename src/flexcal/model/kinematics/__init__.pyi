@@ -1,6 +1,6 @@
 from .forward import PointKinematics, joint_batch, point_kinematics
 from .inverse import damped_step, reach_points
-from .joint_space import even_configurations, joint_limits, joint_ranges
+from .joint_space import joint_limits, joint_ranges, low_discrepancy_configurations
 from .link_poses import joint_origins, link_frames
 from .link_surface import LinkSurface
 from .placements import bearing_placement, found_xyz, joint_placement, link_placement, point_placement
@@ -10,7 +10,6 @@ __all__ = [
     "PointKinematics",
     "bearing_placement",
     "damped_step",
-    "even_configurations",
     "found_xyz",
     "joint_batch",
     "joint_limits",
@@ -19,6 +18,7 @@ __all__ = [
     "joint_ranges",
     "link_frames",
     "link_placement",
+    "low_discrepancy_configurations",
     "point_kinematics",
     "point_placement",
     "reach_points",

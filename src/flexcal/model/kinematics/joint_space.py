@@ -41,7 +41,7 @@ def joint_ranges(model: RobotModel) -> tuple[np.ndarray, np.ndarray]:
     return lower, upper
 
 
-def even_configurations(model: RobotModel, count: int) -> np.ndarray:
+def low_discrepancy_configurations(model: RobotModel, count: int) -> np.ndarray:
     """Configurations (count, n) spread evenly over the joint ranges, always the same ones.
 
     The additive recurrence whose steps are powers of the generalised golden ratio, the root of x^(n+1) = x + 1.

@@ -1,7 +1,7 @@
-from .inertia import INERTIAL, Inertia, parallel_axis
+from .inertia import LINK_PARAMETERS, Inertia, parallel_axis
 from .joint import ElasticJoint, Joint, normals_to
 from .point import ForceSensor, Payload, Point
-from .pseudo_inertia_matrix import PSEUDO_INERTIA, is_body, pseudo_inertia
+from .pseudo_inertia_matrix import PSEUDO_INERTIA, is_physically_consistent, pseudo_inertia
 from .rotations import (
     axis_rotation,
     rotation_rpy,
@@ -14,7 +14,7 @@ from .rotations import (
 from .tree import Bearings, bearing_frame, kinematic_tree
 
 __all__ = [
-    "INERTIAL",
+    "LINK_PARAMETERS",
     "PSEUDO_INERTIA",
     "Bearings",
     "ElasticJoint",
@@ -25,7 +25,7 @@ __all__ = [
     "Point",
     "axis_rotation",
     "bearing_frame",
-    "is_body",
+    "is_physically_consistent",
     "kinematic_tree",
     "normals_to",
     "parallel_axis",

@@ -21,7 +21,7 @@ def parallel_axis(mass: float, com: np.ndarray) -> np.ndarray:
     return mass * ((com @ com) * np.eye(3) - np.outer(com, com))
 
 
-INERTIAL = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+LINK_PARAMETERS = ("mass", "mc_x", "mc_y", "mc_z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 """The ten parameters of a link in the order of the columns: mass (kg), first moment (kg m) and inertia (kg m²) at the joint frame.
 
 Ixy, Ixz and Iyz are entries of the inertia matrix, as URDF has them: negative products of inertia.

@@ -6,12 +6,12 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from flexcal.model.parts.inertia import INERTIAL, Inertia, parallel_axis
+from flexcal.model.parts.inertia import LINK_PARAMETERS, Inertia, parallel_axis
 
 
 def _basis() -> np.ndarray:
-    result = np.zeros((len(INERTIAL), 4, 4))
-    for matrix, key in zip(result, INERTIAL, strict=True):
+    result = np.zeros((len(LINK_PARAMETERS), 4, 4))
+    for matrix, key in zip(result, LINK_PARAMETERS, strict=True):
         if key == "mass":
             matrix[3, 3] = 1.0
             continue
@@ -28,7 +28,7 @@ def _basis() -> np.ndarray:
 
 
 PSEUDO_INERTIA = _basis()
-"""(10, 4, 4): what one unit of each parameter in `INERTIAL` adds to [[Σ, mc], [mcᵀ, m]], Σ = ½ tr(I) 1 - I at the joint frame."""
+"""(10, 4, 4): what one unit of each parameter in `LINK_PARAMETERS` adds to [[Σ, mc], [mcᵀ, m]], Σ = ½ tr(I) 1 - I at the joint frame."""
 
 
 def pseudo_inertia(link: Inertia) -> np.ndarray:
@@ -41,7 +41,7 @@ def pseudo_inertia(link: Inertia) -> np.ndarray:
     return result
 
 
-def is_body(values: Mapping[str, float], link: str) -> bool:
+def is_physically_consistent(values: Mapping[str, float], link: str) -> bool:
     """Whether some body has the ten named parameters of a link: positive mass, and triangle inequalities that hold strictly."""
-    own = np.array([values[f"{link}.{key}"] for key in INERTIAL])
+    own = np.array([values[f"{link}.{key}"] for key in LINK_PARAMETERS])
     return bool(np.linalg.eigvalsh(np.tensordot(own, PSEUDO_INERTIA, 1))[0] > 0)

@@ -1,10 +1,10 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
-from .attached_payload import carried_inertias, holding, last_frame, with_frame
+from .attached_payload import carried_inertias, holding, last_frame, with_point_at_frame
 from .config import AcceptanceConfig, RobotConfig, SignalConfig
 from .parameter_names import (
     GEOMETRY,
-    INERTIALS,
     LATERAL,
+    MASS_AND_COM,
     MOMENTS,
     PARALLEL,
     SCATTER,
@@ -17,7 +17,7 @@ from .parameter_names import (
     unknown_parallel,
 )
 from .posterior import Posterior
-from .posterior_propagation import posterior_spread
+from .posterior_propagation import propagated_covariance_root
 from .prior_parameters import (
     ANGLE_TOLERANCE,
     FRICTION_LOG_STD,
@@ -39,9 +39,9 @@ __all__ = [
     "FRICTION_LOG_STD",
     "FRICTION_TOLERANCE",
     "GEOMETRY",
-    "INERTIALS",
     "LATERAL",
     "LENGTH_TOLERANCE",
+    "MASS_AND_COM",
     "MOMENTS",
     "NUISANCE",
     "PARALLEL",
@@ -62,7 +62,7 @@ __all__ = [
     "holding",
     "last_frame",
     "mounting_names",
-    "posterior_spread",
+    "propagated_covariance_root",
     "sensitivity_name",
     "sensor_column",
     "sensor_delay_name",
@@ -76,5 +76,5 @@ __all__ = [
     "unit_of",
     "unknown_parallel",
     "with_blocks",
-    "with_frame",
+    "with_point_at_frame",
 ]

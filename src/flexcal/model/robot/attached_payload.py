@@ -63,7 +63,7 @@ def carried_inertias(model: RobotModel, payload: float | None = None) -> tuple[I
     return tuple(Inertia(total, com, inertia) if i == held.joint else y for i, y in enumerate(model.inertias))
 
 
-def with_frame(model: RobotModel, frame: str) -> RobotModel:
+def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
     """`model` with a point named as the URDF frame `frame`, at its origin, after the declared ones; itself where robot.yaml declares that.
 
     Raises `InputError` for a frame that the URDF lacks or that no joint moves, and where a declared point of that name is elsewhere.

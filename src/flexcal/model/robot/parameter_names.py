@@ -16,7 +16,7 @@ FRICTION = (
 )  # fmt: skip
 PARALLEL = ("spring_stiffness", "spring_torque", "cable_torque")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
-INERTIALS = ("mass", "com_x", "com_y", "com_z")
+MASS_AND_COM = ("mass", "com_x", "com_y", "com_z")
 MOMENTS = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 STATION = ("x", "y", "z", "rx", "ry", "rz")
 SCATTER = ("instrument", "instrument_share", "robot", "angular", "model", "pose", "transmission")

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.model.robot.robot_model import RobotModel
 
 
-def posterior_spread(model: RobotModel, result: Callable[[RobotModel], np.ndarray]) -> np.ndarray:
+def propagated_covariance_root(model: RobotModel, result: Callable[[RobotModel], np.ndarray]) -> np.ndarray:
     """A square root (size, k) of the covariance of `result` (size,) over the posterior of `model`, to first order.
 
     Its k columns are what one standard deviation in each independent direction of the estimated parameters changes, by central

@@ -13,7 +13,7 @@ import numpy as np
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates
-from flexcal.model.parts import Bearings, is_body
+from flexcal.model.parts import Bearings, is_physically_consistent
 from flexcal.model.robot.attached_payload import holding
 from flexcal.model.robot.parameter_names import unit_in, unit_of
 
@@ -110,7 +110,7 @@ def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotMod
 
 def _check_bodies(model: RobotModel, estimate: Estimate, path: Path) -> None:
     links = [joint.link for joint in model.joints if f"{joint.link}.mc_x" in estimate.parameters]
-    broken = [link for link in links if not is_body(estimate.values, link)]
+    broken = [link for link in links if not is_physically_consistent(estimate.values, link)]
     if broken:
         raise InputError(
             f"{path}: the inertials in the block 'dynamics' are not physically consistent for {', '.join(broken)}, as elastic "

@@ -9,7 +9,7 @@ from .equilibrium import (
     static_equilibrium,
 )
 from .flank import certain_flank
-from .hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_of
+from .hardening import REFERENCE_TWIST, tangent_ratio, twist_by_hardening, twist_from_torque
 
 __all__ = [
     "REFERENCE_TWIST",
@@ -27,5 +27,5 @@ __all__ = [
     "tangent_ratio",
     "tool_at_rest",
     "twist_by_hardening",
-    "twist_of",
+    "twist_from_torque",
 ]

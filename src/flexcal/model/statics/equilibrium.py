@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_batch
 from flexcal.model.robot import RobotModel
-from flexcal.model.statics.hardening import tangent_ratio, twist_of
+from flexcal.model.statics.hardening import tangent_ratio, twist_from_torque
 
 
 def lateral_axes(model: RobotModel, q: np.ndarray) -> np.ndarray:
@@ -216,7 +216,7 @@ def static_equilibrium(
     drives = [k for k, (_, component) in enumerate(axes) if component == 2]
     sprung = [axes[k][0] for k in drives]
     hardening = model.hardening[sprung]
-    twist = twist_of(load[:, sprung], stiffness[drives], hardening)
+    twist = twist_from_torque(load[:, sprung], stiffness[drives], hardening)
     free[:, sprung] += load[:, sprung] / stiffness[drives] - twist
     rest = np.sign(load) if flank is None else flank
     for last in (False,) * (_FLANK_PASSES - 1) + (True,):

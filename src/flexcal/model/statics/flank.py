@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.model.robot import INERTIALS, RobotModel
+from flexcal.model.robot import MASS_AND_COM, RobotModel
 from flexcal.model.statics.equilibrium import gravity_regressor, payload_batch
 
 CERTAIN = 3.0
@@ -33,7 +33,7 @@ def gravity_torque_std(
     rows: list[np.ndarray] = []
     declared: list[float] = []
     for k, joint in enumerate(model.joints):
-        names += [f"{joint.link}.{key}" for key in INERTIALS]
+        names += [f"{joint.link}.{key}" for key in MASS_AND_COM]
         rows.append(regressor[:, :, k, 0] + regressor[:, :, k, 1:] @ model.com[k])
         rows += [model.mass[k] * regressor[:, :, k, c] for c in (1, 2, 3)]
         declared += [model.prior.mass * model.mass[k], *[model.prior.com] * 3]

@@ -14,7 +14,7 @@ REFERENCE_TWIST = 1e-3
 _NEWTON_STEPS = 20
 
 
-def twist_of(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarray) -> np.ndarray:
+def twist_from_torque(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarray) -> np.ndarray:
     """Twist (..., n), rad, under `torque` (..., n) N m; `stiffness` (n,) N m/rad at no load, `hardening` (n,) at least 0."""
     linear = torque / stiffness
     if not np.any(hardening):

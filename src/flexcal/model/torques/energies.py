@@ -6,7 +6,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_batch
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques.inertial_regressor import torque_regressor
 
@@ -29,7 +29,7 @@ def energy_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray) -> np.nda
         position, orientation, _, _ = model.tree.point(
             joint, np.eye(3), np.zeros(3), origin, geometry, np.zeros(6), q, still, False
         )
-        first = len(INERTIAL) * joint
+        first = len(LINK_PARAMETERS) * joint
         energy[:, first] -= position @ model.gravity
         energy[:, first + 1 : first + 4] -= np.einsum("i,sij->sj", model.gravity, orientation)
     return energy

@@ -6,13 +6,13 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import joint_batch
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import RobotModel
 
 
 def inertial_names(model: RobotModel) -> tuple[str, ...]:
     """Names of the 10 n columns, link by link in chain order."""
-    return tuple(f"{joint.link}.{key}" for joint in model.joints for key in INERTIAL)
+    return tuple(f"{joint.link}.{key}" for joint in model.joints for key in LINK_PARAMETERS)
 
 
 def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.ndarray) -> np.ndarray:
@@ -24,7 +24,7 @@ def torque_regressor(model: RobotModel, q: np.ndarray, dq: np.ndarray, ddq: np.n
     Raises `FlexcalError` where the shapes differ or do not fit the robot.
     """
     q = joint_batch(model, q)
-    shape = (model.n, len(INERTIAL) * model.n)
+    shape = (model.n, len(LINK_PARAMETERS) * model.n)
     found = np.zeros((shape[0] * shape[1], len(q)))
     write_torque_regressor(model, q, dq, ddq, np.arange(len(found)).reshape(shape), found)
     return found.reshape(*shape, len(q)).transpose(2, 0, 1)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.parts import INERTIAL
+from flexcal.model.parts import LINK_PARAMETERS
 from flexcal.model.robot import RobotModel
 from flexcal.model.torques.inertial_regressor import motion_batch
 
@@ -21,7 +21,7 @@ def torque_regressor_adjoint(
     2018); here every joint has inertial parameters of its own. Raises `FlexcalError` where shapes differ or do not fit the robot.
     """
     q, dq, ddq = motion_batch(model, q, dq, ddq)
-    shape = (model.n, len(INERTIAL) * model.n)
+    shape = (model.n, len(LINK_PARAMETERS) * model.n)
     if weights.shape != (len(q), *shape):
         raise FlexcalError(
             f"weights have shape {weights.shape}; give one for every entry of W: {(len(q), *shape)}."

@@ -1,9 +1,9 @@
-from .closed_loop import closed_loop_motion, drive_pull, multisine_torque, strain_power
+from .closed_loop import closed_loop_motion, drive_stretch, multisine_torque, strain_power
 from .elastic_arm import ElasticArm
-from .flexible_torque import periodic_torque, spring_load, yielding_torque
+from .flexible_torque import flexible_joint_torque, periodic_torque, spring_load
 from .linearisation import Linearisation, linearise
-from .motor_impedance import KNOT_OCTAVES, friction_shifts, over_frequency
-from .sensor_flatness import flatness_shifts
+from .motor_impedance import KNOT_OCTAVES, friction_response_change, over_frequency
+from .sensor_flatness import sensitivity_response_change
 from .sensor_outputs import sensor_frame
 from .transfer_matrices import transfer_matrix
 
@@ -12,16 +12,16 @@ __all__ = [
     "ElasticArm",
     "Linearisation",
     "closed_loop_motion",
-    "drive_pull",
-    "flatness_shifts",
-    "friction_shifts",
+    "drive_stretch",
+    "flexible_joint_torque",
+    "friction_response_change",
     "linearise",
     "multisine_torque",
     "over_frequency",
     "periodic_torque",
+    "sensitivity_response_change",
     "sensor_frame",
     "spring_load",
     "strain_power",
     "transfer_matrix",
-    "yielding_torque",
 ]

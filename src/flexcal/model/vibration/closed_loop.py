@@ -24,7 +24,7 @@ def closed_loop_motion(
     return np.linalg.solve(dynamics, np.broadcast_to(forces, (len(s), *forces.shape)))
 
 
-def drive_pull(robot: RobotModel, system: Linearisation) -> np.ndarray:
+def drive_stretch(robot: RobotModel, system: Linearisation) -> np.ndarray:
     """Direction (E + d, E) in which each drive's spring is stretched: its twist less its motor."""
     driven = {joint.index for joint in robot.driven}
     twists = [
@@ -42,7 +42,7 @@ def strain_power(
     """Mean square (L, E, E) of the torque in each elastic drive's spring by a cosine of 1 N m added to each motor (last)."""
     stiffness = np.array([joint.stiffness[2] for joint in robot.driven])
     moved = closed_loop_motion(system, frequencies_hz, kp, kd)
-    return 0.5 * np.abs(stiffness[:, None] * (drive_pull(robot, system).T @ moved)) ** 2
+    return 0.5 * np.abs(stiffness[:, None] * (drive_stretch(robot, system).T @ moved)) ** 2
 
 
 def multisine_torque(

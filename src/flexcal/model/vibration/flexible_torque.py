@@ -21,7 +21,7 @@ def periodic_torque(
 ) -> np.ndarray:
     """Torque (N, n), N m, at each motor for the arm beyond it, at N even samples of one `period` (s) of a motion of the motors.
 
-    As `yielding_torque`, with exact derivatives.
+    As `flexible_joint_torque`, with exact derivatives.
     """
     omega = 2j * np.pi / period * np.arange(len(q) // 2 + 1)[:, None]
 
@@ -29,10 +29,10 @@ def periodic_torque(
         lines = np.fft.rfft(bent, axis=0)
         return np.array([np.fft.irfft(lines * omega**order, n=len(q), axis=0) for order in range(3)])
 
-    return yielding_torque(model, q, dq, ddq, derivatives, payload)
+    return flexible_joint_torque(model, q, dq, ddq, derivatives, payload)
 
 
-def yielding_torque(
+def flexible_joint_torque(
     model: RobotModel,
     q: np.ndarray,
     dq: np.ndarray,
@@ -63,7 +63,9 @@ def spring_load(
     derivatives: Callable[[np.ndarray], np.ndarray],
     payload: float | None = None,
 ) -> np.ndarray:
-    """Torque (N, d), N m, of the arm on every spring, in the order of `elastic_axes`, gaps closed; arguments as of `yielding_torque`."""
+    """Torque (N, d), N m, of the arm on every spring, in the order of `elastic_axes`, gaps closed; arguments as of
+    `flexible_joint_torque`.
+    """
     arm = ElasticArm(model, payload)
     return -_loads(model, arm, (q, dq, ddq), derivatives, 2, None)[:, arm.elastic]
 
@@ -76,7 +78,7 @@ def _loads(
     passes: int,
     flanks: np.ndarray | None,
 ) -> np.ndarray:
-    """Torque (N, d + n) at every coordinate of the arm, as `yielding_torque` has it."""
+    """Torque (N, d + n) at every coordinate of the arm, as `flexible_joint_torque` has it."""
     import pinocchio as pin
 
     axes, count = elastic_axes(model), len(motion[0])

@@ -8,10 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.model.robot import INERTIALS, SPRINGS, ArmSensor, RobotModel
-from flexcal.model.statics import Equilibrium, elastic_axes, static_equilibrium, tangent_ratio, twist_of
+from flexcal.model.robot import MASS_AND_COM, SPRINGS, ArmSensor, RobotModel
+from flexcal.model.statics import (
+    Equilibrium,
+    elastic_axes,
+    static_equilibrium,
+    tangent_ratio,
+    twist_from_torque,
+)
 from flexcal.model.vibration.elastic_arm import ElasticArm, moved_inertia
-from flexcal.model.vibration.sensor_outputs import SensedRows, sensed_rows
+from flexcal.model.vibration.sensor_outputs import SensorOutputs, assemble_sensor_outputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,7 +35,7 @@ class Linearisation:
     damping: np.ndarray
     stiffness: np.ndarray
     derivatives: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
-    sensed: SensedRows | None = None
+    sensed: SensorOutputs | None = None
 
     @property
     def inputs(self) -> int:
@@ -82,7 +88,7 @@ def linearise(
     if derivatives:
         motions = {name: _rest_motion(robot, arm, rest, axes, name) for name in derivatives}
         result = _derivatives(robot, arm, at, rest, axes, springs, derivatives)
-    sensed = sensed_rows(arm, at, sensors, count, motions) if sensors else None
+    sensed = assemble_sensor_outputs(arm, at, sensors, count, motions) if sensors else None
     return Linearisation(tuple(e.name for e in robot.driven), mass, damping, stiffness, result, sensed)
 
 
@@ -157,7 +163,7 @@ def _derivatives(
             unit = np.zeros((size, size))
             unit[r, r] = 1.0
             result[name] = (unit, zero, zero) if key == "rotor_inertia" else (zero, unit, zero)
-        elif key in INERTIALS:
+        elif key in MASS_AND_COM:
             mass, stiffness = _by_inertia(robot, arm, at, owner, key)
             more_mass, more_stiffness = moved(_rest_motion(robot, arm, rest, axes, name))
             result[name] = (widened(mass + more_mass), zero, widened(stiffness + more_stiffness))
@@ -175,7 +181,7 @@ def _rest_motion(
     if key == "stiffness" and spring in SPRINGS:
         axis = (robot.joint_index(joint_name), SPRINGS.index(spring))
         return -rest.compliance[0][:, axes.index(axis)] * _stretch(robot, rest, axis)
-    if key in INERTIALS:
+    if key in MASS_AND_COM:
         return -rest.compliance[0] @ _load_by_inertia(robot, arm, rest, owner, key)
     return np.zeros(len(axes))
 
@@ -183,7 +189,9 @@ def _rest_motion(
 def _twists(robot: RobotModel, rest: Equilibrium) -> np.ndarray:
     """Twist (n,) of the drive springs at rest, rad; 0 for rigid joints."""
     twist, sprung = np.zeros(robot.n), [e.index for e in robot.elastic]
-    twist[sprung] = -twist_of(rest.torque[0, sprung], robot.stiffness[sprung, 2], robot.hardening[sprung])
+    twist[sprung] = -twist_from_torque(
+        rest.torque[0, sprung], robot.stiffness[sprung, 2], robot.hardening[sprung]
+    )
     return twist
 
 

@@ -8,7 +8,7 @@ KNOT_OCTAVES = 0.5
 """Octaves between the knots of a change that varies over frequency."""
 
 
-def friction_shifts(
+def friction_response_change(
     response: np.ndarray, frequencies_hz: np.ndarray, size: np.ndarray, octave: float
 ) -> np.ndarray:
     """∂G (L, m, E, k) by friction impedances `size` (E,) N m s/rad at each knot, real and imaginary: -G e eᵀ G / jω.

@@ -10,7 +10,7 @@ from flexcal.model.robot import ArmSensor
 from flexcal.model.vibration.motor_impedance import KNOT_OCTAVES, over_frequency
 
 
-def flatness_shifts(
+def sensitivity_response_change(
     response: np.ndarray,
     frequencies_hz: np.ndarray,
     sensors: Sequence[ArmSensor],

@@ -12,7 +12,7 @@ from flexcal.model.vibration.elastic_arm import ElasticArm
 
 
 @dataclass(frozen=True, eq=False)
-class SensedRows:
+class SensorOutputs:
     """Readings y = (s^order motion + tilt) x of S sensors, by the displacements x of rotors and elastic coordinates.
 
     `motion`, `tilt` (S, E + d); `order` (S,). `derivatives` maps a parameter name to (∂motion, ∂tilt), which come from the motion of the
@@ -37,13 +37,13 @@ class SensedRows:
         return s[:, None, None, None] ** self.order[:, None, None] * motion + tilt
 
 
-def sensed_rows(
+def assemble_sensor_outputs(
     arm: ElasticArm,
     at: np.ndarray,
     sensors: Sequence[ArmSensor],
     rotors: int,
     motions: Mapping[str, np.ndarray],
-) -> SensedRows:
+) -> SensorOutputs:
     """The rows of `sensors` for an arm in the configuration `at`, behind `rotors` coordinates.
 
     `motions` (d,) by name say how the elastic coordinates of the rest position move with a parameter. With the axes a of revolute elastic
@@ -74,7 +74,7 @@ def sensed_rows(
             moved[name][0][row, rotors:] = by @ shift
             if sensor.feels_gravity:
                 moved[name][1][row, rotors:] = by_tilt @ shift
-    return SensedRows(motion, tilt, np.array([s.order for s in sensors], dtype=int), moved)
+    return SensorOutputs(motion, tilt, np.array([s.order for s in sensors], dtype=int), moved)
 
 
 def sensor_frame(

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.model.vibration.linearisation import Linearisation
-from flexcal.model.vibration.sensor_outputs import SensedRows
+from flexcal.model.vibration.sensor_outputs import SensorOutputs
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +76,7 @@ def _derivatives(
 
 def _sensed_derivatives(
     system: Linearisation,
-    sensed: SensedRows,
+    sensed: SensorOutputs,
     names: tuple[str, ...],
     s: np.ndarray,
     moved: np.ndarray,

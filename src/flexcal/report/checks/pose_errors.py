@@ -99,7 +99,7 @@ def check_claimed_uncertainty(prediction: Mapping[str, Any] | None) -> Check:
 
 
 def check_error_budget(
-    estimate: Estimate, variances: Mapping[str, float | None], *, hardly_fits: bool
+    estimate: Estimate, variances: Mapping[str, float | None], *, is_implausible: bool
 ) -> Check:
     """Whether the residuals of the geometry are noise of instrument and robot; `variances` is that of results.json."""
     question = "Are the residuals noise of instrument and robot?"
@@ -112,7 +112,7 @@ def check_error_budget(
     answer = (
         f"Standard deviation of a coordinate: {said}robot {robot:.3f}{with_}, model error {model:.3f} mm."
     )
-    if hardly_fits:
+    if is_implausible:
         return Check(question, f"No: the data do not fit this robot. {answer}", "bad")
     if model > np.hypot(instrument or 0.0, robot):
         return Check(
@@ -259,7 +259,7 @@ def check_known_points(uncalibrated: Sequence[str]) -> Check:
     )
 
 
-def check_moved(proposed: Mapping[str, Any]) -> Check:
+def check_setup_unchanged(proposed: Mapping[str, Any]) -> Check:
     """Of what would leave less than half of the errors if placed again, as results.json has it under `refit_proposed`."""
     what = " and ".join(
         {"station": "instrument", "point": "measured point"}[name] for name in proposed["what"]

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.calibration.fit import TOLERANCE
-from flexcal.calibration.term_selection import ConsideredTerm
+from flexcal.calibration.term_selection import TermComparison
 from flexcal.estimation import Estimate
 from flexcal.report.layout import (
     AXIS,
@@ -202,7 +202,7 @@ def correlation_map(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
     return figure
 
 
-def term_scores(rows: Sequence[ConsideredTerm], by: str = "folds") -> go.Figure:
+def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> go.Figure:
     """Mean error (mm) on left-out poses by term: of whole "folds" in measuring order and in the workspace, or of single "poses"."""
     rows = [row for row in rows if np.isfinite(row.order)]
     labels = [term_label(row) for row in rows]
@@ -227,7 +227,7 @@ def term_scores(rows: Sequence[ConsideredTerm], by: str = "folds") -> go.Figure:
     return figure
 
 
-def term_label(row: ConsideredTerm) -> str:
+def term_label(row: TermComparison) -> str:
     """The base terms, or what a term adds to them."""
     if row.term is None:
         return " + ".join(row.terms)

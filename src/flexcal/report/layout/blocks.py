@@ -43,7 +43,7 @@ class Fact:
 
 
 @dataclass(frozen=True)
-class Rung:
+class ErrorRange:
     """A range of errors on the first screen's scale: mean, 90th percentile and maximum in metres (nan where unknown)."""
 
     label: str
@@ -61,7 +61,7 @@ class Verdict:
     headline: str
     sentence: str
     facts: tuple[Fact, ...]
-    rungs: tuple[Rung, ...]
+    rungs: tuple[ErrorRange, ...]
     rungs_caption: str
     checks: tuple[Check, ...]
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from flexcal.report.layout.blocks import Rung
+from flexcal.report.layout.blocks import ErrorRange
 from flexcal.report.layout.notation import millimetres
 from flexcal.units import MILLIMETRE
 
@@ -15,7 +15,7 @@ from flexcal.units import MILLIMETRE
 class Step:
     """A rung with its places on the scale, in percent of the width; None where a number is not known."""
 
-    rung: Rung
+    rung: ErrorRange
     start: float
     width: float
     mean: float | None
@@ -25,18 +25,18 @@ class Step:
 
 
 @dataclass(frozen=True)
-class Ladder:
+class ErrorAxis:
     """Steps, and the scale's ticks as (percent, label)."""
 
     steps: tuple[Step, ...]
     ticks: tuple[tuple[float, str], ...]
 
 
-def ladder(rungs: Sequence[Rung]) -> Ladder:
+def ladder(rungs: Sequence[ErrorRange]) -> ErrorAxis:
     """Place rungs on a log scale from the decade below the smallest to that above the largest."""
     values = [v / MILLIMETRE for r in rungs for v in (r.mean, r.p90, r.maximum) if math.isfinite(v) and v > 0]
     if not values:
-        return Ladder((), ())
+        return ErrorAxis((), ())
     low = _tick_below(min(values))
     high = _tick_above(max(values))
 
@@ -58,7 +58,7 @@ def ladder(rungs: Sequence[Rung]) -> Ladder:
     sparse = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
     if len(sparse) > 7:
         sparse = [t for t in sparse if f"{t:e}".startswith("1")]
-    return Ladder(
+    return ErrorAxis(
         tuple(steps), tuple((100 * math.log(t / low) / math.log(high / low), f"{t:g}") for t in sparse)
     )
 

@@ -28,7 +28,7 @@ from flexcal.report.layout import (
     significant,
     write_page,
 )
-from flexcal.report.sections import before_table, provenance_section
+from flexcal.report.sections import provenance_section, uncalibrated_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -207,7 +207,7 @@ def _observed(study: MapStudy) -> Section:
     blocks: tuple[Block, ...] = (
         Table("table-scale", "Observed against predicted errors", ("", ""), rows),
         Text((_UP_ONLY,)),
-        before_table(study.results["before"]),
+        uncalibrated_table(study.results["before"]),
         FigureBlock(
             "figure-predicted",
             "Observed against predicted errors",

@@ -38,14 +38,13 @@ from flexcal.report.layout import (
     write_page,
 )
 from flexcal.report.pages.two_stage import HEADLINES
-from flexcal.report.results import Determined
+from flexcal.report.results import IdentifiableParameters
 from flexcal.report.sections import (
     BEFORE_NOTE,
     arm_figure,
-    before_rows,
-    before_rungs,
     budget_table,
     error_figures,
+    headline_facts,
     identifiability_blocks,
     parameter_figures,
     parameter_table,
@@ -53,7 +52,8 @@ from flexcal.report.sections import (
     residuals_section,
     rung,
     terms_section,
-    three_facts,
+    uncalibrated_ranges,
+    uncalibrated_rows,
 )
 from flexcal.units import MILLIMETRE
 
@@ -73,9 +73,9 @@ class CalibrationStudy:
     loads: GravityLoads | None = None
 
 
-def determined(results: Mapping[str, Any]) -> Determined:
+def determined(results: Mapping[str, Any]) -> IdentifiableParameters:
     """Parameters of the calibrated model."""
-    return Determined.stored(results["identifiability"]["selected"])
+    return IdentifiableParameters.stored(results["identifiability"]["selected"])
 
 
 def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
@@ -124,7 +124,7 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     before, after = study.points.before, study.points.statistics(CALIBRATED)
     checks = calibration_checks(study.results, study.estimate, study.points)
     trust = Trust(checks)
-    rungs = before_rungs(study.points)
+    rungs = uncalibrated_ranges(study.points)
     if RIGID in study.points.errors:
         rungs.append(rung("rigid geometry", study.points.statistics(RIGID), "rigid"))
     rungs.append(rung("calibrated", after, "elastic"))
@@ -133,7 +133,7 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
         HEADLINES[trust.status],
         f"{_was(before)}At the same {after.poses} points the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
         f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
-        three_facts(before, after, trust, "points of the fit"),
+        headline_facts(before, after, trust, "points of the fit"),
         tuple(rungs),
         f"Error of the robot at the {after.poses} measured points",
         checks,
@@ -161,9 +161,9 @@ def calibration_checks(
     share = 1.0 if validated is None else validated["parameters"] / (3 * errors.poses)
     return (
         check_left_out(errors.mean, left_out, share).named("left_out", independent=True),
-        check_error_budget(estimate, results["variances"], hardly_fits=results["fit"]["hardly_fits"]).named(
-            "residual"
-        ),
+        check_error_budget(
+            estimate, results["variances"], is_implausible=results["fit"]["is_implausible"]
+        ).named("residual"),
         check_rank(found.parameters, found.rank, found.gap).named("rank"),
         check_drift(results["drift"]).named("drift"),
         check_outliers(len(estimate.outliers), errors).named("outliers"),
@@ -180,7 +180,7 @@ def _stage_one_checks(stage_one: Mapping[str, Any] | None) -> tuple[Check, ...]:
 def _accuracy_section(study: CalibrationStudy) -> Section:
     points, seen = study.points, study.results["identifiability"]
     ranks = {RIGID: str(seen["rank"]), CALIBRATED: str(seen["selected"]["rank"])}
-    rows = [(*row, NOTHING) for row in before_rows(points)]
+    rows = [(*row, NOTHING) for row in uncalibrated_rows(points)]
     for model, label in _LABELS.items():
         if model in points.errors:
             statistics = points.statistics(model)

@@ -13,7 +13,7 @@ import numpy as np
 from flexcal.files.transaction import write_text
 from flexcal.report.checks import verdict_answer
 from flexcal.report.layout import LIGHT, NOTHING, document_millimetres, significant, templates
-from flexcal.report.results import Particulars
+from flexcal.report.results import MeasurementDetails
 from flexcal.units import MILLIMETRE
 
 _WIDTH, _ROW = 640.0, 34.0
@@ -27,7 +27,7 @@ class CertificateStudy:
     results: Mapping[str, Any]
     before: np.ndarray
     after: np.ndarray
-    particulars: Particulars
+    particulars: MeasurementDetails
 
 
 def write_certificate(path: Path, study: CertificateStudy) -> None:

@@ -23,7 +23,7 @@ from flexcal.report.layout import (
     templates,
 )
 from flexcal.report.pages.certificate import error_strip
-from flexcal.report.results import Particulars
+from flexcal.report.results import MeasurementDetails
 from flexcal.report.sections import BEFORE
 
 _MARKS = {"good": "✓", "care": "!", "bad": "✗", "unknown": "?"}
@@ -40,7 +40,7 @@ class CustomerStudy:
     points: MeasuredPoints
     trust: Trust
     files: Mapping[str, str]
-    particulars: Particulars
+    particulars: MeasurementDetails
 
     @property
     def verified(self) -> bool:

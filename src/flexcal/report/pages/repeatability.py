@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.accuracy import CYCLES, VISITS_A_SET, PoseRepeatability
+from flexcal.calibration.accuracy import CYCLES, VISITS_PER_SET, PoseRepeatability
 from flexcal.data.poses import PoseSet
 from flexcal.report.figures import pose_courses, residual_trend
 from flexcal.report.layout import (
@@ -179,7 +179,7 @@ def _drift_section(drift: Mapping[str, Any]) -> Section:
         for item in drift["each"]
     )
     sentences = [
-        f"The visits to each pose are divided into consecutive sets of {VISITS_A_SET} or more. dAP and dRP are the changes of AP and RP "
+        f"The visits to each pose are divided into consecutive sets of {VISITS_PER_SET} or more. dAP and dRP are the changes of AP and RP "
         "from the first set to the last. AP may stay constant while the barycentre moves about the command: the displacement is "
         "the distance "
         "between the barycentres of the first and the last set, tested by Hotelling's two-sample test (significant: p < 0.0027).",

@@ -17,20 +17,30 @@ from flexcal.report.checks import (
     check_springs,
     check_truth,
 )
-from flexcal.report.layout import TRUTH, Check, Page, Rung, Status, Verdict, millimetres, ratio, write_page
+from flexcal.report.layout import (
+    TRUTH,
+    Check,
+    ErrorRange,
+    Page,
+    Status,
+    Verdict,
+    millimetres,
+    ratio,
+    write_page,
+)
 from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections import (
-    before_rungs,
     common_origin,
     comparison_section,
     coverage,
     geometry_section,
+    headline_facts,
+    link_inertials_section,
     provenance_section,
     residuals_section,
     rung,
-    stage_zero_section,
     stiffness_section,
-    three_facts,
+    uncalibrated_ranges,
     verification_section,
 )
 
@@ -55,7 +65,7 @@ def write_two_stage_report(path: str | Path, study: TwoStageStudy) -> None:
 
 def two_stage_page(study: TwoStageStudy) -> Page:
     """The page before it becomes HTML."""
-    before, results, points = stage_zero_section(study), study.results, study.points
+    before, results, points = link_inertials_section(study), study.results, study.points
     return Page(
         title=f"{results['robot']}: calibration report",
         subtitle=f"Two-stage calibration with elastic drives and bearings · {_ROBOTS[results['cell']]} · seed {results['seed']}",
@@ -92,7 +102,7 @@ def two_stage_verdict(study: TwoStageStudy) -> Verdict:
         trust.status,
         HEADLINES[trust.status],
         sentence,
-        three_facts(before, after, trust, "poses"),
+        headline_facts(before, after, trust, "poses"),
         _rungs(study),
         f"Error of the tool on {after.poses} poses that were not used for the fit, as the tracker reads them",
         (*checks, *truth_checks(study)),
@@ -103,13 +113,13 @@ def two_stage_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     """The checks behind the verdict: those that a real robot would have too."""
     found, geometry, determined, fresh = study.stiffness, study.geometry, study.determined, study.verification
     stiffness, damping = study.springs("stiffness"), study.springs("damping")
-    bad_data = study.results["calibration_fit"]["hardly_fits"]
+    bad_data = study.results["calibration_fit"]["is_implausible"]
     return (
         check_fresh_poses(study.points.statistics(CALIBRATED), fresh.all).named(
             "fresh_poses", independent=True
         ),
         check_claimed_uncertainty(study.results["prediction"]).named("claimed_uncertainty", independent=True),
-        check_error_budget(geometry, study.results["variances"], hardly_fits=bad_data).named("residual"),
+        check_error_budget(geometry, study.results["variances"], is_implausible=bad_data).named("residual"),
         check_responses(found),
         check_drift(study.results["calibration_fit"]["drift"]).named("drift"),
         check_springs(found, stiffness, damping).named("springs"),
@@ -129,9 +139,9 @@ def truth_checks(study: TwoStageStudy) -> tuple[Check, ...]:
     return (check_truth(covered, total).named(TRUTH),) if total else ()
 
 
-def _rungs(study: TwoStageStudy) -> tuple[Rung, ...]:
+def _rungs(study: TwoStageStudy) -> tuple[ErrorRange, ...]:
     paper = study.paper
-    rungs = before_rungs(study.fresh)
+    rungs = uncalibrated_ranges(study.fresh)
     rungs += [rung(f"rigid, {fit.poses} poses", fit.errors, "rigid") for fit in study.rigid]
     if paper is not None and paper.rigid is not None:
         rungs.append(rung("paper: rigid, hardware", paper.rigid, "published"))

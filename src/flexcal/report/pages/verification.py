@@ -15,7 +15,7 @@ from flexcal.report.checks import (
     check_enough,
     check_flanks,
     check_known_points,
-    check_moved,
+    check_setup_unchanged,
     check_unseen,
 )
 from flexcal.report.figures import ErrorSeries, error_distribution, predicted_quantiles, verification_errors
@@ -39,12 +39,12 @@ from flexcal.report.layout import (
 from flexcal.report.sections import (
     BEFORE_NOTE,
     arm_figure,
-    before_rows,
-    before_rungs,
+    headline_facts,
     provenance_section,
     residual_blocks,
     rung,
-    three_facts,
+    uncalibrated_ranges,
+    uncalibrated_rows,
 )
 
 _HEADLINES: dict[Status, str] = {
@@ -107,8 +107,8 @@ def _verdict(study: VerificationStudy) -> Verdict:
         _HEADLINES[trust.status],
         f"At {after.poses} {noun} errors of the calibrated model have a P90 of {millimetres(after.p90)} mm and a maximum of "
         f"{millimetres(after.max)} mm. The instrument's noise is included.{_refitted(study.results)}",
-        three_facts(before, after, trust, "points"),
-        (*before_rungs(study.points), rung("calibrated", after, "elastic")),
+        headline_facts(before, after, trust, "points"),
+        (*uncalibrated_ranges(study.points), rung("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} {noun}, against the instrument",
         checks,
     )
@@ -139,7 +139,11 @@ def verification_checks(results: Mapping[str, Any], points: MeasuredPoints) -> t
             if results.get("uncalibrated_points")
             else ()
         ),
-        *((check_moved(results["refit_proposed"]).named("moved"),) if results.get("refit_proposed") else ()),
+        *(
+            (check_setup_unchanged(results["refit_proposed"]).named("moved"),)
+            if results.get("refit_proposed")
+            else ()
+        ),
     )
 
 
@@ -148,7 +152,7 @@ def _errors_section(study: VerificationStudy) -> Section:
     series = [ErrorSeries("calibrated", ELASTIC, result.errors)]
     refit = study.results.get("refit")
     label = f"calibrated, {' and '.join(refit['what'])} refitted (leave-one-out)" if refit else "calibrated"
-    rows = before_rows(study.points)
+    rows = uncalibrated_rows(study.points)
     if refit and (block := study.results["verification"].get("as_calibrated")):
         stands = ErrorStatistics.of_millimetres(block)
         rows.append(("calibrated, nothing refitted", str(stands.poses), *statistics_cells(stands)))

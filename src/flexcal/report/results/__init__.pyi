@@ -1,7 +1,7 @@
 from .fitted_response import FittedResponse, fitted_responses
-from .identifiability import Determined
-from .measured_response import MeasuredResponse, in_words, relative_to_diagonal
-from .particulars import NOT_GIVEN, Particulars
+from .identifiability import IdentifiableParameters
+from .measured_response import MeasuredResponse, relative_to_diagonal, uncertainty_sentence
+from .particulars import NOT_GIVEN, MeasurementDetails
 from .published_values import TX90L_PAPER, Publication
 from .run_significance import LEVEL, ParameterChanges, parameter_changes
 from .runs import Comparison, Run
@@ -12,16 +12,16 @@ __all__ = [
     "NOT_GIVEN",
     "TX90L_PAPER",
     "Comparison",
-    "Determined",
     "FittedResponse",
+    "IdentifiableParameters",
     "MeasuredResponse",
+    "MeasurementDetails",
     "ParameterChanges",
-    "Particulars",
     "Publication",
     "Run",
     "TwoStageStudy",
     "fitted_responses",
-    "in_words",
     "parameter_changes",
     "relative_to_diagonal",
+    "uncertainty_sentence",
 ]

@@ -12,7 +12,7 @@ from flexcal.estimation import Dropped
 
 
 @dataclass(frozen=True, eq=False)
-class Determined:
+class IdentifiableParameters:
     """Which of so many `parameters` are determined.
 
     `singular_values` and `diagonal` (of R) are relative to the largest; `gap` in decades; `weak` names the weakest directions that are
@@ -28,7 +28,7 @@ class Determined:
     weak: tuple[tuple[str, float], ...]
 
     @classmethod
-    def stored(cls, block: Mapping[str, Any]) -> Determined:
+    def stored(cls, block: Mapping[str, Any]) -> IdentifiableParameters:
         """From the block of results.json."""
         dropped = tuple(
             Dropped(item["name"], tuple((by["name"], by["coefficient"]) for by in item["absorbed_by"]))

@@ -47,7 +47,7 @@ def relative_to_diagonal(std: np.ndarray, response: np.ndarray) -> np.ndarray:
     return np.diagonal(std, axis1=1, axis2=2) / np.abs(np.diagonal(response, axis1=1, axis2=2))
 
 
-def in_words(responses: Sequence[MeasuredResponse]) -> str:
+def uncertainty_sentence(responses: Sequence[MeasuredResponse]) -> str:
     """How large the standard deviations are, at the median line of the diagonal, for those who cannot see a figure of them."""
     first = responses[0]
     share, noise = (

@@ -1,4 +1,4 @@
-"""Particulars of a measurement, for the sheets that a customer gets."""
+"""Details of a measurement, for the sheets that a customer gets."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 
 
 @dataclass(frozen=True)
-class Particulars:
+class MeasurementDetails:
     """Robot, instrument, operator and date of a measurement; an empty one leaves a line to fill in by hand."""
 
     robot_serial: str = ""
@@ -21,4 +21,4 @@ class Particulars:
         return [(label, getattr(self, name)) for name, label in labels.items()]
 
 
-NOT_GIVEN = Particulars()
+NOT_GIVEN = MeasurementDetails()

@@ -13,7 +13,7 @@ from flexcal.data.plans import MultisinePlan
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
 from flexcal.report.results.fitted_response import FittedResponse
-from flexcal.report.results.identifiability import Determined
+from flexcal.report.results.identifiability import IdentifiableParameters
 from flexcal.report.results.published_values import Publication
 
 
@@ -61,9 +61,9 @@ class TwoStageStudy:
         return self.estimates["calibration"]
 
     @property
-    def determined(self) -> Determined:
+    def determined(self) -> IdentifiableParameters:
         """What the points of stage 2 determine."""
-        return Determined.stored(self.results["identifiability"])
+        return IdentifiableParameters.stored(self.results["identifiability"])
 
     @property
     def kept(self) -> tuple[str, ...]:

@@ -1,11 +1,11 @@
 from .base_parameters import base_parameters_section
-from .first_screen import rung, three_facts
+from .first_screen import headline_facts, rung
 from .friction import friction_section
 from .geometry import arm_figure, error_figures, geometry_section
 from .headline_numbers import comparison_section
 from .identifiability import identifiability_blocks
 from .learned_residual import learned_section
-from .link_inertials import stage_zero_section
+from .link_inertials import link_inertials_section
 from .parameters import coverage, parameter_figures, parameter_table
 from .provenance import common_origin, input_files, provenance_section
 from .residuals import residual_blocks, residuals_section
@@ -15,7 +15,7 @@ from .signal_processing import signals_table
 from .springs import hardening_sentence, spring_table, unseen_springs
 from .stiffness import response_blocks, stiffness_section
 from .torques import recording_labels, torque_blocks
-from .uncalibrated import BEFORE, BEFORE_NOTE, before_rows, before_rungs, before_table
+from .uncalibrated import BEFORE, BEFORE_NOTE, uncalibrated_ranges, uncalibrated_rows, uncalibrated_table
 from .uncertainty_budget import budget_table
 from .verification import verification_section
 
@@ -24,9 +24,6 @@ __all__ = [
     "BEFORE_NOTE",
     "arm_figure",
     "base_parameters_section",
-    "before_rows",
-    "before_rungs",
-    "before_table",
     "budget_table",
     "common_origin",
     "comparison_section",
@@ -35,10 +32,12 @@ __all__ = [
     "friction_section",
     "geometry_section",
     "hardening_sentence",
+    "headline_facts",
     "identifiability_blocks",
     "input_files",
     "learned_section",
     "levels_block",
+    "link_inertials_section",
     "parameter_figures",
     "parameter_table",
     "provenance_section",
@@ -49,11 +48,12 @@ __all__ = [
     "rung",
     "signals_table",
     "spring_table",
-    "stage_zero_section",
     "stiffness_section",
     "terms_section",
-    "three_facts",
     "torque_blocks",
+    "uncalibrated_ranges",
+    "uncalibrated_rows",
+    "uncalibrated_table",
     "unseen_springs",
     "verification_section",
 ]

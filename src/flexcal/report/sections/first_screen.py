@@ -6,10 +6,10 @@ from typing import Literal
 
 from flexcal.calibration.error_model import ErrorStatistics
 from flexcal.report.checks import Trust
-from flexcal.report.layout import NOTHING, Fact, Rung, millimetres
+from flexcal.report.layout import NOTHING, ErrorRange, Fact, millimetres
 
 
-def three_facts(
+def headline_facts(
     before: ErrorStatistics | None, after: ErrorStatistics, trust: Trust, noun: str
 ) -> tuple[Fact, ...]:
     """How accurate it was, how accurate it is, and whether it can be trusted; `noun` is poses or points."""
@@ -22,9 +22,9 @@ def three_facts(
 
 def rung(
     label: str, s: ErrorStatistics, kind: Literal["nominal", "rigid", "elastic", "floor", "published"]
-) -> Rung:
+) -> ErrorRange:
     """A rung of the scale from error statistics."""
-    return Rung(label, s.mean, s.p90, s.max, kind)
+    return ErrorRange(label, s.mean, s.p90, s.max, kind)
 
 
 def _fact(question: str, s: ErrorStatistics | None, words: str) -> Fact:

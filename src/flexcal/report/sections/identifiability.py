@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from flexcal.estimation import Dropped
 from flexcal.report.figures import singular_values
 from flexcal.report.layout import Block, FigureBlock, Table, Text
-from flexcal.report.results import Determined, Publication
+from flexcal.report.results import IdentifiableParameters, Publication
 
 _MOST = 4
 
@@ -15,7 +15,7 @@ _NOTHING = 1e-9
 """Amounts (SI) below this are rounding errors of a column that is zero."""
 
 
-def identifiability_blocks(found: Determined, paper: Publication | None) -> tuple[Block, ...]:
+def identifiability_blocks(found: IdentifiableParameters, paper: Publication | None) -> tuple[Block, ...]:
     """The gap, the dropped parameters and the weakest directions that were kept."""
     dropped = found.parameters - found.rank
     words = (
@@ -72,7 +72,7 @@ def _amount(coefficient: float) -> str:
     return "" if text == "1" else "−" if text == "−1" else f"{text} × "
 
 
-def _weak_table(found: Determined) -> Table:
+def _weak_table(found: IdentifiableParameters) -> Table:
     return Table(
         "table-weak",
         "Least determined combinations of the kept parameters",

@@ -25,7 +25,7 @@ from flexcal.report.results import TwoStageStudy
 _UNITS = {"kg": (1.0, "kg"), "m": (1e3, "mm"), "kg m²": (1.0, "kg m²")}
 
 
-def stage_zero_section(study: TwoStageStudy) -> Section | None:
+def link_inertials_section(study: TwoStageStudy) -> Section | None:
     """Gains over CAD and the inertials themselves; None where stage 0 was left out."""
     if study.results["dynamics"] is None:
         return None

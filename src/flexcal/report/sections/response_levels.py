@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from flexcal.report.figures import response_levels
 from flexcal.report.layout import FigureBlock, Selector
-from flexcal.report.results import MeasuredResponse, in_words
+from flexcal.report.results import MeasuredResponse, uncertainty_sentence
 
 
 def levels_block(
@@ -21,6 +21,6 @@ def levels_block(
         "frequencies. Valleys and peaks are antiresonances and resonances of the elastic arm. The lower curves are one standard "
         "deviation of the mean: "
         "noise of the sensors, and distortion by friction and backlash, which repeats with the excitation and is not noise.",
-        in_words(responses),
+        uncertainty_sentence(responses),
         (Selector("Pose", "pose", tuple(labels)),) if len(labels) > 1 else (),
     )

@@ -6,13 +6,13 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexcal.calibration.term_selection import ConsideredTerm
+from flexcal.calibration.term_selection import TermComparison
 from flexcal.report.figures import term_label, term_scores
 from flexcal.report.layout import NOTHING, FigureBlock, Section, Table
 from flexcal.units import MILLIMETRE
 
 
-def terms_section(considered: Sequence[ConsideredTerm], by: str) -> Section:
+def terms_section(considered: Sequence[TermComparison], by: str) -> Section:
     """Every term that was considered, as a table, and what the terms gain, as a figure; `by` says what was left out."""
     rows = []
     for row in considered:

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from flexcal.calibration.verification import DECLARED, NOMINAL, OWN, MeasuredPoints
-from flexcal.report.layout import Rung, Table, document_millimetres, statistics_cells
+from flexcal.report.layout import ErrorRange, Table, document_millimetres, statistics_cells
 from flexcal.report.sections.first_screen import rung
 
 BEFORE = {
@@ -22,7 +22,7 @@ BEFORE_NOTE = (
 )
 
 
-def before_rows(points: MeasuredPoints) -> list[tuple[str, ...]]:
+def uncalibrated_rows(points: MeasuredPoints) -> list[tuple[str, ...]]:
     """Label, number of points, mean, P90 and maximum in mm of all three; dashes where one is not known."""
     rows = []
     for model, label in BEFORE.items():
@@ -32,7 +32,7 @@ def before_rows(points: MeasuredPoints) -> list[tuple[str, ...]]:
     return rows
 
 
-def before_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
+def uncalibrated_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
     """The block `before` of a document as a table."""
     labels = dict(zip(("declared", "registered", "own"), BEFORE.values(), strict=True))
     rows = []
@@ -50,7 +50,7 @@ def before_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
     )
 
 
-def before_rungs(points: MeasuredPoints) -> list[Rung]:
+def uncalibrated_ranges(points: MeasuredPoints) -> list[ErrorRange]:
     """A rung for the best-fit registered robot, and one for the robot's own error, as far as they are known."""
     labels = {NOMINAL: "best-fit registered", OWN: "the robot's own"}
     return [
