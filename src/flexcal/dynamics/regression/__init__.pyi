@@ -11,17 +11,17 @@ from .covariance import (
     score_covariance,
 )
 from .cross_validation import Fold, fold_numbers, folds, prediction_errors, solutions
-from .cutoff_selection import CutoffChoice, LogSegment, choose_cutoff, pieces
+from .cutoff_selection import ContinuousSamples, CutoffChoice, choose_cutoff, pieces
 from .scores import Scores
 from .triangular_factor import TriangularFactor, stacked, triangular
 
 __all__ = [
     "Batch",
     "BatchCovariance",
+    "ContinuousSamples",
     "CutoffChoice",
     "ExperimentSystem",
     "Fold",
-    "LogSegment",
     "RegressionData",
     "Rows",
     "Scores",

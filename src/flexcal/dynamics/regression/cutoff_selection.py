@@ -43,7 +43,7 @@ _RANK = 1e-10
 
 
 @dataclass(frozen=True, eq=False)
-class LogSegment:
+class ContinuousSamples:
     """Samples without gaps, every `time_step` (s): positions `q` (N, n) and `torque` (N, n) of motors and from outside, N m.
 
     `payload` is kg, None where the log does not say.
@@ -65,7 +65,7 @@ class CutoffChoice:
     proposed_error: float
 
 
-def pieces(recordings: Iterable[Recording], samples: int, proposed_hz: float) -> Iterator[LogSegment]:
+def pieces(recordings: Iterable[Recording], samples: int, proposed_hz: float) -> Iterator[ContinuousSamples]:
     """The first so many `samples` of a log between its gaps, at no less than the rate that cut-offs up to the proposed one need."""
     left = samples
     for _, group in groupby(recordings, _between_gaps()):
@@ -81,11 +81,11 @@ def pieces(recordings: Iterable[Recording], samples: int, proposed_hz: float) ->
         if len(both):
             n = q.shape[1]
             payload = None if parts[0].payload is None else float(parts[0].payload[0])
-            yield LogSegment(step * thin.factor, both[:, :n], both[:, n:], payload)
+            yield ContinuousSamples(step * thin.factor, both[:, :n], both[:, n:], payload)
 
 
 def choose_cutoff(
-    model: RobotModel, loads: Sequence[Sequence[LogSegment]], proposed_hz: float
+    model: RobotModel, loads: Sequence[Sequence[ContinuousSamples]], proposed_hz: float
 ) -> CutoffChoice | None:
     """Of cut-offs from the proposed one down, for classic friction; None where the logs are too short for that, or it need not be lowered.
 
@@ -185,7 +185,7 @@ class _Tables:
         model: RobotModel,
         observation: Observation,
         kept: np.ndarray,
-        pieces: Sequence[LogSegment],
+        pieces: Sequence[ContinuousSamples],
         highest_hz: float,
     ) -> None:
         self._model, self._observation, self._kept = model, observation, kept
@@ -257,7 +257,7 @@ class _Tables:
 class _Filters:
     """A piece in the frequency domain: low-pass, differences and decimation are products there."""
 
-    def __init__(self, piece: LogSegment, highest_hz: float) -> None:
+    def __init__(self, piece: ContinuousSamples, highest_hz: float) -> None:
         self._step, count = piece.time_step, len(piece.q)
         self._factor = max(1, int(1.0 / (self._step * highest_hz)))
         self._beyond = min(count - 1, int(_SPAN / self._step))

@@ -2,16 +2,16 @@ from .assignment import ColumnAssignment
 from .excitation_records import ResponseRecords, read_response_records
 from .map_option import apply_map
 from .nominal_consistency import Misfit, check_nominal
-from .recognition import Guess, LeaveOutErrors, guess_columns, reasons_unused
+from .recognition import Guess, UnusedColumn, guess_columns, reasons_unused
 from .rtde_names import TOOL
 
 __all__ = [
     "TOOL",
     "ColumnAssignment",
     "Guess",
-    "LeaveOutErrors",
     "Misfit",
     "ResponseRecords",
+    "UnusedColumn",
     "apply_map",
     "check_nominal",
     "guess_columns",

@@ -10,7 +10,7 @@ from flexcal.data.tables import UNITS, standard_columns
 from flexcal.errors import InputError
 from flexcal.files.structuring import suggestion
 from flexcal.importing.columns.assignment import NUMBERED, ColumnAssignment
-from flexcal.importing.columns.recognition import Guess, LeaveOutErrors, place
+from flexcal.importing.columns.recognition import Guess, UnusedColumn, place
 from flexcal.importing.tables import ForeignTable, parse_name, unit_of
 
 if TYPE_CHECKING:
@@ -74,7 +74,7 @@ def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: 
     taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
     reasons = {left.column: left.why for left in guess.left_out}
     left = tuple(
-        LeaveOutErrors(column, reasons.get(column, "not mapped"))
+        UnusedColumn(column, reasons.get(column, "not mapped"))
         for column in foreign.table.columns
         if column not in taken
     )

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class LeaveOutErrors:
+class UnusedColumn:
     """A column that is not imported, and why."""
 
     column: str
@@ -45,10 +45,10 @@ class Guess:
 
     placed: Mapping[str, ColumnAssignment]
     texts: Mapping[str, str]
-    left_out: tuple[LeaveOutErrors, ...]
+    left_out: tuple[UnusedColumn, ...]
 
 
-def reasons_unused(left_out: Sequence[LeaveOutErrors]) -> list[str]:
+def reasons_unused(left_out: Sequence[UnusedColumn]) -> list[str]:
     """Columns that were left out, grouped by reason."""
     by_reason: dict[str, list[str]] = {}
     for left in left_out:
@@ -129,7 +129,7 @@ def _guess(
 ) -> Guess:
     taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
     left = tuple(
-        LeaveOutErrors(column, reasons.get(column, "not recognised"))
+        UnusedColumn(column, reasons.get(column, "not recognised"))
         for column in foreign.table.columns
         if column not in taken
     )

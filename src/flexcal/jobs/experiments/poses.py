@@ -58,7 +58,7 @@ class DesignedPoses:
 
 
 @dataclass(frozen=True, eq=False)
-class FrequencyPoseSelection:
+class CalibrationPosePlan:
     """A plan of calibration poses, its file, why these, the way through them, and where the robot will work (None: anywhere).
 
     `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `provenance` says what the plan comes from,
@@ -154,7 +154,7 @@ def plan_calibration_poses(
     seed: int = 0,
     command: str = "",
     progress: Progress = silent,
-) -> FrequencyPoseSelection:
+) -> CalibrationPosePlan:
     """Choose `count` poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
 
     The poses are in an order of short moves.
@@ -174,7 +174,7 @@ def plan_calibration_poses(
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)
     plan = replace(design.plan, name="calibration")
     origin = robot_provenance(model, choice.files)
-    result = FrequencyPoseSelection(
+    result = CalibrationPosePlan(
         plan, out, design, curve, way, seed, choice.working, choice.pool, origin, command
     )
     write_pose_plan(out, model, plan, result.document(), choice.working)

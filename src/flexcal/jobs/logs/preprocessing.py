@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from flexcal.data.recordings import Decimation
-from flexcal.dynamics.regression import CutoffChoice, LogSegment, choose_cutoff, pieces
+from flexcal.dynamics.regression import ContinuousSamples, CutoffChoice, choose_cutoff, pieces
 from flexcal.dynamics.signals import JointLog, log_blocks, motion_bandwidth
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
@@ -81,7 +81,7 @@ def _chosen(
     model: RobotModel, logs: Sequence[Path], proposed_hz: float, loaded: Sequence[bool] | None
 ) -> CutoffChoice | None:
     """By cross-validation within the logs of each load."""
-    loads: dict[tuple[bool, float | None], list[LogSegment]] = {}
+    loads: dict[tuple[bool, float | None], list[ContinuousSamples]] = {}
     for number, log in enumerate(logs):
         for piece in pieces(log_blocks(log, model), _SAMPLES // len(logs), proposed_hz):
             load = (bool(loaded and loaded[number]), piece.payload)

@@ -23,8 +23,8 @@ from flexcal.importing.columns import (
     TOOL,
     ColumnAssignment,
     Guess,
-    LeaveOutErrors,
     Misfit,
+    UnusedColumn,
     apply_map,
     check_nominal,
     guess_columns,
@@ -62,7 +62,7 @@ class ImportedFile:
     file: Path
     kind: Literal["poses", "log", "joints"]
     placed: tuple[ColumnAssignment, ...]
-    left_out: tuple[LeaveOutErrors, ...]
+    left_out: tuple[UnusedColumn, ...]
     columns: dict[str, np.ndarray]
     misfit: Misfit | None
     remarks: tuple[str, ...]
@@ -203,14 +203,14 @@ def _kind(
         placed.pop("quaternion")
     what = {"poses": "measured poses", "log": "a log of joints", "joints": "joint positions only"}[kind]
     left = [
-        LeaveOutErrors(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))
+        UnusedColumn(column, reasons.get(quantity, f"it looks like {quantity}, which is no part of {what}"))
         for quantity, item in guess.placed.items()
         if quantity not in placed
         for column in item.columns
     ]
     texts = guess.texts if kind == "poses" else {}
     left += [
-        LeaveOutErrors(column, f"no part of {what}")
+        UnusedColumn(column, f"no part of {what}")
         for name, column in guess.texts.items()
         if name not in texts
     ]
