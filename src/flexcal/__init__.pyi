@@ -1,32 +1,134 @@
+from .calibration.accuracy import AccuracyMap, accuracy_map, repeatability
 from .calibration.fit import Calibration, calibrate
-from .calibration.verification import verify
-from .data.poses import PoseSet, read_poses
-from .data.recordings import Recording
+from .calibration.measurement import predict, register, rigid_motion
+from .calibration.term_selection import select_terms
+from .calibration.verification import Verification, verify
+from .compensation import Compensation, compensate
+from .data.plans import MultisinePlan, PosePlan, TrajectoryPlan, read_plan
+from .data.poses import PoseSet, ToolTargets, read_poses, read_targets
+from .data.recordings import Decimation, Recording, read_recording
+from .design.poses import design_poses, next_poses, random_poses
+from .design.scene import MeasuringSetup
+from .design.trajectories import design_trajectories
+from .dynamics.diagnostics import predict_torques
+from .dynamics.estimators import (
+    direct_and_inverse,
+    energy_least_squares,
+    feasible_least_squares,
+    huber_least_squares,
+    instrumental_variables,
+    kalman_filter,
+    maximum_likelihood,
+    ordinary_least_squares,
+    power_least_squares,
+    total_least_squares,
+    weighted_least_squares,
+)
+from .dynamics.friction import select_friction
+from .dynamics.inertials import identify_with_prior, trajectory_error
+from .dynamics.inverse_model import CLASSIC, BaseParameters, Observation
+from .dynamics.payload import identify_payload
+from .dynamics.regression import experiment_system, observe
+from .dynamics.residual import read_learned_residual
+from .dynamics.signals import JointLog, Window
 from .elasticity.identification import identify_stiffness
 from .errors import FlexcalError, InputError
 from .estimation import Estimate
-from .frequency.periodic import FrequencyResponse, frequency_response
+from .export import write_mjcf, write_urdf
+from .files.formats import read_yaml
+from .frequency.periodic import (
+    FrequencyResponse,
+    frequency_response,
+    frequency_responses,
+    local_polynomial_responses,
+)
+from .jobs.experiments import exciting_plan, frequency_plan
 from .model.kinematics import point_kinematics
+from .model.parts import is_physically_consistent
 from .model.robot import RobotModel
-from .model.statics import static_equilibrium
-from .virtual_cell import VirtualCell
+from .model.statics import gravity_torque, static_equilibrium, tool_at_rest
+from .model.torques import torque_regressor
+from .report.results import fitted_responses
+from .virtual_cell import CellConfig, VirtualCell, draw_truth
 
 __version__: str
+
 __all__ = [
+    "CLASSIC",
+    "AccuracyMap",
+    "BaseParameters",
     "Calibration",
+    "CellConfig",
+    "Compensation",
+    "Decimation",
     "Estimate",
     "FlexcalError",
     "FrequencyResponse",
     "InputError",
+    "JointLog",
+    "MeasuringSetup",
+    "MultisinePlan",
+    "Observation",
+    "PosePlan",
     "PoseSet",
     "Recording",
     "RobotModel",
+    "ToolTargets",
+    "TrajectoryPlan",
+    "Verification",
     "VirtualCell",
+    "Window",
+    "accuracy_map",
     "calibrate",
+    "compensate",
+    "design_poses",
+    "design_trajectories",
+    "direct_and_inverse",
+    "draw_truth",
+    "energy_least_squares",
+    "exciting_plan",
+    "experiment_system",
+    "feasible_least_squares",
+    "fitted_responses",
+    "frequency_plan",
     "frequency_response",
+    "frequency_responses",
+    "gravity_torque",
+    "huber_least_squares",
+    "identify_payload",
     "identify_stiffness",
+    "identify_with_prior",
+    "instrumental_variables",
+    "is_physically_consistent",
+    "kalman_filter",
+    "local_polynomial_responses",
+    "maximum_likelihood",
+    "next_poses",
+    "observe",
+    "ordinary_least_squares",
     "point_kinematics",
+    "power_least_squares",
+    "predict",
+    "predict_torques",
+    "random_poses",
+    "read_learned_residual",
+    "read_plan",
     "read_poses",
+    "read_recording",
+    "read_targets",
+    "read_yaml",
+    "register",
+    "repeatability",
+    "rigid_motion",
+    "select_friction",
+    "select_terms",
     "static_equilibrium",
+    "tool_at_rest",
+    "torque_regressor",
+    "total_least_squares",
+    "trajectory_error",
     "verify",
+    "weighted_least_squares",
+    "write_mjcf",
+    "write_urdf",
 ]
