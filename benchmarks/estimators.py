@@ -12,9 +12,9 @@ import time
 from collections.abc import Iterator
 from pathlib import Path
 
+from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.dynamics.estimators import ESTIMATORS, EstimatorName
 
 EXAMPLE = Path(__file__).parents[1] / "examples" / "tx40"
 HOLD_OUT = 0.3

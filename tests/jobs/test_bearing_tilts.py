@@ -21,9 +21,9 @@ from tilting_robot import (
 )
 
 from flexcal.cli.main import main
+from flexcal.dynamics.estimators import EstimatorName
 from flexcal.errors import InputError
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.dynamics.estimators import EstimatorName
 from flexcal.model.robot import RobotModel
 
 STIFFNESS = {f"{name}.stiffness": value for name, value in BEARING.items()}

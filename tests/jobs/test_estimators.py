@@ -7,9 +7,9 @@ from typing import get_args, get_type_hints
 import pytest
 
 from flexcal.cli.verbs.identify_dynamics import IdentifyDynamics
+from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.dynamics.estimators import ESTIMATORS, EstimatorName
 
 
 def test_the_option_offers_every_estimator() -> None:

@@ -19,9 +19,9 @@ from pushed_robot import (
     pushed_yaml,
 )
 
+from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.errors import InputError
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.model.robot import RobotModel
 
 _NOISE = 0.005

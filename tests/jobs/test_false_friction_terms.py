@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 from planar_arm import Log
 
-from flexcal.jobs.dynamics import RobotDynamics, identify_robot_dynamics
+from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
 
 
-def selected(folder: Path, log: Log, seed: int) -> RobotDynamics:
+def selected(folder: Path, log: Log, seed: int) -> DynamicsIdentification:
     robot, path = log.write(folder, seed, friction="auto")
     (folder / "estimates.yaml").unlink(missing_ok=True)
     return identify_robot_dynamics(robot, [path])

@@ -9,13 +9,13 @@ from scipy.stats import t as student
 
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.signals import Motion
-from flexcal.jobs.dynamics import RobotDynamics, identify_robot_dynamics
+from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
 
 STATES = 40
 LINKS = ("mass", "mc_x", "mc_z", "Iyy", "rotor_inertia", "torque_offset")
 
 
-def inside(found: RobotDynamics, seed: int, log: Log) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def inside(found: DynamicsIdentification, seed: int, log: Log) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Which 95 % intervals hold the truth: of torques and friction torques in a motion of the same kind, and of other base parameters."""
     estimate, observation = found.estimate, found.train.observation
     assert isinstance(observation, Observation)

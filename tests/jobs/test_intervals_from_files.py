@@ -7,11 +7,11 @@ import pytest
 from planar_arm import TRUTH, Log, torque
 from scipy.stats import t as student
 
+from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.signals import Motion
 from flexcal.estimation import Estimate
-from flexcal.jobs.dynamics import RobotDynamics, identify_robot_dynamics
-from flexcal.jobs.dynamics.estimators import EstimatorName
+from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
 
 NOISY_POSITIONS = Log(position_noise=3e-5)
 """The torques are exact: only positions are noisy, and with them velocities and accelerations."""
@@ -19,7 +19,7 @@ LONG_MEMORY = Log(torque_noise=0.5, memory=1.5)
 PERIODS = {"duration": 25.0, "fundamental": 0.2}
 
 
-def inside(found: RobotDynamics) -> tuple[np.ndarray, np.ndarray]:
+def inside(found: DynamicsIdentification) -> tuple[np.ndarray, np.ndarray]:
     """Which 95 % intervals hold the truth: those of base parameters, and those of the torques of forty states."""
     estimate = found.estimate
     hidden = {entry.name for entry in estimate.dropped}
@@ -29,7 +29,7 @@ def inside(found: RobotDynamics) -> tuple[np.ndarray, np.ndarray]:
     return np.array(held), _torques_inside(found, estimate)
 
 
-def _torques_inside(found: RobotDynamics, estimate: Estimate) -> np.ndarray:
+def _torques_inside(found: DynamicsIdentification, estimate: Estimate) -> np.ndarray:
     rng = np.random.default_rng(99)
     q, dq, ddq = (size * rng.uniform(-1, 1, (40, 2)) for size in (2.0, 2.0, 4.0))
     observation = found.train.observation

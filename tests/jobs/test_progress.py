@@ -8,8 +8,8 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from flexcal.dynamics.estimators import EstimatorName
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.dynamics.estimators import EstimatorName
 from flexcal.jobs.experiments import plan_calibration_poses
 
 

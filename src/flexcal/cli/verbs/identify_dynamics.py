@@ -24,7 +24,7 @@ from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
-    from flexcal.jobs.dynamics import RobotDynamics
+    from flexcal.jobs.dynamics import DynamicsIdentification
 
 _SPRINGS = (".drive.stiffness", ".drive.damping", ".bearing_x.", ".bearing_y.")
 _ESTIMATORS = """wls: weighted least squares, every joint and log by its own noise.
@@ -164,7 +164,7 @@ class IdentifyDynamics:
             console.say(f"wrote {self.out / 'report.html'}")
         console.finish(document, self._next(found))
 
-    def _next(self, found: RobotDynamics) -> str:
+    def _next(self, found: DynamicsIdentification) -> str:
         """Payload and frequency responses for an elastic robot; else validation, the payload where one is declared, and then a URDF if the
         inertials are physically consistent."""
         where = estimates_option(self.out)

@@ -2,6 +2,22 @@ from .column_noise import perturbed_logs, regressor_errors
 from .didim import direct_and_inverse
 from .ekf import kalman_filter
 from .energy_model import energy_least_squares
+from .estimator import (
+    DIDIM,
+    EKF,
+    ESTIMATORS,
+    IRLS,
+    IV,
+    ML,
+    OLS,
+    SDP,
+    TLS,
+    WLS,
+    EnergyModel,
+    Estimator,
+    EstimatorName,
+    PowerModel,
+)
 from .feasible import feasible_least_squares
 from .idim_iv import instrumental_variables
 from .irls import huber_least_squares
@@ -16,7 +32,21 @@ from .tls import total_least_squares
 from .wls import noise_levels, weighted_least_squares
 
 __all__ = [
+    "DIDIM",
+    "EKF",
+    "ESTIMATORS",
+    "IRLS",
+    "IV",
+    "ML",
+    "OLS",
+    "SDP",
+    "TLS",
+    "WLS",
+    "EnergyModel",
+    "Estimator",
+    "EstimatorName",
     "InstrumentalFit",
+    "PowerModel",
     "RecordedRows",
     "Unknowns",
     "direct_and_inverse",

@@ -36,7 +36,7 @@ _UNREADABLE = (
 class ArrayForm:
     """What an array has to be: its kind, and per axis an extent or a name; axes of one name are as long in every array of a file.
 
-    Numbers that are not finite are refused, NaN not where `finite` is False; so are numbers beyond `units.LARGEST`.
+    Numbers that are not finite are refused unless `finite` is False; so are numbers beyond `units.LARGEST`.
     """
 
     kind: Kind
@@ -127,7 +127,7 @@ class NpzFile:
                 size = np.abs(array)
             if form.finite and not np.isfinite(size).all():
                 raise self.error(f"holds numbers in '{name}' that are not finite")
-            if float(np.max(size, initial=0.0, where=~np.isnan(size))) > LARGEST:
+            if float(np.max(size, initial=0.0, where=np.isfinite(size))) > LARGEST:
                 raise self.error(f"holds numbers beyond {LARGEST:g} in '{name}'")
         return array
 

@@ -175,6 +175,8 @@ class FrequencyResponse:
                 )
             more = {**sensed, "sensors": tuple(sensed["sensors"].tolist())}
         payload = float(values["payload"])
+        if np.isinf(payload):
+            raise file.error("holds an infinite payload")
         return cls(
             frequencies_hz=values["frequencies_hz"],
             response=values["response"],

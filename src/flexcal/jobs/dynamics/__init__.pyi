@@ -1,10 +1,12 @@
 from .gains import identify_gains
+from .identification import identify_dynamics
 from .inertials import identify_inertials_from_recordings, identify_robot_inertials
 from .job import identify_robot_dynamics
-from .result import RobotDynamics
+from .result import DynamicsIdentification
 
 __all__ = [
-    "RobotDynamics",
+    "DynamicsIdentification",
+    "identify_dynamics",
     "identify_gains",
     "identify_inertials_from_recordings",
     "identify_robot_dynamics",

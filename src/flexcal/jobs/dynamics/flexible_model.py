@@ -7,10 +7,10 @@ from pathlib import Path
 
 import numpy as np
 
+from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.inverse_model import BearingSpring, DriveSpring
 from flexcal.dynamics.signals import log_blocks
 from flexcal.errors import InputError
-from flexcal.jobs.dynamics.estimators import EstimatorName
 from flexcal.model.robot import RobotModel
 
 _LARGEST_TILT = 0.1

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flexcal.dynamics.drives import stiffness_attenuation
+from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
-from flexcal.jobs.dynamics.estimators import EstimatorName
 from flexcal.model.parts import LINK_PARAMETERS
 
 _CLEAR = 5.0

@@ -3,35 +3,50 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
+from html import escape
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
-from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio
+import numpy as np
+
+from flexcal.dynamics.diagnostics import EssentialParameters, ExternalShare, GravityRatio, TorquePrediction
+from flexcal.dynamics.estimators import EstimatorName
 from flexcal.dynamics.friction import FrictionSelection
 from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.residual import LEARNED
 from flexcal.estimation import Estimate
-from flexcal.jobs.dynamics.estimators import EstimatorName
+from flexcal.files.formats import write_estimates
+from flexcal.files.transaction import write_text
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
 from flexcal.jobs.logs import Treatment
-from flexcal.jobs.result_files import dropped_parameters, quantities
+from flexcal.jobs.pages import REPORT, report_folder
+from flexcal.jobs.result_files import (
+    ESTIMATES,
+    dropped_parameters,
+    quantities,
+    write_predictions,
+    write_results,
+)
 from flexcal.model.parts import is_physically_consistent
-from flexcal.model.robot import torque_units
+from flexcal.model.robot import RobotModel, torque_units
 from flexcal.report.checks import Trust
 from flexcal.report.pages import dynamics_checks
 
 
 @dataclass(frozen=True, eq=False)
-class RobotDynamics:
-    """The estimate, how well it predicts the torques it was made from and those it never saw, and where it was written.
+class DynamicsIdentification:
+    """Result of `identify_dynamics`: the estimate, how well it predicts the torques it was made from and those it never saw.
 
     The last share `hold_out` of the time of every log was kept out of the fit, or the logs `validated` were. `motors` are the joints
     whose motors have equations of their own; `signals` are as `preprocessing_document` has them. `weight_faults` are torques unlike the
     links' weight that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was
     accepted. `external` tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what
-    was learned beside the estimate, None where nobody asked for it; `provenance` has all files with their hashes, `command` the command
+    was learned beside the estimate, None where nobody asked for it; `predictions` are those of all logs. `estimates` is the file that it
+    was stored in, None where it was not; `provenance` has all files with their hashes, `command` the command
     line, where there was one.
     """
 
@@ -51,10 +66,65 @@ class RobotDynamics:
     weight_shares: Mapping[str, GravityRatio]
     external: ExternalShare | None
     learned: LearnedDynamics | None
+    predictions: tuple[TorquePrediction, ...]
     seconds: float
-    estimates: Path
-    provenance: Mapping[str, str]
+    estimates: Path | None = None
+    provenance: Mapping[str, str] = field(default_factory=dict)
     command: str = ""
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.train.observation.model.name}: {self._headline}>"
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(self.summary())}</pre>"
+
+    @property
+    def model(self) -> RobotModel:
+        """The robot with the estimate."""
+        return self.train.observation.model.with_estimate(self.estimate)
+
+    @property
+    def residuals(self) -> tuple[np.ndarray, ...]:
+        """Measured minus predicted torques (M, n), N m, of every log, at the times of its prediction."""
+        return tuple(prediction.measured - prediction.predicted for prediction in self.predictions)
+
+    def summary(self) -> str:
+        """What the fit says, for people: errors of the torques, base parameters, remarks, verdict."""
+        document = self.document()
+        rows = [
+            f"{row['name']:<60.60} {row['estimate']:>12.5g} {'':>12} {row['unit']}"
+            if row["std"] is None
+            else f"{row['name']:<60.60} {row['estimate']:>12.5g} ± {row['std']:<10.2g} {row['unit']}"
+            for row in document["base_parameters"]
+        ]
+        return "\n".join(
+            [self._headline, *rows, *document["remarks"], *document["notes"], self.trust.sentence]
+        )
+
+    @property
+    def _headline(self) -> str:
+        percent = self._numbers["error_percent"]
+        unseen = "" if percent["held_out"] is None else f", {percent['held_out']:.2f} % outside it"
+        return (
+            f"{self.estimate.rank} of {self.train.base.rank} base parameters by {self.estimator}, "
+            f"relative torque error {percent['train']:.2f} % in the fit{unseen}"
+        )
+
+    def report(self, path: str | Path) -> Path:
+        """Write the result as one HTML page; returns its path."""
+        path = Path(path)
+        with TemporaryDirectory() as name:
+            folder = Path(name)
+            write_estimates(folder / ESTIMATES, "dynamics", self.estimate)
+            self.write(folder)
+            write_text(path, (folder / REPORT).read_text("utf-8"))
+        return path
+
+    def write(self, folder: Path) -> None:
+        """Leave results.json, predictions.npz and report.html in a folder that has the estimates already."""
+        write_results(folder, self.document())
+        write_predictions(folder, self.predictions)
+        report_folder(folder)
 
     @property
     def bodiless(self) -> tuple[str, ...]:
@@ -116,7 +186,9 @@ class RobotDynamics:
             "essential_parameters": self._essential_parameters(),
             "parameters": quantities(self.estimate),
             "dropped": dropped_parameters(self.estimate.dropped),
-            "learned_residual": None if self.learned is None else self.learned.document(self.estimates),
+            "learned_residual": None
+            if self.learned is None
+            else self.learned.document(self.estimates or Path(LEARNED)),
             "seconds": self.seconds,
             "estimates": self.estimates,
             "provenance": dict(self.provenance),

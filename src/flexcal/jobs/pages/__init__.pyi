@@ -1,8 +1,9 @@
 from .comparison import compare_folders
 from .customer import customer_report
-from .report import report_folder, two_stage_study
+from .report import REPORT, report_folder, two_stage_study
 
 __all__ = [
+    "REPORT",
     "compare_folders",
     "customer_report",
     "report_folder",

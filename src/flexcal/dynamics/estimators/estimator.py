@@ -1,0 +1,190 @@
+"""Estimators of dynamic parameters as objects with one signature."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import ClassVar, Literal, Protocol
+
+from flexcal.dynamics.estimators.column_noise import perturbed_logs, regressor_errors
+from flexcal.dynamics.estimators.didim import direct_and_inverse
+from flexcal.dynamics.estimators.ekf import kalman_filter
+from flexcal.dynamics.estimators.energy_model import energy_least_squares
+from flexcal.dynamics.estimators.feasible import feasible_least_squares
+from flexcal.dynamics.estimators.idim_iv import instrumental_variables
+from flexcal.dynamics.estimators.irls import huber_least_squares
+from flexcal.dynamics.estimators.ols import ordinary_least_squares
+from flexcal.dynamics.estimators.periodic_likelihood import maximum_likelihood
+from flexcal.dynamics.estimators.power_model import power_least_squares
+from flexcal.dynamics.estimators.recorded_rows import RecordedRows
+from flexcal.dynamics.estimators.tls import total_least_squares
+from flexcal.dynamics.estimators.wls import weighted_least_squares
+from flexcal.dynamics.regression import RegressionData
+from flexcal.estimation import Estimate
+
+
+class Estimator(Protocol):
+    """What `identify_dynamics` takes as estimator: a `name` for files and messages, and `fit`."""
+
+    name: ClassVar[EstimatorName]
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """The base parameters, with the covariance that the estimator claims.
+
+        Parameters
+        ----------
+        equations : RegressionData
+            Triangular factors of the regression: enough for estimators that are linear in the torques.
+        rows : RecordedRows
+            The rows that they were made of, log after log, for estimators that need to see them again.
+
+        Returns
+        -------
+        Estimate
+            Values in SI units with their joint covariance.
+
+        Raises
+        ------
+        FlexcalError
+            Where the logs do not determine what the estimator needs.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class OLS:
+    """Ordinary least squares: all equations weigh the same."""
+
+    name: ClassVar[EstimatorName] = "ols"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return ordinary_least_squares(equations)
+
+
+@dataclass(frozen=True)
+class WLS:
+    """Weighted least squares: every joint by the variance of its residuals, which may be correlated in time."""
+
+    name: ClassVar[EstimatorName] = "wls"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return weighted_least_squares(equations)
+
+
+@dataclass(frozen=True)
+class SDP:
+    """Weighted least squares under the constraint that every link is physically consistent, by semidefinite programming (Sousa and
+    Cortesão 2014)."""
+
+    name: ClassVar[EstimatorName] = "sdp"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return feasible_least_squares(equations)
+
+
+@dataclass(frozen=True)
+class IRLS:
+    """Iteratively reweighted least squares with the Huber loss, for logs with outliers."""
+
+    name: ClassVar[EstimatorName] = "irls"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return huber_least_squares(equations, rows)
+
+
+@dataclass(frozen=True)
+class TLS:
+    """Total least squares: the noise of positions in the regressor is estimated and taken into account (Van Huffel and Vandewalle 1991)."""
+
+    name: ClassVar[EstimatorName] = "tls"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return total_least_squares(equations, regressor_errors(rows, perturbed_logs(rows)))
+
+
+@dataclass(frozen=True)
+class IV:
+    """Instrumental variables from the simulated closed loop (Janot, Vandanjon and Gautier 2014)."""
+
+    name: ClassVar[EstimatorName] = "iv"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return instrumental_variables(equations, rows)
+
+
+@dataclass(frozen=True)
+class DIDIM:
+    """Direct and inverse dynamic identification model: from torques alone, by simulation (Gautier, Janot and Vandanjon 2013)."""
+
+    name: ClassVar[EstimatorName] = "didim"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return direct_and_inverse(equations, rows)
+
+
+@dataclass(frozen=True)
+class EnergyModel:
+    """Least squares of the energy balance of the whole robot: without accelerations (Gautier and Khalil 1988)."""
+
+    name: ClassVar[EstimatorName] = "energy"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return energy_least_squares(rows)
+
+
+@dataclass(frozen=True)
+class PowerModel:
+    """Least squares of the power balance of the whole robot, one equation a sample (Gautier 1997)."""
+
+    name: ClassVar[EstimatorName] = "power"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return power_least_squares(rows)
+
+
+@dataclass(frozen=True)
+class ML:
+    """Maximum likelihood for periodic excitation, in the frequency domain (Swevers, Ganseman, Tükel, De Schutter and Van Brussel 1997)."""
+
+    name: ClassVar[EstimatorName] = "ml"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return maximum_likelihood(equations, rows)
+
+
+@dataclass(frozen=True)
+class EKF:
+    """Extended Kalman filter and smoother: states and parameters together (Gautier and Poignet 2001)."""
+
+    name: ClassVar[EstimatorName] = "ekf"
+
+    def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
+        """As `Estimator.fit`."""
+        return kalman_filter(equations, rows)
+
+
+EstimatorName = Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"]
+
+ESTIMATORS: dict[EstimatorName, Estimator] = {
+    "wls": WLS(),
+    "ols": OLS(),
+    "sdp": SDP(),
+    "irls": IRLS(),
+    "iv": IV(),
+    "didim": DIDIM(),
+    "energy": EnergyModel(),
+    "power": PowerModel(),
+    "tls": TLS(),
+    "ml": ML(),
+    "ekf": EKF(),
+}
+"""The estimators by name."""

@@ -1,0 +1,178 @@
+"""Identification of dynamic parameters: a robot model and its joint logs in, an estimate with its predictions out."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from flexcal.data.recordings import Recording, write_recording
+from flexcal.dynamics.diagnostics import ExternalExcess, essential_parameters, external_share, weight_shares
+from flexcal.dynamics.drives import with_backlash, with_nominal_uncertainty
+from flexcal.dynamics.estimators import WLS, Estimator
+from flexcal.dynamics.friction import select_friction
+from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation, SensorOffset
+from flexcal.dynamics.regression import RegressionData
+from flexcal.dynamics.residual import require_scikit_learn
+from flexcal.errors import InputError
+from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
+from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
+from flexcal.jobs.dynamics.result import DynamicsIdentification
+from flexcal.jobs.inputs import require_distinct_files
+from flexcal.jobs.logs import (
+    HoldOutLogs,
+    choose_preprocessing,
+    preprocessing_document,
+    scratch_folder,
+    weight_faults,
+)
+from flexcal.model.robot import RobotModel
+from flexcal.progress import Progress, silent
+
+JointLogs = Sequence[str | Path | Recording]
+_DEFAULT = WLS()
+
+
+def identify_dynamics(
+    model: RobotModel,
+    logs: JointLogs,
+    *,
+    estimator: Estimator = _DEFAULT,
+    hold_out: float = 0.0,
+    validate: JointLogs = (),
+    flexible: bool = False,
+    learn_residual: bool = False,
+    accept_weight: bool = False,
+    jobs: int = 1,
+    progress: Progress = silent,
+) -> DynamicsIdentification:
+    """Fit link inertials, rotor inertias and friction of a robot to joint logs.
+
+    What robot.yaml leaves open is chosen: the cut-off by cross-validation, the friction terms by cross-validation and significance.
+
+    Parameters
+    ----------
+    model : RobotModel
+        Nominal robot, with `model.config.dynamics` as robot.yaml declares it.
+    logs : sequence of path or Recording
+        Joint logs of unloaded motions, as files or in memory. Files are read in blocks and filtered into temporary files, which take
+        96 bytes a sample of six joints, and 48 for their arm sides.
+    estimator : Estimator
+        All but `WLS`, `OLS` and `SDP`, and learning, go through the logs again, in this process alone.
+    hold_out : float
+        Share (0 to 1) at the end of every log that is predicted instead of fitted, with what the filters would carry over.
+    validate : sequence of path or Recording
+        Logs that are predicted instead of fitted.
+    flexible : bool
+        Whether motors and arm of the elastic joints have equations of their own (Eq. 2.22), by logs that have the arm side, and the
+        drives' springs are estimated; friction terms are chosen before that, as if the robot were rigid.
+    learn_residual : bool
+        Whether to learn what the estimate misses of the torques; needs scikit-learn.
+    accept_weight : bool
+        Whether torques unlike the links' weight are accepted, as of balanced arms and guessed masses.
+    jobs : int
+        Number of logs read in parallel, each in its own process.
+    progress : Progress
+        Told of the stages and their shares.
+
+    Returns
+    -------
+    DynamicsIdentification
+        Its `estimate`, `model`, `residuals`, `summary()` and `report(path)`. Where the robot declares a force sensor, its columns are
+        the external torques.
+
+    Raises
+    ------
+    FlexcalError
+        Where the logs do not fit the robot, for a log with a payload, one that is given twice, torques unlike the links' weight; with
+        `learn_residual` for a `flexible` robot or without scikit-learn.
+    """
+    if learn_residual:
+        _require_rigid_and_learnable(flexible)
+    begun = time.perf_counter()
+    with scratch_folder() as folder:
+        files, others = _files(logs, folder, "log"), _files(validate, folder, "validation")
+        require_distinct_files(files, others)
+        springs = require_flexible_drives(model, [*files, *others], estimator.name) if flexible else ()
+        bearings = require_flexible_bearings(model, [*files, *others]) if flexible else ()
+        treatment = choose_preprocessing(model, files, flexible=flexible)
+        divided = HoldOutLogs.read(
+            files,
+            others,
+            hold_out,
+            model,
+            treatment,
+            folder,
+            accept_weight=accept_weight,
+            jobs=jobs,
+            progress=progress,
+        )
+        friction = select_friction(
+            model, model.config.dynamics.friction, divided.equations, treatment.decimation
+        )
+        sensor = model.config.force_sensor
+        shifted = sensor is not None and sensor.offset == "estimated"
+        terms = (*friction.terms, SensorOffset()) if shifted else friction.terms
+        observation = with_backlash(Observation(model, terms, springs, bearings), divided.equations)
+        base = BaseParameters.of(observation)
+        systems = divided.equations(observation)
+        train = RegressionData.of(observation, base, systems)
+        held_out = None
+        if divided.unseen:
+            held_out = RegressionData.of(observation, base, divided.unseen_equations(observation))
+        rows = divided.rows(observation, base)
+        estimate = with_nominal_uncertainty(train, estimator.fit(train, rows))
+        essential = essential_parameters(train, estimate)
+        if friction.spread is not None:
+            estimate = friction.spread.widened(estimate)
+        external = None
+        if model.force_sensor is not None:
+            wide = replace(observation, terms=(*observation.terms, ExternalExcess()))
+            external = external_share(RegressionData.of(wide, base, divided.equations(wide)))
+        learned = None
+        if learn_residual:
+            unseen = divided.unseen_rows(observation, base)
+            learned = LearnedDynamics.of(rows, systems, unseen, estimate, progress)
+        plain = observation if terms == CLASSIC else replace(observation, terms=CLASSIC)
+        return DynamicsIdentification(
+            estimate=estimate,
+            estimator=estimator.name,
+            structural_rank=base.rank if plain is observation else BaseParameters.of(plain).rank,
+            train=train,
+            held_out=held_out,
+            hold_out=hold_out,
+            validated=tuple(others),
+            essential=essential,
+            friction=friction,
+            motors=observation.motors,
+            treatment=treatment,
+            signals=preprocessing_document(treatment, divided.logs),
+            weight_faults=tuple(weight_faults(divided.logs, model)),
+            weight_shares={} if accept_weight else weight_shares(train, estimate),
+            external=external,
+            learned=learned,
+            predictions=tuple(divided.predictions(observation, estimate)),
+            seconds=time.perf_counter() - begun,
+        )
+
+
+def _files(logs: JointLogs, folder: Path, name: str) -> list[Path]:
+    """The logs as files; those in memory are written to `folder`."""
+    files = []
+    for number, log in enumerate(logs, start=1):
+        if isinstance(log, Recording):
+            files.append(folder / f"{name}_{number}.parquet")
+            write_recording(files[-1], log)
+        else:
+            files.append(Path(log))
+    return files
+
+
+def _require_rigid_and_learnable(flexible: bool) -> None:
+    require_scikit_learn()
+    if flexible:
+        raise InputError(
+            "a residual torque is learned for rigid joints, as a function of the motors' states; leave out one of --learn-residual and "
+            "--flexible."
+        )
