@@ -72,7 +72,7 @@ def test_what_was_written_predicts_the_same_without_scikit_learn(
     write_estimates(tmp_path / "estimates.yaml", "dynamics", estimate)
     write_learned_residual(tmp_path / LEARNED, learned, tmp_path / "estimates.yaml")
     program = (
-        "import sys; sys.modules['sklearn'] = None; import numpy as np; from flexcal.dynamics import read_learned_residual\n"
+        "import sys; sys.modules['sklearn'] = None; import numpy as np; from flexcal import read_learned_residual\n"
         "found = read_learned_residual('learned_residual.npz', 'estimates.yaml')\n"
         "print(found.learned, *np.ravel(found.torque(*np.full((3, 1, 2), 0.3))).tolist())"
     )
