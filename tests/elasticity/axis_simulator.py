@@ -88,4 +88,5 @@ def multisine(period: int, lines: range, generator: np.random.Generator, step: f
     """One period of random phases."""
     t = np.arange(period) / period
     phases = generator.uniform(0, 2 * np.pi, len(lines))
-    return sum(np.cos(2 * np.pi * k * t + phase) for k, phase in zip(lines, phases, strict=True))
+    waves = (np.cos(2 * np.pi * k * t + phase) for k, phase in zip(lines, phases, strict=True))
+    return sum(waves, start=np.zeros(period))

@@ -7,8 +7,8 @@ import io
 from pathlib import Path
 
 import numpy as np
-import numpy.lib.recfunctions
 from fuzz_foreign import write_foreign
+from numpy.lib.recfunctions import structured_to_unstructured
 
 URDF = """<?xml version="1.0" encoding="UTF-8"?>
 <robot name="arm">
@@ -191,7 +191,7 @@ def run_verbs(folder: Path) -> None:
         np.genfromtxt(folder / name, delimiter=",", names=True) for name in ("poses.csv", "log.csv")
     )
     assert poses.dtype.names is not None
-    rows = np.lib.recfunctions.structured_to_unstructured(log)[:100]
+    rows = structured_to_unstructured(log)[:100]
     write_foreign(
         folder,
         {name: poses[name] for name in poses.dtype.names},

@@ -105,6 +105,7 @@ def write_tilting(
     states = np.zeros((len(time), 6))
     states[:, joints] = q
     stiffness = np.array(list(BEARING.values()))
+    moved = np.inf
     for _ in range(40):
         force = _inverse(model, data, states)
         line = np.fft.rfft(-force[:, tilts], axis=0)

@@ -38,13 +38,14 @@ def rest(plant: Plant, data: mujoco.MjData, motors: np.ndarray, slip: np.ndarray
     load = np.zeros_like(start) if slip is None else plant.springs[:, 4] * slip
     gap = plant.springs[:, 2] > 0
     flank = np.where(gap, np.sign(gravity_force(plant, data, start)), 0.0)
-    for _ in range(FLANKS):
+    passes = 0
+    while True:
+        passes += 1
         position, torque = _balance(plant, data, start, flank, load)
         seen = np.where(gap, np.sign(torque), 0.0)
-        if np.array_equal(seen, flank):
-            break
+        if np.array_equal(seen, flank) or passes == FLANKS:
+            return Rest(position, torque[plant.motors])
         flank = seen
-    return Rest(position, torque[plant.motors])
 
 
 def _balance(

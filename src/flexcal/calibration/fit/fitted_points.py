@@ -152,7 +152,8 @@ class PointFit:
             )
         whitening = scatter.weights(self.poses.sigma, turns)
         flank, prior = at.rest.flank, self.prior.beside(self.waves, scatter.transmission)
-        for _ in range(_FLANK_PASSES):
+        passes = 0
+        while True:
             task = GeometryProblem(self.start, self.poses, kept, prior, flank, self.elastic, whitening)
             if self.marginalised and len(prior.parameters):
                 estimate = marginalised(task, progress=self.progress)
@@ -162,9 +163,11 @@ class PointFit:
             after = predict(fitted, self.poses, elastic=self.elastic, jacobians=True)
             if (after.rest.flank == flank).all():
                 break
-            flank = after.rest.flank
+            flank, passes = after.rest.flank, passes + 1
             if "backlash" in self.terms:
                 require_both_flanks(self.start, flank)
+            if passes == _FLANK_PASSES:
+                break
         return FittedPoints(self, scatter, spread or {}, held, estimate, fitted, after, flank, task)
 
 

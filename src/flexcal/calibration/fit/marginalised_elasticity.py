@@ -23,7 +23,8 @@ def marginalised(fit: GeometryProblem, *, progress: Callable[[int, float], None]
     it would weigh poses one by one, but S ties them together.
     """
     kept, elastic = fit.kept, fit.prior.parameters
-    for _ in range(_RELINEARISATIONS):
+    linearisations = 0
+    while True:
         about = _Marginal.about(fit, kept, elastic)
         estimate = solve(about.geometry_alone(), progress=progress)
         kept = estimate.parameters
@@ -31,7 +32,8 @@ def marginalised(fit: GeometryProblem, *, progress: Callable[[int, float], None]
         found = elastic.prior_mean() + about.spread.T @ rest
         step = (found - elastic.coordinates()) / np.sqrt(np.diag(fit.prior.covariance))
         elastic = elastic.with_coordinates(found)
-        if np.abs(step).max() < _SETTLED:
+        linearisations += 1
+        if np.abs(step).max() < _SETTLED or linearisations == _RELINEARISATIONS:
             break
     return _joint(_Marginal.about(fit, kept, elastic), estimate)
 

@@ -66,11 +66,11 @@ class _Stream(io.TextIOBase):
         self._stream = stream
 
     @property
-    def encoding(self) -> str:
+    def encoding(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride] (typeshed has an attribute)
         return self._stream.encoding
 
     @property
-    def errors(self) -> str | None:
+    def errors(self) -> str | None:  # pyright: ignore[reportIncompatibleVariableOverride]
         return self._stream.errors
 
     def isatty(self) -> bool:

@@ -91,8 +91,8 @@ class Calibrate:
             found = self._calibrated(self.terms, progress)
             known = all(point["std_m"] <= KNOWN_POINT_STD for point in found.found_points.values())
             write = self.write_point and known and not is_implausible(found.selected)
+            told = point_lines(found.found_points) if write else []
             if write:
-                told = point_lines(found.found_points)
                 found = self._with_points_written(found, progress)
         document = found.document()
         seen = document["identifiability"]

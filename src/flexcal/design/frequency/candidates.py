@@ -40,17 +40,19 @@ class FrequencyPoseCandidates:
         """`count` poses (count, n) rad, uniform; raises `FlexcalError`, with what each check threw out, where too few are found."""
         found: list[np.ndarray] = []
         lost = {"gravity preload": 0, "collision": 0}
-        for drawn in range(1, _TRIES + 1):
+        drawn = 0
+        for _ in range(_TRIES):
             q = rng.uniform(self.lower, self.upper, (_BATCH, self.model.n))
+            drawn += _BATCH
             found += list(self.kept(q, lost))
             progress("candidates", min(1.0, len(found) / count))
             if len(found) >= count:
                 return np.array(found[:count])
-            if drawn * _BATCH >= 40 * count + 1000 and len(found) < 0.02 * count:
+            if drawn >= 40 * count + 1000 and len(found) < 0.02 * count:
                 break
         losses = ", ".join(f"{name} threw out {number}" for name, number in lost.items())
         raise FlexcalError(
-            f"of {drawn * _BATCH} random poses of {self.model.name} only {len(found)} of the wanted {count} can be excited: {losses}; "
+            f"of {drawn} random poses of {self.model.name} only {len(found)} of the wanted {count} can be excited: {losses}; "
             "lower the excitation or the reference motion, or hold a heavier payload."
         )
 

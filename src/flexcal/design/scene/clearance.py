@@ -75,11 +75,11 @@ class Clearance:
             within = pairs[found < self.within].tolist()
             if within:
                 jacobian = pin.computeJointJacobians(robot, data, configurations[i])[:, self._columns]
+                jacobians += [jacobian] * len(within)
             for pair in within:
                 result = distances.distanceResults[pair]
                 close.append((i, pair))
                 points.append(np.array([result.getNearestPoint1(), result.getNearestPoint2(), result.normal]))
-                jacobians.append(jacobian)
             if found.min(initial=np.inf) < least:
                 break
         instants, pairs = np.array(close, dtype=int).reshape(-1, 2).T

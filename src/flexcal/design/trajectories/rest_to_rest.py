@@ -40,11 +40,12 @@ def timed_motion(design: TrajectoryDesign, number: int, rate_hz: float) -> Timed
     if begin <= _AT_REST * fastest:
         return _sampled(design, number, rate_hz, 0.0, plan.duration)
     steady = (plan.periods - plan.settle_periods) * period
-    for periods in range(max(1, plan.settle_periods), _LONGEST + 1):
-        found = _sampled(design, number, rate_hz, periods * period, steady)
-        if max(found.largest_shares.values()) <= 1:
-            break
-    return found
+    periods = max(1, plan.settle_periods)
+    while True:
+        motion = _sampled(design, number, rate_hz, periods * period, steady)
+        if max(motion.largest_shares.values()) <= 1 or periods >= _LONGEST:
+            return motion
+        periods += 1
 
 
 def _sampled(

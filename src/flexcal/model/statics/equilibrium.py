@@ -219,14 +219,16 @@ def static_equilibrium(
     twist = twist_from_torque(load[:, sprung], stiffness[drives], hardening)
     free[:, sprung] += load[:, sprung] / stiffness[drives] - twist
     rest = np.sign(load) if flank is None else flank
-    for last in (False,) * (_FLANK_PASSES - 1) + (True,):
+    passes = 0
+    while True:
+        passes += 1
         slack = free - rest * model.backlash
         deflection, *derivatives = _solve(
             model, axes, stiffness, q + slack, masses, sensitivities=sensitivities
         )
         torque = load.copy()
         torque[:, sprung] = -model.stiffness[sprung, 2] * deflection[:, sprung, 2]
-        if flank is not None or last or (np.sign(torque) == rest)[:, loose].all():
+        if flank is not None or passes == _FLANK_PASSES or (np.sign(torque) == rest)[:, loose].all():
             break
         rest = np.sign(torque)
     sign = np.where(loose, rest, np.sign(torque)) if flank is None else flank

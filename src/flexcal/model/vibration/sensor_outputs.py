@@ -66,13 +66,14 @@ def assemble_sensor_outputs(
         if sensor.moves:
             by += columns @ turned.T
         by = np.where(both, by, 0.0)
+        by_tilt = None
         if sensor.feels_gravity:
             tilt[row, rotors:] = -turned @ arm.robot.gravity
             far = np.where(order[..., None], turned[None, :], turned[:, None])
             by_tilt = np.where(both, -np.cross(near, far) @ arm.robot.gravity, 0.0)
         for name, shift in motions.items():
             moved[name][0][row, rotors:] = by @ shift
-            if sensor.feels_gravity:
+            if by_tilt is not None:
                 moved[name][1][row, rotors:] = by_tilt @ shift
     return SensorOutputs(motion, tilt, np.array([s.order for s in sensors], dtype=int), moved)
 
