@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 export OPENBLAS_NUM_THREADS ?= 1
 SOURCES := pyproject.toml CMakeLists.txt $(wildcard kernels/*)
 
-.PHONY: install demo test test-all sanitize check bench docs clean
+.PHONY: install demo test test-all sanitize check bench docs wheels clean
 
 install: $(VENV)/.installed
 
@@ -59,5 +59,9 @@ docs: $(VENV)/.developer
 bench: $(VENV)/.developer
 	$(BIN)/python -m benchmarks
 
+# sdist and a wheel for $(PYTHON) in dist/, checked in a fresh environment without a compiler
+wheels:
+	$(PYTHON) .ci/wheels.py
+
 clean:
-	rm -rf build $(VENV) demo report.html
+	rm -rf build dist $(VENV) demo report.html
