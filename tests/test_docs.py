@@ -36,14 +36,19 @@ def methods(root: Path) -> str:
 
 
 def documented(root: Path) -> dict[str, str]:
-    """Unit of every name in the table of docs/file-formats.md, as a pattern."""
+    """Unit of every name in the table of docs/file-formats.md, and in that of friction terms, as a pattern."""
     text = (root / "docs" / "file-formats.md").read_text(encoding="utf-8")
-    table = text[text.index("| name | unit |") : text.index("## robot.yaml")]
+    methods = (root / "docs" / "methods" / "dynamics.md").read_text(encoding="utf-8")
+    friction = methods[methods.index("| term | column | parameter | unit |") :]
     found: dict[str, str] = {}
-    for row in table.splitlines()[2:]:
-        if row:
-            _, names, unit, _ = (cell.strip() for cell in row.split("|"))
-            found |= dict.fromkeys(re.findall(r"`([^`]+)`", names), unit)
+    for table in (
+        text[text.index("| name | unit |") : text.index("## robot.yaml")],
+        friction.split("\n\n")[0],
+    ):
+        for row in table.splitlines()[2:]:
+            if row:
+                *_, names, unit, _ = (cell.strip() for cell in row.split("|"))
+                found |= dict.fromkeys(re.findall(r"`([^`]+)`", names), unit)
     return found
 
 

@@ -15,7 +15,8 @@ from flexcal.dynamics.friction import (
     SublinearViscous,
     WarmUp,
 )
-from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, candidate_shapes
+from flexcal.dynamics.friction.catalogue import LIBRARY, candidate_shapes
+from flexcal.dynamics.friction.scale import Scale
 from flexcal.dynamics.friction.terms import dahl
 from flexcal.dynamics.inverse_model import CLASSIC, DriveTerm, Observation
 from flexcal.dynamics.regression import blocks as rows

@@ -11,18 +11,17 @@ from flexcal.dynamics.estimators.recorded_rows import RecordedRows
 from flexcal.dynamics.regression import Batch, ExperimentSystem, RegressionData, Rows, reduced, rows
 from flexcal.dynamics.signals import Experiment, JointLog, Motion, filtered_motion, log_blocks
 from flexcal.errors import FlexcalError
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import FRICTION_PARAMETERS, RobotModel, unit_of
 
 _EXACT = (
     "coulomb",
-    "load_coulomb",
-    "load_stribeck",
-    "stribeck",
-    "presliding",
-    "coulomb_warm_up",
     "torque_offset",
+    *(key for key in FRICTION_PARAMETERS if unit_of(key) in ("N m", "1")),
 )
-"""What names of columns begin with that are constants or signs of a velocity: these have no errors but at a reversal."""
+"""What names of columns begin with that are constants or signs of a velocity: these have no errors but at a reversal.
+
+Of a friction term these are the ones whose column is a number, or a torque of the links: its parameter is a torque, or a number.
+"""
 _ORDER = 4
 _GAIN = 70.0
 """Variance of the fourth difference of white noise, over its own."""

@@ -9,7 +9,8 @@ import numpy as np
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
-from flexcal.dynamics.friction.catalogue import LIBRARY, Scale, candidate_shapes, standard_terms
+from flexcal.dynamics.friction.catalogue import LIBRARY, candidate_shapes, standard_terms
+from flexcal.dynamics.friction.scale import Scale
 from flexcal.dynamics.friction.significance import CandidateFit
 from flexcal.dynamics.friction.stepwise import (
     Candidate,

@@ -4,20 +4,46 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import ClassVar
+from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
+from flexcal.dynamics.friction.scale import Scale
 from flexcal.dynamics.inverse_model import Column, Memory, MotorAxis, motor_axes
 from flexcal.dynamics.signals import Motion
 from flexcal.model.robot import RobotModel, unknown_parallel
 from flexcal.model.torques import torque_regressor
+
+_SHARES_OF_SPEED = (0.01, 0.03, 0.1, 0.3, 1.0)
+_SHARES_OF_SPEED_LOADED = (0.3, 1.0, 3.0)
+_SHARES_OF_STROKE = (0.001, 0.003, 0.01, 0.03, 0.1)
+_SHARES_OF_DURATION = (0.05, 0.1, 0.2, 1 / 3)
+"""A time constant near the length of a recording is drift by another name: it says nothing about other recordings."""
+
+
+class FrictionTerm(Protocol):
+    """A friction term that is tried beyond the classic ones, by its `key` in robot.yaml; its parameters are `<joint>.<key>`."""
+
+    key: ClassVar[str]
+
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        """Its shapes to try, each with what it is called; an empty name where there is but one."""
+        ...
+
+    def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
+        """As a `DriveTerm` has them."""
+        ...
 
 
 class _PerMotor:
     """One parameter a motor; a joint that the motor turns along feels its share of the torque."""
 
     key: ClassVar[str]
+
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        yield "", cls()
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         raise NotImplementedError
@@ -57,6 +83,11 @@ class Stribeck(_PerMotor):
     velocities: tuple[float, ...]
     key = "stribeck"
 
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        for share in _SHARES_OF_SPEED:
+            yield f"{share:g} of the speed", cls(tuple(share * scale.speed))
+
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         speed = axis.of(motion.dq)
         return np.sign(speed) * np.exp(-((speed / self.velocities[axis.joint]) ** 2))
@@ -72,6 +103,11 @@ class Presliding(_PerMotor):
     travels: tuple[float, ...]
     key = "presliding"
 
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        for share in _SHARES_OF_STROKE:
+            yield f"{share:g} of the stroke", cls(tuple(share * scale.stroke))
+
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         position, travel = axis.of(motion.q), self.travels[axis.joint]
         key = f"{axis.name}.{self.key} {travel!r}"
@@ -82,25 +118,40 @@ class Presliding(_PerMotor):
 
 
 @dataclass(frozen=True)
-class WarmUp(_PerMotor):
-    """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: decreasing viscosity during warm-up."""
+class _Warming(_PerMotor):
+    """A term that goes with exp(-t/τ), with t from the start of the recording and `time` τ, s."""
 
     time: float
-    key = "warm_up"
 
-    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
-        return axis.of(motion.dq) * _cold(motion, self.time, memory)
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        for time in (share * scale.duration for share in _SHARES_OF_DURATION):
+            yield f"{time:.3g} s", cls(time)
+
+    def cold(self, motion: Motion, memory: Memory) -> np.ndarray:
+        """exp(-t/τ) (N,) of the instants of a motion."""
+        begun, _ = memory.setdefault("begun", (motion.time[0], 0.0))
+        return np.exp(-(motion.time - begun) / self.time)
 
 
 @dataclass(frozen=True)
-class CoulombWarmUp(_PerMotor):
+class WarmUp(_Warming):
+    """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: decreasing viscosity during warm-up."""
+
+    key = "warm_up"
+
+    def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
+        return axis.of(motion.dq) * self.cold(motion, memory)
+
+
+@dataclass(frozen=True)
+class CoulombWarmUp(_Warming):
     """`<joint>.coulomb_warm_up` · sign(ṡ) exp(-t/τ), with `time` τ, s: as `WarmUp`, of Coulomb friction."""
 
-    time: float
     key = "coulomb_warm_up"
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
-        return np.sign(axis.of(motion.dq)) * _cold(motion, self.time, memory)
+        return np.sign(axis.of(motion.dq)) * self.cold(motion, memory)
 
 
 @dataclass(frozen=True)
@@ -110,13 +161,20 @@ class Cables:
     A joint whose declared spring is identified has that in its place: the columns are the same.
     """
 
+    key = "cable_stiffness"
+
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        yield "", cls()
+
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
         for i, name in enumerate(model.joint_names):
             if "spring_stiffness" in unknown_parallel(model, name):
                 continue
-            yield Column(f"{name}.cable_stiffness", i, motion.q[:, i])
+            yield Column(f"{name}.{self.key}", i, motion.q[:, i])
 
 
+@dataclass(frozen=True, eq=False)
 class _PerLoad:
     """One parameter a motor, of what the links alone ask of its joint.
 
@@ -126,6 +184,10 @@ class _PerLoad:
 
     inertials: np.ndarray
     key: ClassVar[str]
+
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        yield "", cls(scale.inertials)
 
     def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
         raise NotImplementedError
@@ -142,7 +204,6 @@ class _PerLoad:
 class LoadCoulomb(_PerLoad):
     """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears."""
 
-    inertials: np.ndarray
     key = "load_coulomb"
 
     def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
@@ -153,18 +214,16 @@ class LoadCoulomb(_PerLoad):
 class LoadStribeck(_PerLoad):
     """`<joint>.load_stribeck` · |load| sign(ṡ) exp(-(ṡ/v)²), with `velocities` v as `Stribeck` (Bittencourt & Gunnarsson 2012)."""
 
-    inertials: np.ndarray
     velocities: tuple[float, ...]
     key = "load_stribeck"
 
+    @classmethod
+    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+        for share in _SHARES_OF_SPEED_LOADED:
+            yield f"{share:g} of the speed", cls(scale.inertials, tuple(share * scale.speed))
+
     def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
         return np.sign(speed) * np.exp(-((speed / self.velocities[axis.joint]) ** 2))
-
-
-def _cold(motion: Motion, time: float, memory: Memory) -> np.ndarray:
-    """exp(-t/τ) from the start of the recording."""
-    begun, _ = memory.setdefault("begun", (motion.time[0], 0.0))
-    return np.exp(-(motion.time - begun) / time)
 
 
 def dahl(position: np.ndarray, travel: float, start: float) -> np.ndarray:
@@ -186,3 +245,16 @@ def dahl(position: np.ndarray, travel: float, start: float) -> np.ndarray:
     to = np.where(before, start, np.append(directions, 0.0)[stretch])
     since = path - np.where(before, 0.0, np.append(begins, 0.0)[stretch])
     return to + (states[stretch] - to) * np.exp(-since)
+
+
+LIBRARY_TERMS: tuple[type[FrictionTerm], ...] = (
+    SublinearViscous,
+    LoadCoulomb,
+    LoadStribeck,
+    Stribeck,
+    Presliding,
+    WarmUp,
+    CoulombWarmUp,
+    Cables,
+)
+"""What is tried beyond the classic terms, in the order of robot.yaml's documentation."""

@@ -2,6 +2,7 @@ from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_colu
 from .attached_payload import carried_inertias, holding, last_frame, with_point_at_frame
 from .config import AcceptanceConfig, RobotConfig, SignalConfig
 from .parameter_names import (
+    FRICTION_PARAMETERS,
     GEOMETRY,
     LATERAL,
     MASS_AND_COM,
@@ -37,6 +38,7 @@ from .stored_estimates import NUISANCE, PAYLOAD_FRAME, with_blocks
 __all__ = [
     "ANGLE_TOLERANCE",
     "FRICTION_LOG_STD",
+    "FRICTION_PARAMETERS",
     "FRICTION_TOLERANCE",
     "GEOMETRY",
     "LATERAL",

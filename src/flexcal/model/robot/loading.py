@@ -22,7 +22,7 @@ from flexcal.model.parts import (
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ElasticConfig, RobotConfig
-from flexcal.model.robot.parameter_names import COUPLED, FRICTION, PARALLEL, SCATTER
+from flexcal.model.robot.parameter_names import COUPLED, FRICTION_PARAMETERS, PARALLEL, SCATTER
 from flexcal.model.urdf import Description, Frame, read_urdf
 
 HARMONICS = (1, 2, 3)
@@ -112,7 +112,7 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
         coulomb=_per_joint(file, config, "coulomb", n),
         torque_offset=np.zeros(n),
         parallel=np.zeros((n, len(PARALLEL))),
-        friction=np.zeros((n, len(FRICTION))),
+        friction=np.zeros((n, len(FRICTION_PARAMETERS))),
         coupling=np.zeros((len(config.drives.coupling), len(COUPLED))),
         delay=np.zeros(n),
         ratio=_per_joint(file, config, "ratio", n),

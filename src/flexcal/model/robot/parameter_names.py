@@ -10,10 +10,19 @@ if TYPE_CHECKING:
 GEOMETRY = ("offset", "misalignment_1", "misalignment_2", "length_x", "length_y", "length_z")
 SPRINGS = ("bearing_x", "bearing_y", "drive")
 LATERAL = ("gravity_compliance_1", "gravity_compliance_2")
-FRICTION = (
-    "coulomb_asymmetry", "sublinear_viscous", "load_coulomb", "load_stribeck", "stribeck", "presliding", "warm_up", "coulomb_warm_up",
-    "cable_stiffness",
-)  # fmt: skip
+_FRICTION_UNITS = {
+    "coulomb_asymmetry": "N m",
+    "sublinear_viscous": "N m √(s/rad)",
+    "load_coulomb": "1",
+    "load_stribeck": "1",
+    "stribeck": "N m",
+    "presliding": "N m",
+    "warm_up": "N m s/rad",
+    "coulomb_warm_up": "N m",
+    "cable_stiffness": "N m/rad",
+}
+FRICTION_PARAMETERS = tuple(_FRICTION_UNITS)
+"""Parameters of the friction terms beyond viscous and Coulomb friction, `<joint>.<key>`."""
 PARALLEL = ("spring_stiffness", "spring_torque", "cable_torque")
 COUPLED = ("rotor_inertia", "viscous", "coulomb")
 MASS_AND_COM = ("mass", "com_x", "com_y", "com_z")
@@ -30,15 +39,14 @@ _UNITS = {
     "spring_stiffness": "N m/rad", "spring_torque": "N m", "cable_torque": "N m",
     **dict.fromkeys(("fx_offset", "fy_offset", "fz_offset"), "N"), **dict.fromkeys(("mx_offset", "my_offset", "mz_offset"), "N m"),
     "torque_offset": "N m", "delay": "s", "mass": "kg", "com_x": "m", "com_y": "m", "com_z": "m",
-    "coulomb_asymmetry": "N m", "sublinear_viscous": "N m √(s/rad)", "stribeck": "N m", "presliding": "N m",
     "held_inertia": "kg m²", "arm_inertia": "kg m²", "arm_viscous": "N m s/rad", "arm_coulomb": "N m", "gap_torque": "N m",
-    "warm_up": "N m s/rad", "coulomb_warm_up": "N m", "cable_stiffness": "N m/rad", "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
+    **_FRICTION_UNITS, "mc_x": "kg m", "mc_y": "kg m", "mc_z": "kg m",
     **dict.fromkeys(("position_x", "position_y", "position_z"), "m"), "direction_1": "rad", "direction_2": "rad",
     "instrument": "m", "robot": "m", "angular": "rad", "model": "m", "pose": "m", "transmission": "rad",
 }  # fmt: skip
 
 
-_OF_DRIVES = ("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION, *PARALLEL)
+_OF_DRIVES = ("rotor_inertia", "viscous", "coulomb", "torque_offset", *FRICTION_PARAMETERS, *PARALLEL)
 _SLIDING = {
     "kg m²": "kg", "N m": "N", "N m/rad": "N/m", "N m s/rad": "N s/m", "N m √(s/rad)": "N √(s/m)",
 }  # fmt: skip
@@ -116,7 +124,7 @@ def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
             table[f"{joint.name}.{key}"] = (key, (i,))
         for key in unknown_parallel(model, joint.name):
             table[f"{joint.name}.{key}"] = ("parallel", (i, PARALLEL.index(key)))
-        for k, key in enumerate(FRICTION):
+        for k, key in enumerate(FRICTION_PARAMETERS):
             table[f"{joint.name}.{key}"] = ("friction", (i, k))
         if i in elastic:
             for k, key in enumerate(SPRINGS):
