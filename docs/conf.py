@@ -9,7 +9,9 @@ from importlib.metadata import version as installed_version
 from pathlib import Path
 
 import plotly
+from docutils import nodes
 from sphinx.application import Sphinx
+from sphinx.util.docutils import SphinxDirective
 
 HERE = Path(__file__).parent
 sys.path.insert(0, str(HERE))
@@ -86,5 +88,16 @@ def as_plain_text(app: Sphinx, what: str, name: str, obj: object, options: objec
     lines[:] = [*plain, ""]
 
 
+class Verbs(SphinxDirective):
+    """A table of the verbs of the command line: an example of each, and what it does."""
+
+    def run(self) -> list[nodes.Node]:
+        from flexcal.cli.arguments.verb_table import VERBS
+
+        rows = [f"| `{verb.example}` | {verb.summary} |" for verb in VERBS]
+        return self.parse_text_to_nodes("\n".join(["| verb | what it does |", "| --- | --- |", *rows]))
+
+
 def setup(app: Sphinx) -> None:
+    app.add_directive("verbs", Verbs)
     app.connect("autodoc-process-docstring", as_plain_text)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import html
 import importlib
 import json
 import re
@@ -116,12 +117,11 @@ def test_the_pooling_is_as_wide_as_it_says(methods: str) -> None:
     assert f"fewer than {SMALLEST_FREEDOM} are refused" in text
 
 
-def test_the_page_on_the_command_line_has_every_verb(root: Path) -> None:
-    from flexcal.cli.arguments.verb_table import VERBS
+def test_the_page_on_exporting_has_every_format(root: Path) -> None:
+    from flexcal.cli.arguments.verb_table import EXPORTS
 
-    page = (root / "docs" / "command-line.md").read_text(encoding="utf-8")
-    rows = [line for line in page.splitlines() if line.startswith("| `flexcal ")]
-    assert rows == [f"| `{verb.example}` | {verb.summary} |" for verb in VERBS]
+    page = (root / "docs" / "exporting.md").read_text(encoding="utf-8")
+    assert [verb.name for verb in EXPORTS if f"`{verb.name}`" not in page] == []
 
 
 def test_the_page_on_files_has_those_that_verbs_leave(root: Path) -> None:
@@ -137,7 +137,9 @@ def test_the_page_on_files_has_those_that_verbs_leave(root: Path) -> None:
 
 
 def test_pages_and_their_equations_need_no_network(root: Path, tmp_path: Path) -> None:
-    """Those without notebooks, built: whatever they load lies beside them, and every equation is MathML."""
+    """Those without notebooks, built: whatever they load lies beside them, every equation is MathML, and every verb is there."""
+    from flexcal.cli.arguments.verb_table import VERBS
+
     options = ["-D", "nb_execution_mode=off", "-D", "exclude_patterns=api.md,examples", "-b", "html"]
     command = [sys.executable, "-m", "sphinx", "-q", *options, str(root / "docs"), str(tmp_path)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=300)
@@ -149,6 +151,8 @@ def test_pages_and_their_equations_need_no_network(root: Path, tmp_path: Path) -
         assert len(loaded) > 5, path
         for address in loaded:
             assert (path.parent / address.split("?")[0]).is_file(), f"{path}: {address}"
+    said = html.unescape(re.sub(r"<[^>]+>", "", pages[tmp_path / "command-line.html"]))
+    assert [verb.example for verb in VERBS if verb.example not in said] == []
     styles = [sheet.read_text(encoding="utf-8") for sheet in tmp_path.glob("_static/**/*.css")]
     assert [sheet for sheet in styles if re.search(r"(@import|url\()\s*[\"']?(https?:)?//", sheet)] == []
     assert (tmp_path / "_static" / "STIXTwoMath-Regular.ttf").stat().st_size > 1e6

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from flexcal.estimation import Parameter, Parameters
-from flexcal.export import render_json
+from flexcal.export.json_model import render_json
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import Bearings
 from flexcal.model.robot import Posterior, RobotModel

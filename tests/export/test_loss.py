@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flexcal.export import measure_export_error, render_mjcf, render_sdf, render_urdf, write_urdf
-from flexcal.export.mjcf_file import mjcf_tool
+from flexcal.export import measure_export_error, write_urdf
+from flexcal.export.mjcf_file import mjcf_tool, render_mjcf
 from flexcal.export.representation_error import AT_REST, random_poses
-from flexcal.export.sdf import sdf_tool
-from flexcal.export.urdf import urdf_tool
+from flexcal.export.sdf import render_sdf, sdf_tool
+from flexcal.export.urdf import render_urdf, urdf_tool
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.robot import RobotModel
 from flexcal.model.robot.config import BoxConfig

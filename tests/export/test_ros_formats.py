@@ -12,8 +12,8 @@ from panda import panda
 from scipy.spatial.transform import Rotation
 
 from flexcal.errors import FlexcalError
-from flexcal.export import render_kinematics, render_sdf
-from flexcal.export.universal_robots import LINKS
+from flexcal.export.sdf import render_sdf
+from flexcal.export.universal_robots import LINKS, render_kinematics
 from flexcal.model.robot import RobotModel
 
 UR5 = {

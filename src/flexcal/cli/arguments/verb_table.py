@@ -6,6 +6,8 @@ import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
+from flexcal.export import FORMATS
+
 
 @dataclass(frozen=True)
 class Verb:
@@ -36,6 +38,17 @@ class Step:
     title: str
     verbs: tuple[Verb, ...]
 
+
+EXPORTS = tuple(
+    Verb(
+        ("export", format.name),
+        "export",
+        f"Export{format.name.capitalize()}",
+        format.summary,
+        f"flexcal export {format.name} robot.yaml --out {format.example}",
+    )
+    for format in FORMATS
+)
 
 STEPS = (
     Step(
@@ -252,62 +265,7 @@ STEPS = (
                 "the report of a folder that one of these verbs wrote with --out, from its stored numbers",
                 "flexcal report results",
             ),
-            Verb(
-                ("export", "urdf"),
-                "export",
-                "ExportUrdf",
-                "the calibrated robot as URDF, and the error in millimetres of what URDF cannot represent",
-                "flexcal export urdf robot.yaml --out calibrated.urdf",
-            ),
-            Verb(
-                ("export", "mjcf"),
-                "export",
-                "ExportMjcf",
-                "with springs, dampers and rotors as joints, for MuJoCo",
-                "flexcal export mjcf robot.yaml --out calibrated.xml",
-            ),
-            Verb(
-                ("export", "sdf"),
-                "export",
-                "ExportSdf",
-                "as SDFormat, for Gazebo",
-                "flexcal export sdf robot.yaml --out calibrated.sdf",
-            ),
-            Verb(
-                ("export", "dh"),
-                "export",
-                "ExportDh",
-                "the standard Denavit-Hartenberg table, nominal beside calibrated",
-                "flexcal export dh robot.yaml --out dh.csv",
-            ),
-            Verb(
-                ("export", "mdh"),
-                "export",
-                "ExportMdh",
-                "the modified Denavit-Hartenberg table, nominal beside calibrated",
-                "flexcal export mdh robot.yaml --out mdh.csv",
-            ),
-            Verb(
-                ("export", "offsets"),
-                "export",
-                "ExportOffsets",
-                "the best joint offsets, for controllers that accept nothing else",
-                "flexcal export offsets robot.yaml --out offsets.csv",
-            ),
-            Verb(
-                ("export", "kinematics"),
-                "export",
-                "ExportKinematics",
-                "the kinematics YAML of Universal Robots' ROS description",
-                "flexcal export kinematics robot.yaml --out kinematics.yaml",
-            ),
-            Verb(
-                ("export", "json"),
-                "export",
-                "ExportJson",
-                "the whole calibrated model, for programs of your own",
-                "flexcal export json robot.yaml --out calibrated.json",
-            ),
+            *EXPORTS,
         ),
     ),
     Step(

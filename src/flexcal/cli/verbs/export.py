@@ -11,6 +11,7 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.shared_options import Estimates, Json, MaybeText, Robot, require_robot
 from flexcal.cli.terminal.console import Console
+from flexcal.export import FORMATS, PlainFormat
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -64,87 +65,28 @@ class Export(ABC):
         console.finish(document, following)
 
 
-@dataclass(frozen=True)
-class ExportUrdf(Export):
-    """Write the calibrated robot as URDF: calibrated joint origins and tool, links with identified inertials.
+def _plain_export(format: PlainFormat) -> type[Export]:
+    """The verb of a format without options of its own."""
 
-    A URDF cannot represent deflection, backlash and transmission error; the resulting error is printed in millimetres. Rotor inertia
-    and friction stay in estimates.yaml.
-    """
+    @dataclass(frozen=True)
+    class PlainExport(Export):
+        def write(self) -> ExportedRobot:
+            from flexcal.jobs.deployment import export_robot
 
-    def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_urdf
+            return export_robot(self.robot, self.out, format.name, estimates=self.estimates)
 
-        return export_urdf(self.robot, self.out, estimates=self.estimates)
+        def following(self, document: dict[str, Any]) -> str:
+            return format.following.format(out=self.out)
 
-    def following(self, document: dict[str, Any]) -> str:
-        return f"load {self.out} wherever the nominal URDF was loaded"
-
-
-@dataclass(frozen=True)
-class ExportMjcf(Export):
-    """Write the calibrated robot as MJCF for MuJoCo, with its springs, dampers and rotors as joints and its payload in the last link.
-
-    It deflects under gravity as the calibrated robot does. MJCF cannot represent backlash, gravity compliance and transmission error;
-    the resulting error is printed in millimetres.
-    """
-
-    def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_mjcf
-
-        return export_mjcf(self.robot, self.out, estimates=self.estimates)
-
-    def following(self, document: dict[str, Any]) -> str:
-        return f"load {self.out} in MuJoCo, or look at it with 'python -m mujoco.viewer --mjcf={self.out}'"
+    PlainExport.__doc__ = format.details
+    return PlainExport
 
 
-@dataclass(frozen=True)
-class ExportSdf(Export):
-    """Write the calibrated robot as SDFormat 1.7 for Gazebo: geometry, inertials and friction, without visuals and collision bodies.
-
-    SDFormat cannot represent deflection, backlash and transmission error; the resulting error is printed in millimetres.
-    """
-
-    def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_sdf
-
-        return export_sdf(self.robot, self.out, estimates=self.estimates)
-
-    def following(self, document: dict[str, Any]) -> str:
-        return f"include {self.out} in a Gazebo world"
-
-
-@dataclass(frozen=True)
-class ExportKinematics(Export):
-    """Write the placements of the six joints as the `kinematics` YAML of Universal Robots' ROS description.
-
-    Its frames are those of that description, whatever those of the URDF are, for robots of that manufacturer. It cannot hold the tool,
-    which is printed.
-    """
-
-    def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_kinematics
-
-        return export_kinematics(self.robot, self.out, estimates=self.estimates)
-
-    def following(self, document: dict[str, Any]) -> str:
-        return f"give {self.out} to the description or driver as kinematics_params_file"
-
-
-@dataclass(frozen=True)
-class ExportJson(Export):
-    """Write the complete calibrated model as one JSON document, for programs of your own.
-
-    Joints with placements, springs, backlash and drives, points, payload, stations, and every parameter with its standard deviation.
-    """
-
-    def write(self) -> ExportedRobot:
-        from flexcal.jobs.deployment import export_json
-
-        return export_json(self.robot, self.out, estimates=self.estimates)
-
-    def following(self, document: dict[str, Any]) -> str:
-        return f"read {self.out} in your own program; docs/file-formats.md describes its content"
+globals().update(
+    (f"Export{format.name.capitalize()}", _plain_export(format))
+    for format in FORMATS
+    if isinstance(format, PlainFormat)
+)
 
 
 @dataclass(frozen=True)

@@ -1,25 +1,12 @@
 from .compensation import compensate_robot
-from .export import (
-    ExportedRobot,
-    export_dh,
-    export_json,
-    export_kinematics,
-    export_mjcf,
-    export_offsets,
-    export_sdf,
-    export_urdf,
-)
+from .export import ExportedRobot, export_dh, export_offsets, export_robot
 from .prediction import predict_robot
 
 __all__ = [
     "ExportedRobot",
     "compensate_robot",
     "export_dh",
-    "export_json",
-    "export_kinematics",
-    "export_mjcf",
     "export_offsets",
-    "export_sdf",
-    "export_urdf",
+    "export_robot",
     "predict_robot",
 ]

@@ -13,13 +13,9 @@ from flexcal.export import (
     Convention,
     ExportedFile,
     RenderedModel,
+    render,
     render_dh,
-    render_json,
-    render_kinematics,
-    render_mjcf,
     render_offsets,
-    render_sdf,
-    render_urdf,
     undetermined_offsets,
     write_rendered,
 )
@@ -75,32 +71,12 @@ class ExportedRobot:
         }
 
 
-def export_urdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
-    """Write the robot with its estimates as URDF; `estimates` is a file or folder in place of that beside robot.yaml.
+def export_robot(robot: Path, out: Path, format: str, *, estimates: Path | None = None) -> ExportedRobot:
+    """Write the robot with its estimates in a plain format; `estimates` is a file or folder in place of that beside robot.yaml.
 
     Raises `FlexcalError`, as every export here, as reading and the format's rendering do, and where `out` is one of the robot's own files.
     """
-    return _export(robot, out, estimates, lambda robot_: render_urdf(robot_.model))
-
-
-def export_mjcf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
-    """Write the robot as MJCF with elastic joints."""
-    return _export(robot, out, estimates, lambda robot_: render_mjcf(robot_.model))
-
-
-def export_sdf(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
-    """Write the robot as SDFormat."""
-    return _export(robot, out, estimates, lambda robot_: render_sdf(robot_.model, robot_.nominal))
-
-
-def export_json(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
-    """Write everything of the robot as one JSON document."""
-    return _export(robot, out, estimates, lambda robot_: render_json(robot_.model, robot_.nominal))
-
-
-def export_kinematics(robot: Path, out: Path, *, estimates: Path | None = None) -> ExportedRobot:
-    """Write the placements of six joints as the `kinematics` YAML of Universal Robots' ROS description."""
-    return _export(robot, out, estimates, lambda robot_: render_kinematics(robot_.model, robot_.nominal))
+    return _export(robot, out, estimates, lambda robot_: render(format, robot_.model, robot_.nominal))
 
 
 def export_dh(
@@ -114,7 +90,7 @@ def export_dh(
 ) -> ExportedRobot:
     """Write the Denavit-Hartenberg table of the chain to a point; see `render_dh`."""
 
-    def render(robot_: Exportable) -> RenderedModel:
+    def rendered(robot_: Exportable) -> RenderedModel:
         return render_dh(
             robot_.model,
             robot_.nominal,
@@ -124,7 +100,7 @@ def export_dh(
             unseen=robot_.unseen,
         )
 
-    return _export(robot, out, estimates, render)
+    return _export(robot, out, estimates, rendered)
 
 
 def export_offsets(
@@ -137,7 +113,7 @@ def export_offsets(
 ) -> ExportedRobot:
     """Write the best joint offsets of the chain to a point; see `render_offsets`."""
 
-    def render(robot_: Exportable) -> RenderedModel:
+    def rendered(robot_: Exportable) -> RenderedModel:
         return render_offsets(
             robot_.model,
             robot_.nominal,
@@ -146,10 +122,10 @@ def export_offsets(
             undetermined=robot_.undetermined,
         )
 
-    return _export(robot, out, estimates, render)
+    return _export(robot, out, estimates, rendered)
 
 
-def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> ExportedRobot:
+def _export(robot: Path, out: Path, estimates: Path | None, rendered: Render) -> ExportedRobot:
     nominal = RobotModel.from_yaml(robot, estimates=False)
     path = stored_estimates(nominal, estimates)
     for own, what in ((nominal.urdf, "nominal URDF"), (robot, "robot.yaml"), (path, "estimates file")):
@@ -163,4 +139,4 @@ def _export(robot: Path, out: Path, estimates: Path | None, render: Render) -> E
     measured = measured_points(nominal, blocks)
     probable, unseen = probable_robots(model, measured) if measured else (model, None)
     exportable = Exportable(nominal, probable, unseen, measured)
-    return ExportedRobot(write_rendered(probable, out, render(exportable)), "calibration" in blocks)
+    return ExportedRobot(write_rendered(probable, out, rendered(exportable)), "calibration" in blocks)
