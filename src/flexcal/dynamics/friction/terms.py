@@ -59,7 +59,7 @@ class _PerMotor:
 class AsymmetricCoulomb(_PerMotor):
     """`<joint>.coulomb_asymmetry` · |sign ṡ|: half the difference between the directions; equals a torque offset except at rest."""
 
-    key = "coulomb_asymmetry"
+    key: ClassVar[str] = "coulomb_asymmetry"
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         return np.abs(np.sign(axis.of(motion.dq)))
@@ -69,7 +69,7 @@ class AsymmetricCoulomb(_PerMotor):
 class SublinearViscous(_PerMotor):
     """`<joint>.sublinear_viscous` · sign(ṡ) √|ṡ|: shear-thinning grease."""
 
-    key = "sublinear_viscous"
+    key: ClassVar[str] = "sublinear_viscous"
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         speed = axis.of(motion.dq)
@@ -81,7 +81,7 @@ class Stribeck(_PerMotor):
     """`<joint>.stribeck` · sign(ṡ) exp(-(ṡ/v)²), with `velocities` v of the axes, rad/s or m/s (Armstrong-Hélouvry 1994)."""
 
     velocities: tuple[float, ...]
-    key = "stribeck"
+    key: ClassVar[str] = "stribeck"
 
     @classmethod
     def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
@@ -101,7 +101,7 @@ class Presliding(_PerMotor):
     """
 
     travels: tuple[float, ...]
-    key = "presliding"
+    key: ClassVar[str] = "presliding"
 
     @classmethod
     def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
@@ -138,7 +138,7 @@ class _Warming(_PerMotor):
 class WarmUp(_Warming):
     """`<joint>.warm_up` · ṡ exp(-t/τ), with t from the start of the recording and `time` τ, s: decreasing viscosity during warm-up."""
 
-    key = "warm_up"
+    key: ClassVar[str] = "warm_up"
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         return axis.of(motion.dq) * self.cold(motion, memory)
@@ -148,7 +148,7 @@ class WarmUp(_Warming):
 class CoulombWarmUp(_Warming):
     """`<joint>.coulomb_warm_up` · sign(ṡ) exp(-t/τ), with `time` τ, s: as `WarmUp`, of Coulomb friction."""
 
-    key = "coulomb_warm_up"
+    key: ClassVar[str] = "coulomb_warm_up"
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
         return np.sign(axis.of(motion.dq)) * self.cold(motion, memory)
@@ -161,7 +161,7 @@ class Cables:
     A joint whose declared spring is identified has that in its place: the columns are the same.
     """
 
-    key = "cable_stiffness"
+    key: ClassVar[str] = "cable_stiffness"
 
     @classmethod
     def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
@@ -204,7 +204,7 @@ class _PerLoad:
 class LoadCoulomb(_PerLoad):
     """`<joint>.load_coulomb` · |load| sign ṡ: load-dependent friction of the gears."""
 
-    key = "load_coulomb"
+    key: ClassVar[str] = "load_coulomb"
 
     def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
         return np.sign(speed)
@@ -215,7 +215,7 @@ class LoadStribeck(_PerLoad):
     """`<joint>.load_stribeck` · |load| sign(ṡ) exp(-(ṡ/v)²), with `velocities` v as `Stribeck` (Bittencourt & Gunnarsson 2012)."""
 
     velocities: tuple[float, ...]
-    key = "load_stribeck"
+    key: ClassVar[str] = "load_stribeck"
 
     @classmethod
     def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
