@@ -41,10 +41,7 @@ def desired_pose(model: RobotModel, nominal: RobotModel, targets: ToolTargets) -
 
 def joints_before(model: RobotModel, target: str) -> int:
     """How many joints move a point."""
-    joint, count = model.point(target).joint, 0
-    while joint >= 0:
-        joint, count = model.joints[joint].parent, count + 1
-    return count
+    return len(model.path_to(model.point(target).joint))
 
 
 def _from_stations(

@@ -6,7 +6,7 @@ from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
 
 
-def path_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:
+def chain_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str, tuple[int, ...]]:
     """Name of a target (default: the first) and indices of the joints that move it, from the base on.
 
     Raises `FlexcalError` for an unknown point, and for a robot without any, to which the `format_name` could lead.
@@ -16,8 +16,4 @@ def path_to(model: RobotModel, point: str | None, format_name: str) -> tuple[str
             f"{format_name} are of the chain from the base to a point, and {model.path} declares none; add one under `points:`."
         )
     target = model.point(point)
-    at, chain = target.joint, []
-    while at >= 0:
-        chain.insert(0, at)
-        at = model.joints[at].parent
-    return target.name, tuple(chain)
+    return target.name, model.path_to(target.joint)

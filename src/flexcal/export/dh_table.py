@@ -10,7 +10,7 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.export.chain import path_to
+from flexcal.export.chain import chain_to
 from flexcal.export.dh_parameters import (
     NEARLY_PARALLEL,
     DhChain,
@@ -68,7 +68,7 @@ def render_dh(
     used. `unseen` is the robot with only that in its posterior which the measured points leave open: parameters of which that is the
     larger part are marked as not determined. Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    target, chain = path_to(model, point, "Denavit-Hartenberg parameters")
+    target, chain = chain_to(model, point, "Denavit-Hartenberg parameters")
     straight = chain_axes(nominal, target, chain)
     before = dh_chain(straight, hayati=not four_parameters)
     kinds = [model.joints[i].kind for i in chain]

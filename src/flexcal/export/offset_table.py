@@ -8,7 +8,7 @@ from io import StringIO
 
 import numpy as np
 
-from flexcal.export.chain import path_to
+from flexcal.export.chain import chain_to
 from flexcal.export.offset_fit import OffsetFit, error_after_offsets, fit_offsets, offset_tool
 from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
 from flexcal.export.transforms import SIX, from_xyz_rpy, transform, xyz_rpy
@@ -34,7 +34,7 @@ def render_offsets(
 
     Raises `FlexcalError` for a robot without points, or an unknown point.
     """
-    target, chain = path_to(model, point, "Joint offsets")
+    target, chain = chain_to(model, point, "Joint offsets")
     fit = fit_offsets(model, nominal, target, keep_frames=keep_frames, undetermined=undetermined)
     text = _csv(model, fit, chain, keep_frames=keep_frames)
     placed = "as it is" if keep_frames else "with base and tool placed by best fit"

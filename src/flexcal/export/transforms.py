@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexcal.model.parts import rotation_rpy, rpy_rotation
+from flexcal.model.parts import axis_rotations, rotation_rpy, rpy_rotation
 
 SIX: tuple[str, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 X, Y, Z = np.eye(3)
@@ -30,11 +30,9 @@ def from_xyz_rpy(numbers: dict[str, float]) -> np.ndarray:
 
 
 def turned(axis: np.ndarray, angle: np.ndarray | float) -> np.ndarray:
-    """Rotations (..., 4, 4) by angles (...,), rad, about a unit vector (3,): Rodrigues."""
-    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
-    angle = np.asarray(angle, dtype=float)[..., None, None]
-    result = np.zeros((*angle.shape[:-2], 4, 4))
-    result[..., :3, :3] = np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * (skew @ skew)
+    """Rotations (..., 4, 4) by angles (...,), rad, about a unit vector (3,)."""
+    result = np.zeros((*np.shape(angle), 4, 4))
+    result[..., :3, :3] = axis_rotations(axis, angle)
     result[..., 3, 3] = 1.0
     return result
 

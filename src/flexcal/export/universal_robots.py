@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.errors import FlexcalError
-from flexcal.export.chain import path_to
+from flexcal.export.chain import chain_to
 from flexcal.export.dh_parameters import Axes, DhChain, chain_axes, dh_chain, joint_transform, link_transform
 from flexcal.export.representation_error import AT_REST, ToolMap
 from flexcal.export.transforms import Z, from_xyz_rpy, transform, turned, xyz_rpy
@@ -34,7 +34,7 @@ def render_kinematics(model: RobotModel, nominal: RobotModel) -> RenderedModel:
     The last frame is at the URDF's `tool0` along the last axis, or at the last link without one. Raises `FlexcalError` for a robot that
     is not one chain of six revolute joints, or has no point at its end.
     """
-    point, chain = path_to(model, None, "Placements of joints")
+    point, chain = chain_to(model, None, "Placements of joints")
     if chain != (0, 1, 2, 3, 4, 5) or model.n != 6 or {j.kind for j in model.joints} != {"revolute"}:
         raise FlexcalError(
             f"a kinematics file is of one chain of six revolute joints, which {model.name} is not; export urdf or mdh instead."

@@ -63,8 +63,4 @@ def _names(model: RobotModel, poses: PoseSet) -> list[str]:
 
 def _carried(model: RobotModel, link: int) -> bool:
     """Whether a link hangs on a spring."""
-    while link >= 0:
-        if link in model.bearing_frames:
-            return True
-        link = model.joints[link].parent
-    return False
+    return any(joint in model.bearing_frames for joint in model.path_to(link))

@@ -97,12 +97,7 @@ def point_uncertainty(model: RobotModel, target: str) -> float:
 
 def _names(model: RobotModel, targets: Sequence[str], stations: Sequence[str]) -> list[str]:
     """Geometric parameters, those of a station that measures in the base frame without its rotation."""
-    moving: set[int] = set()
-    for target in targets:
-        joint = model.point(target).joint
-        while joint >= 0:
-            moving.add(joint)
-            joint = model.joints[joint].parent
+    moving = {i for target in targets for i in model.path_to(model.point(target).joint)}
     names = [f"{model.joints[i].name}.{key}" for i in sorted(moving) for key in GEOMETRY]
     names += [f"tool.{key}" for key in GEOMETRY]
     first = next(iter(model.points))

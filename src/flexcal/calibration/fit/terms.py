@@ -105,13 +105,8 @@ def loaded_compliances(model: RobotModel, poses: PoseSet) -> frozenset[str]:
 
 def moving_joints(model: RobotModel, poses: PoseSet) -> list[int]:
     """Joints between the base and any measured target, in chain order."""
-    found: set[int] = set()
-    for target in dict.fromkeys(poses.target):
-        joint = model.point(target).joint
-        while joint >= 0:
-            found.add(joint)
-            joint = model.joints[joint].parent
-    return sorted(found)
+    targets = dict.fromkeys(poses.target)
+    return sorted({i for target in targets for i in model.path_to(model.point(target).joint)})
 
 
 def _keys(kind: str) -> tuple[str, ...]:

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import PointKinematics
-from flexcal.model.parts import vector_rotation
+from flexcal.model.parts import skew_matrix, vector_rotation
 from flexcal.model.robot import GEOMETRY, LATERAL, SPRINGS, STATION, RobotModel
 from flexcal.model.statics import (
     Equilibrium,
@@ -153,7 +153,7 @@ class Prediction:
 def left_jacobian(vector: np.ndarray) -> np.ndarray:
     """How a rotation turns (3, 3), in fixed axes, as its rotation vector (3,) changes."""
     angle = float(np.linalg.norm(vector))
-    skew = np.array([[0, -vector[2], vector[1]], [vector[2], 0, -vector[0]], [-vector[1], vector[0], 0]])
+    skew = skew_matrix(vector)
     if angle < 1e-8:
         return np.eye(3) + skew / 2
     return (

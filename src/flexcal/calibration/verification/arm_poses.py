@@ -52,11 +52,6 @@ def arms_at(model: RobotModel, poses: PoseSet, errors: Mapping[str, np.ndarray])
 
 def joint_polylines(model: RobotModel, poses: PoseSet) -> np.ndarray:
     """Corners (N, joints + 2, 3) m of the arm from the base through every joint to the measured point, base frame, undeflected."""
-    chain: list[int] = []
-    joint = model.point(str(poses.target[0])).joint
-    while joint >= 0:
-        chain.insert(0, joint)
-        joint = model.joints[joint].parent
     still = np.zeros((len(poses), model.n, 3))
     q = np.ascontiguousarray(poses.q)
     target = model.point(str(poses.target[0]))
@@ -66,7 +61,7 @@ def joint_polylines(model: RobotModel, poses: PoseSet) -> np.ndarray:
         geometry = np.ascontiguousarray(model.geometry)
         return model.tree.point(index, frame[0], frame[1], xyz, geometry, np.zeros(6), q, still, False)[0]
 
-    origins = [place(k, np.eye(3), np.zeros(3), np.zeros(3)) for k in chain]
+    origins = [place(k, np.eye(3), np.zeros(3), np.zeros(3)) for k in model.path_to(target.joint)]
     tip = place(target.joint, target.rotation, target.translation, target.xyz)
     return np.stack([np.zeros_like(tip), *origins, tip], axis=1)
 

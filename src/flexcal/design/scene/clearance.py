@@ -100,12 +100,10 @@ def _reaches(checker: CollisionChecker) -> np.ndarray:
         geometry = shape.geometry
         geometry.computeLocalAABB()
         far = np.linalg.norm(shape.translation) + np.linalg.norm(geometry.aabb_center) + geometry.aabb_radius
-        at = shape.joint
-        while at >= 0:
+        for at in reversed(checker.model.path_to(shape.joint)):
             reach[at] = max(reach[at], far)
             travel = (
                 max(abs(joints[at].lower), abs(joints[at].upper)) if joints[at].kind == "prismatic" else 0.0
             )
             far += np.linalg.norm(joints[at].translation) + travel
-            at = joints[at].parent
     return np.where([joint.kind == "prismatic" for joint in joints], 1.0, reach)

@@ -45,10 +45,7 @@ def inertial_columns(model: RobotModel) -> tuple[InertialColumns, ...]:
 
 
 def _beyond(model: RobotModel, joint: int, column: int) -> bool:
-    at = column // len(LINK_PARAMETERS)
-    while at > joint:
-        at = model.joints[at].parent
-    return at == joint
+    return joint in model.path_to(column // len(LINK_PARAMETERS))
 
 
 def random_states(model: RobotModel, samples: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

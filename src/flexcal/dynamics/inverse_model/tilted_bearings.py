@@ -57,13 +57,7 @@ class TiltedBearings:
 
     def felt(self, coordinate: tuple[int, int]) -> np.ndarray:
         """Numbers of the inertials, of all links, that a coordinate feels: those of the links beyond its joint."""
-        beyond = []
-        for link in range(self.model.n):
-            at = link
-            while at > coordinate[0]:
-                at = self.model.joints[at].parent
-            if at == coordinate[0]:
-                beyond.append(link)
+        beyond = [link for link in range(self.model.n) if coordinate[0] in self.model.path_to(link)]
         return np.concatenate(
             [len(LINK_PARAMETERS) * link + np.arange(len(LINK_PARAMETERS)) for link in beyond]
         )

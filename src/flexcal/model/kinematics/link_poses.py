@@ -6,7 +6,7 @@ import numpy as np
 
 from flexcal.model.kinematics.forward import joint_batch, point_kinematics
 from flexcal.model.kinematics.placements import joint_placement
-from flexcal.model.parts import Joint
+from flexcal.model.parts import axis_rotations
 from flexcal.model.robot import RobotModel
 
 
@@ -30,7 +30,7 @@ def link_frames(model: RobotModel, q: np.ndarray) -> tuple[np.ndarray, np.ndarra
             rotation[:, i] = turned
             origin[:, i] += moved[:, None] * (turned @ joint.axis)
         else:
-            rotation[:, i] = turned @ _turns(joint, moved)
+            rotation[:, i] = turned @ axis_rotations(joint.axis, moved)
     return rotation, origin
 
 
@@ -39,20 +39,7 @@ def joint_origins(model: RobotModel, q: np.ndarray, *, point: str | None = None)
 
     Joints of a tree that do not carry the target are left out. Raises `FlexcalError` for an unknown point or a wrong joint count.
     """
-    chain: list[int] = []
-    joint = model.point(point).joint
-    while joint >= 0:
-        chain.insert(0, joint)
-        joint = model.joints[joint].parent
+    chain = model.path_to(model.point(point).joint)
     _, origin = link_frames(model, q)
     target = point_kinematics(model, q, point=point, jacobians=False).position
     return np.concatenate([np.zeros((len(origin), 1, 3)), origin[:, chain], target[:, None]], axis=1)
-
-
-def _turns(joint: Joint, angle: np.ndarray) -> np.ndarray:
-    """Rotations (samples, 3, 3) about the joint's axis: Rodrigues."""
-    x, y, z = joint.axis
-    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    return (
-        np.eye(3) + np.sin(angle)[:, None, None] * skew + (1 - np.cos(angle))[:, None, None] * (skew @ skew)
-    )

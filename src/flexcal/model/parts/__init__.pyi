@@ -4,14 +4,16 @@ from .point import ForceSensor, Payload, Point
 from .pseudo_inertia_matrix import PSEUDO_INERTIA, is_physically_consistent, pseudo_inertia
 from .rotations import (
     axis_rotation,
+    axis_rotations,
     rotation_rpy,
     rotation_vector,
     rotation_wxyz,
     rpy_rotation,
+    skew_matrix,
     vector_rotation,
     wxyz_rotation,
 )
-from .tree import Bearings, bearing_frame, kinematic_tree
+from .tree import Bearings, bearing_frame, kinematic_tree, path_to
 
 __all__ = [
     "LINK_PARAMETERS",
@@ -24,16 +26,19 @@ __all__ = [
     "Payload",
     "Point",
     "axis_rotation",
+    "axis_rotations",
     "bearing_frame",
     "is_physically_consistent",
     "kinematic_tree",
     "normals_to",
     "parallel_axis",
+    "path_to",
     "pseudo_inertia",
     "rotation_rpy",
     "rotation_vector",
     "rotation_wxyz",
     "rpy_rotation",
+    "skew_matrix",
     "vector_rotation",
     "wxyz_rotation",
 ]

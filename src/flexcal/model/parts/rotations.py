@@ -32,8 +32,20 @@ def rotation_rpy(rotation: np.ndarray) -> np.ndarray:
 
 def axis_rotation(axis: np.ndarray, angle: float) -> np.ndarray:
     """Rotation (3, 3) by `angle` (rad) about the unit vector `axis` (3,)."""
-    skew = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    skew = skew_matrix(axis)
     return np.eye(3) + np.sin(angle) * skew + (1 - np.cos(angle)) * skew @ skew
+
+
+def axis_rotations(axis: np.ndarray, angles: np.ndarray | float) -> np.ndarray:
+    """Rotations (..., 3, 3) by `angles` (...,) (rad) about the unit vector `axis` (3,): Rodrigues' formula."""
+    skew, angles = skew_matrix(axis), np.asarray(angles, dtype=float)[..., None, None]
+    return np.eye(3) + np.sin(angles) * skew + (1 - np.cos(angles)) * (skew @ skew)
+
+
+def skew_matrix(vector: np.ndarray) -> np.ndarray:
+    """The matrix (3, 3) whose product with a second vector (3,) is the cross product of both."""
+    x, y, z = vector
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
 def vector_rotation(vector: np.ndarray) -> np.ndarray:

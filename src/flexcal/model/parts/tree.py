@@ -14,6 +14,15 @@ Bearings = Literal["before", "after"]
 """Where bearings tilt: before the joint's rotation, about axes fixed to the parent link, or after it, about axes of the child."""
 
 
+def path_to(joints: Sequence[Joint], joint: int) -> tuple[int, ...]:
+    """Indices of the joints from the base to a joint, this one included; none for -1, the base."""
+    path: list[int] = []
+    while joint >= 0:
+        path.append(joint)
+        joint = joints[joint].parent
+    return tuple(reversed(path))
+
+
 def bearing_frame(joint: Joint) -> np.ndarray:
     """The default bearing frame (3, 3) of a joint: z its axis, x the first axis normal to it."""
     x = joint.normals[0]

@@ -18,6 +18,7 @@ from flexcal.model.parts import (
     Point,
     bearing_frame,
     kinematic_tree,
+    path_to,
     rpy_rotation,
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
@@ -61,7 +62,7 @@ def _parts(file: YamlFile, config: RobotConfig, urdf: Path, description: Descrip
     payload = _payload(file, description, config)
     stiffness, damping = np.full((n, 3), np.nan), np.full((n, 3), np.nan)
     bearing_frames: dict[int, np.ndarray] = {}
-    carrying = {i for p in points.values() for i in _path(joints, p.joint)}
+    carrying = {i for p in points.values() for i in path_to(joints, p.joint)}
     for k, entry in enumerate(config.elastic):
         i = _joint(file, ("elastic", k, "joint"), names, entry.joint)
         if i in bearing_frames:
@@ -236,11 +237,3 @@ def _check_count(file: YamlFile, keys: tuple[str, str], values: Sequence[float],
         raise file.error(
             keys, f"{keys[1]} has {len(values)} entries but the robot has {n} joints; give one per joint."
         )
-
-
-def _path(joints: tuple[Joint, ...], joint: int) -> list[int]:
-    result = []
-    while joint >= 0:
-        result.append(joint)
-        joint = joints[joint].parent
-    return result

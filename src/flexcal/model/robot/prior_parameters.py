@@ -92,12 +92,7 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
 def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
     """What robot.yaml leaves uncertain of the links that an elastic joint moves and, where `loaded`, the payload's mass."""
     elastic = {joint.index for joint in model.elastic}
-    moved = []
-    for i in range(model.n):
-        at = i
-        while at >= 0 and at not in elastic:
-            at = model.joints[at].parent
-        moved += [i] if at >= 0 else []
+    moved = [i for i in range(model.n) if not elastic.isdisjoint(model.path_to(i))]
     items = [declared(model, name) for name in uncertain_inertials(model, moved)]
     held = model.payload
     if loaded and held is not None and held.mass > 0 and uncertain_payload(model):

@@ -27,6 +27,7 @@ from flexcal.model.parts import (
     bearing_frame,
     kinematic_tree,
     parallel_axis,
+    path_to,
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ControllerConfig, PriorConfig, RobotConfig
@@ -244,6 +245,10 @@ class RobotModel:
                 f"there is no movable joint '{name}' in {self.urdf.name}; there are {', '.join(self.joint_names)}."
             )
         return self.joint_names.index(name)
+
+    def path_to(self, joint: int) -> tuple[int, ...]:
+        """Indices of the joints from the base to a joint, this one included; none for -1, the base."""
+        return path_to(self.joints, joint)
 
     def point(self, name: str | None = None) -> Point:
         """A target by name, the first declared one without; raises `FlexcalError` that lists the names."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.model.kinematics import joint_batch, joint_placement
+from flexcal.model.parts import axis_rotations
 from flexcal.model.robot import RobotModel
 
 
@@ -25,7 +26,7 @@ def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
     q = joint_batch(model, q)
     rotation, position = np.eye(3), np.zeros(3)
     axes, origins = {}, {}
-    carrying = _path(model, sensor.joint)
+    carrying = model.path_to(sensor.joint)
     for i in carrying:
         offset, turn = joint_placement(model, i)
         position, rotation = position + rotation @ offset, rotation @ turn
@@ -34,7 +35,7 @@ def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
         if model.joints[i].kind == "prismatic":
             position = position + moved[:, None] * axes[i]
         else:
-            rotation = rotation @ _turns(axis, moved)
+            rotation = rotation @ axis_rotations(axis, moved)
     place = position + rotation @ sensor.translation
     rotation = sensor.sign * (rotation @ sensor.rotation)
     found = np.zeros((*q.shape, 6))
@@ -48,15 +49,6 @@ def sensor_jacobian(model: RobotModel, q: np.ndarray) -> np.ndarray:
     return found
 
 
-def _path(model: RobotModel, joint: int) -> list[int]:
-    """The joints from the base to a joint."""
-    found: list[int] = []
-    while joint >= 0:
-        found.insert(0, joint)
-        joint = model.joints[joint].parent
-    return found
-
-
 def declared_torque(model: RobotModel, q: np.ndarray) -> np.ndarray:
     """Torque (samples, n) of springs and cables on the joints, as far as robot.yaml says how much: less what motors give against it."""
     found = np.zeros_like(q)
@@ -67,10 +59,3 @@ def declared_torque(model: RobotModel, q: np.ndarray) -> np.ndarray:
     for cable in model.config.dynamics.cable_torques:
         found[:, model.joint_index(cable.joint)] -= cable.torque or 0.0
     return found
-
-
-def _turns(axis: np.ndarray, angles: np.ndarray) -> np.ndarray:
-    """Rotations (samples, 3, 3) about a unit `axis` (3,) by `angles` (samples,): Rodrigues."""
-    cross = np.cross(np.eye(3), axis[None])
-    sine, cosine = np.sin(angles)[:, None, None], np.cos(angles)[:, None, None]
-    return np.eye(3) + sine * cross + (1.0 - cosine) * (cross @ cross)
