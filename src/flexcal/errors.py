@@ -15,10 +15,10 @@ class InputError(FlexcalError):
     """A file or argument that cannot be used as it is; the message names the file, and line, column or joint where there is one."""
 
 
-def unreadable(path: Path, problem: OSError | UnicodeDecodeError) -> InputError:
-    """The error of a file that cannot be read, with the system's reason."""
-    reason = getattr(problem, "strerror", None) or str(problem)
-    return InputError(f"{path} cannot be read ({reason}); check the name and the folder.")
+def unreadable(path: Path, problem: Exception, remedy: str = "check the name and the folder") -> InputError:
+    """The error of a file that cannot be read, with the system's reason on one line, and what to do."""
+    reason = getattr(problem, "strerror", None) or " ".join(str(problem).split())
+    return InputError(f"{path} cannot be read ({reason}); {remedy}.")
 
 
 @contextmanager

@@ -199,7 +199,7 @@ REFUSED = {
     ("--duration", 3): "3 s is too short for the base frequency 0.2 Hz",
     ("--duration", 12): "2.4 periods",
     ("--of", "link_3.mass"): "only for c",
-    ("--criterion", "c", "--of", "link_3.mas"): "did you mean link_3.mass",
+    ("--criterion", "c", "--of", "link_3.mas"): "did you mean 'link_3.mass'",
     ("--criterion", "c", "--of", "link_1.com_z"): "link_1.com_z, which torques determine not at all",
     (
         "--criterion",

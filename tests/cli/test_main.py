@@ -10,7 +10,7 @@ import pytest
 from cli_files import FLEXCAL
 
 from flexcal.cli import main as cli
-from flexcal.cli.arguments.verb_table import VERBS
+from flexcal.cli.arguments.verb_table import VERBS, command_class
 
 
 def test_help_lists_every_verb_with_an_example(run) -> None:
@@ -58,11 +58,9 @@ def test_every_verb_explains_itself(run, verb) -> None:
 
 @pytest.mark.parametrize("verb", VERBS, ids=lambda verb: verb.name)
 def test_every_example_parses(verb, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    import importlib
-
     monkeypatch.chdir(tmp_path)
 
-    command = getattr(importlib.import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
+    command = command_class(verb)
     carried_out: list[object] = []
     monkeypatch.setattr(command, "run", lambda self: carried_out.append(self))
     assert cli.main(verb.example.split()[1:]) == 0

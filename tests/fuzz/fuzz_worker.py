@@ -23,10 +23,10 @@ MEMORY = 6 * 2**30
 def import_everything() -> None:
     """All verbs, and what they import when they run: modules only, so that no thread is started."""
     from flexcal.cli import main
-    from flexcal.cli.arguments.verb_table import VERBS
+    from flexcal.cli.arguments.verb_table import VERBS, command_class
 
     for verb in VERBS:
-        import_module(f"flexcal.cli.verbs.{verb.module}")
+        command_class(verb)
     for name in (
         "polars",
         "scipy.optimize",

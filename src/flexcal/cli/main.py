@@ -11,10 +11,9 @@ import sys
 import textwrap
 from collections.abc import Sequence
 from contextlib import redirect_stderr, suppress
-from importlib import import_module
 
 from flexcal.cli.arguments.invocation import record_command_line
-from flexcal.cli.arguments.verb_table import Verb, find_verb, overview, unknown_verb
+from flexcal.cli.arguments.verb_table import Verb, command_class, find_verb, overview, unknown_verb
 from flexcal.cli.terminal.encoding import substitute_unencodable
 from flexcal.cli.terminal.escaping import sentence
 from flexcal.cli.terminal.standard_streams import buffered_output, replace_closed_streams
@@ -111,7 +110,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     from flexcal.cli.arguments.parse_errors import refusal, refuse_unknown_options
     from flexcal.cli.folders.overwrite_protection import complete_interrupted_runs, outputs
 
-    command = getattr(import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
+    command = command_class(verb)
     refuse_unknown_options(verb, arguments)
     said = io.StringIO()
     try:

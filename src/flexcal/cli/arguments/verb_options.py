@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields
-from importlib import import_module
 from typing import Annotated, Literal, get_args, get_origin, get_type_hints
 
 from tyro.conf import Positional
 
-from flexcal.cli.arguments.verb_table import Verb
+from flexcal.cli.arguments.verb_table import Verb, command_class
 
 
 @dataclass(frozen=True)
@@ -22,7 +21,7 @@ class Option:
 
 def options_of(verb: Verb) -> tuple[Option, ...]:
     """The options of a verb in the order of its help; those without a name in front are none."""
-    command = getattr(import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
+    command = command_class(verb)
     hints = get_type_hints(command, include_extras=True)
     found = []
     for field in fields(command):

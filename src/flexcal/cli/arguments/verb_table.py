@@ -5,6 +5,8 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from importlib import import_module
+from typing import Any
 
 from flexcal.export import FORMATS
 
@@ -311,6 +313,11 @@ def find_verb(arguments: Sequence[str]) -> Verb | None:
     """The verb that the arguments begin with."""
     matches = [verb for verb in VERBS if tuple(arguments[: len(verb.words)]) == verb.words]
     return matches[0] if matches else None
+
+
+def command_class(verb: Verb) -> type[Any]:
+    """The dataclass of a verb's arguments, whose `run` carries it out."""
+    return getattr(import_module(f"flexcal.cli.verbs.{verb.module}"), verb.command)
 
 
 def unknown_verb(arguments: Sequence[str]) -> str:

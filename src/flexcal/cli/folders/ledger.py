@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from flexcal.errors import InputError
+from flexcal.errors import unreadable
 from flexcal.files.transaction import current
 
 LEDGER = ".flexcal"
@@ -31,9 +31,7 @@ class Ledger:
         except FileNotFoundError:
             return cls(entries)
         except OSError as problem:
-            raise InputError(
-                f"{path} cannot be read ({problem.strerror or problem}); give another --out."
-            ) from problem
+            raise unreadable(path, problem, "give another --out") from problem
         for line in lines:
             if line.startswith("#"):
                 verb = line.removeprefix(_COMMENT)

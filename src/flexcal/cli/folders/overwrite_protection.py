@@ -13,7 +13,7 @@ from typing import Any
 
 from flexcal.cli.folders.ledger import LEDGER, Ledger
 from flexcal.data.plans import page_beside
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import (
     Publication,
     Stage,
@@ -148,9 +148,7 @@ def _digest_on_disk(path: Path) -> str:
         with path.open("rb") as stream:
             return hashlib.file_digest(stream, "sha256").hexdigest()
     except OSError as problem:
-        raise InputError(
-            f"{path} cannot be read ({problem.strerror or problem}); give another --out."
-        ) from problem
+        raise unreadable(path, problem, "give another --out") from problem
 
 
 def complete_interrupted_runs(parsed: Any) -> None:

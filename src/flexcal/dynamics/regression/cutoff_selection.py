@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import cast
 
 import numpy as np
@@ -13,7 +12,7 @@ from scipy.fft import next_fast_len
 
 from flexcal.data.recordings import Decimation, Recording
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.signals import AT_REST, Motion
+from flexcal.dynamics.signals import AT_REST, Motion, between_gaps
 from flexcal.model.robot import RobotModel
 
 BLOCKS = 10
@@ -68,7 +67,7 @@ class CutoffChoice:
 def pieces(recordings: Iterable[Recording], samples: int, proposed_hz: float) -> Iterator[ContinuousSamples]:
     """The first so many `samples` of a log between its gaps, at no less than the rate that cut-offs up to the proposed one need."""
     left = samples
-    for _, group in groupby(recordings, _between_gaps()):
+    for group in between_gaps(recordings):
         if left <= 0:
             return
         parts = list(_first(group, left))
@@ -322,16 +321,3 @@ def _first(recordings: Iterable[Recording], samples: int) -> Iterator[Recording]
 def _net(recording: Recording) -> np.ndarray:
     outside = recording.external_torque
     return recording.torque if outside is None else recording.torque + outside
-
-
-def _between_gaps() -> Callable[[Recording], int]:
-    """Number of the stretch in which a recording of a log lies."""
-    number = 0
-
-    def stretch(recording: Recording) -> int:
-        nonlocal number
-        base = recording.time_base
-        number += base is not None and base.gap > 0
-        return number
-
-    return stretch

@@ -4,7 +4,7 @@ from .experiment import Experiment, Window, slowest_speeds
 from .external_torques import external_torque
 from .joint_log import JointLog, log_blocks
 from .log_faults import LogFaults
-from .motion import AT_REST, BESIDE, Motion, differences, filtered_motion, smoothed, stretches
+from .motion import AT_REST, BESIDE, Motion, between_gaps, differences, filtered_motion, smoothed, stretches
 from .periodic_motion import PeriodicMotion, real_rows
 from .repeated_motion import RepeatedMotion
 
@@ -20,6 +20,7 @@ __all__ = [
     "PeriodicMotion",
     "RepeatedMotion",
     "Window",
+    "between_gaps",
     "differences",
     "external_torque",
     "filtered_motion",

@@ -176,7 +176,7 @@ def filtered_positions(
     """
     short: TooFewSamples | None = None
     long = False
-    for stretch in _between_gaps(recordings):
+    for stretch in between_gaps(recordings):
         try:
             for part in _filtered(stretch, cutoff_hz, torque):
                 long = True
@@ -202,7 +202,8 @@ def stretches(motions: Iterable[Motion]) -> Iterator[Iterator[Motion]]:
         yield group
 
 
-def _between_gaps(recordings: Iterable[Recording]) -> Iterator[Iterator[Recording]]:
+def between_gaps(recordings: Iterable[Recording]) -> Iterator[Iterator[Recording]]:
+    """The recordings of a log in groups without gaps; each group is used up before the next is asked for."""
     number = 0
 
     def stretch(recording: Recording) -> int:

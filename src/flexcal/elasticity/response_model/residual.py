@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.elasticity.response_model.prediction import Prediction, ResponseModel
 from flexcal.elasticity.response_model.weighting import Weighting
-from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.frequency.periodic import FrequencyResponse, vec
 
 LOGARITHM_LIMIT = 0.1
 """Largest relative standard deviation of an element whose logarithm is compared; near a zero log Ĝ is biased."""
@@ -45,7 +45,7 @@ class PoseResidual:
         relative = response.stacked_std / np.maximum(np.abs(measured), np.finfo(float).tiny)
         small = relative < LOGARITHM_LIMIT
         apart = 1.0 / np.linalg.norm(_factor(response, weighting, measured, scale, small), axis=1)
-        logarithmic = small & (_vec(relative) ** 2 / 2 < LOGARITHM_CURVATURE * apart).reshape(
+        logarithmic = small & (vec(relative) ** 2 / 2 < LOGARITHM_CURVATURE * apart).reshape(
             len(measured), measured.shape[2], -1
         ).swapaxes(1, 2)
         return cls(measured, logarithmic, scale, _factor(response, weighting, measured, scale, logarithmic))
@@ -58,7 +58,7 @@ class PoseResidual:
 
     def residual(self, predicted: np.ndarray) -> np.ndarray:
         """Whitened rows (2 L m n,), line by line: real parts, then imaginary parts."""
-        white = self.factor @ _vec(self.errors(predicted + self.shift))[:, :, None]
+        white = self.factor @ vec(self.errors(predicted + self.shift))[:, :, None]
         return _real(white)[:, 0]
 
     def jacobian(self, prediction: Prediction) -> np.ndarray:
@@ -132,14 +132,10 @@ def _factor(
     logarithmic: np.ndarray,
 ) -> np.ndarray:
     """Factor (L, m n, m n) of the weight of the errors, of which some are logarithms."""
-    unit = _vec(np.where(logarithmic, measured, scale))
+    unit = vec(np.where(logarithmic, measured, scale))
     return weighting.factor(
         response, response.stacked_covariance / (unit[:, :, None] * unit[:, None, :].conj())
     )
-
-
-def _vec(matrix: np.ndarray) -> np.ndarray:
-    return np.swapaxes(matrix, -1, -2).reshape(len(matrix), -1)
 
 
 def _real(white: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ from typing import Protocol
 
 import numpy as np
 
-from flexcal.frequency.periodic import FrequencyResponse
+from flexcal.frequency.periodic import FrequencyResponse, vec
 
 
 class Weighting(Protocol):
@@ -63,7 +63,7 @@ class ResonanceWeighting:
             for at in extrema(np.log(np.abs(response.response[:, i, i])), np.log(self.prominence)):
                 near = np.exp(-0.5 * ((logarithm - logarithm[at]) / self.width) ** 2)
                 weight[:, i, i] = np.maximum(weight[:, i, i], 1 + (self.emphasis - 1) * near)
-        vector = np.swapaxes(weight, 1, 2).reshape(len(weight), -1)
+        vector = vec(weight)
         return UniformWeighting().factor(response, covariance) * vector[:, :, None]
 
 

@@ -8,7 +8,9 @@ from .estimates_file import (
     sha256_of,
     write_estimates,
 )
+from .json_values import json_values
 from .npz_reader import ArrayForm, NpzFile, refuse_foreign
+from .npz_writer import write_npz
 from .yaml_reader import YamlFile, read_yaml, read_yaml_file
 from .yaml_writer import to_plain, write_yaml, yaml_text
 
@@ -19,6 +21,7 @@ __all__ = [
     "NpzFile",
     "YamlFile",
     "block_sha256",
+    "json_values",
     "provenance",
     "read_estimates",
     "read_yaml",
@@ -28,6 +31,7 @@ __all__ = [
     "sha256_of",
     "to_plain",
     "write_estimates",
+    "write_npz",
     "write_yaml",
     "yaml_text",
 ]

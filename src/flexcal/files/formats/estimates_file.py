@@ -17,7 +17,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from flexcal.errors import FlexcalError, InputError
+from flexcal.errors import FlexcalError, InputError, unreadable
 from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.files.formats.npz_reader import ArrayForm, NpzFile, refuse_foreign
 from flexcal.files.formats.yaml_reader import YamlFile, read_yaml_file
@@ -198,8 +198,7 @@ def sha256_of(path: str | Path) -> str:
                 while content := stream.read(2**20):
                     digest.update(content)
     except OSError as problem:
-        reason = problem.strerror or str(problem)
-        raise InputError(f"{path} cannot be read ({reason}); check the name and the folder.") from problem
+        raise unreadable(path, problem) from problem
     return digest.hexdigest()
 
 

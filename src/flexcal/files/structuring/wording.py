@@ -10,10 +10,10 @@ _QUOTED = 40
 """Letters of a value that a message quotes."""
 
 
-def suggestion(word: str, known: Sequence[str]) -> str:
-    """`; did you mean '…'?` with the nearest known word, or nothing."""
-    near = difflib.get_close_matches(word, known, n=1, cutoff=0.5)
-    return f"; did you mean '{near[0]}'?" if near else ""
+def suggestion(word: str, known: Sequence[str], most: int = 1) -> str:
+    """`; did you mean '…'?` with the nearest known words, at `most` so many, or nothing."""
+    near = [f"'{name}'" for name in difflib.get_close_matches(word, known, n=most, cutoff=0.5)]
+    return f"; did you mean {' or '.join(near)}?" if near else ""
 
 
 def describe(value: Any) -> str:

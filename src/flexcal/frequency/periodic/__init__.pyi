@@ -1,5 +1,5 @@
 from .averages import Average
-from .covariance import kronecker, pool_noise
+from .covariance import kronecker, pool_noise, vec
 from .line_spectra import hold_factor, noise_lines, spectrum, torque_hold
 from .local_polynomial import local_polynomial_responses
 from .local_windows import ORDER, LocalWindows, projected
@@ -47,4 +47,5 @@ __all__ = [
     "spectrum",
     "synthesise",
     "torque_hold",
+    "vec",
 ]

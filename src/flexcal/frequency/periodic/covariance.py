@@ -10,6 +10,11 @@ _SMALLEST_RELATIVE_STD = (
 )
 
 
+def vec(matrices: np.ndarray) -> np.ndarray:
+    """Matrices (L, m, n) stacked by columns, (L, m n)."""
+    return np.swapaxes(matrices, -1, -2).reshape(len(matrices), -1)
+
+
 def pool_noise(squares: np.ndarray, bins: np.ndarray, at: np.ndarray, count: int) -> np.ndarray:
     """Means (L, …) of `squares` (B, …) over the `count` successive bins around each of the positions `at` (L,).
 

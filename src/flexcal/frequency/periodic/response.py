@@ -10,10 +10,10 @@ import numpy as np
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.recordings import Recording
 from flexcal.errors import FlexcalError, InputError
-from flexcal.files.formats import ArrayForm, NpzFile
-from flexcal.files.transaction import atomic_path, current
+from flexcal.files.formats import ArrayForm, NpzFile, write_npz
+from flexcal.files.transaction import current
 from flexcal.frequency.periodic.averages import Average, average_response, right_divide
-from flexcal.frequency.periodic.covariance import input_gain, kronecker, output_noise, total_covariance
+from flexcal.frequency.periodic.covariance import input_gain, kronecker, output_noise, total_covariance, vec
 from flexcal.frequency.periodic.pose_records import PoseRecords, by_pose
 from flexcal.frequency.periodic.steady_state import experiment_spectra, keep_periods, odd_distortion
 
@@ -118,7 +118,7 @@ class FrequencyResponse:
     @property
     def vec(self) -> np.ndarray:
         """`response` stacked by columns, (L, n²): the order of the covariances."""
-        return np.swapaxes(self.response, -1, -2).reshape(self.response.shape[0], -1)
+        return vec(self.response)
 
     @property
     def std(self) -> np.ndarray:
@@ -149,8 +149,7 @@ class FrequencyResponse:
         values["sensors"] = np.array(self.sensors, dtype=str)
         if not self.sensors:
             values = {name: value for name, value in values.items() if name not in _SENSED}
-        with atomic_path(path) as temporary, temporary.open("wb") as stream:
-            np.savez_compressed(stream, **values)
+        write_npz(path, values)
 
     @classmethod
     def load(cls, path: str | Path) -> "FrequencyResponse":

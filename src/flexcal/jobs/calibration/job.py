@@ -48,7 +48,7 @@ from flexcal.calibration.verification import (
 from flexcal.data.poses import read_poses
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
-from flexcal.files.formats import provenance, read_estimates
+from flexcal.files.formats import json_values, provenance, read_estimates
 from flexcal.jobs.calibration.fitted_measurements import measurement_digests
 from flexcal.jobs.calibration.joint_ranges import joint_extents
 from flexcal.jobs.calibration.remarks import calibration_remarks, outliers_of
@@ -59,7 +59,6 @@ from flexcal.jobs.result_files import (
     estimates_target,
     identifiability_block,
     identifiability_spectrum,
-    plain,
     quantities,
     store_block,
     write_arm,
@@ -114,7 +113,7 @@ class RobotCalibration:
     @cached_property
     def trust(self) -> Trust:
         """The verdict, from the same checks as on the page."""
-        return Trust(calibration_checks(plain(self._numbers), self.estimate, self.points))
+        return Trust(calibration_checks(json_values(self._numbers), self.estimate, self.points))
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.estimation import Dropped, Estimate, Identifiability
+from flexcal.files.formats import json_values
 from flexcal.files.transaction import current, settle, write_text
 
 RESULTS = "results.json"
+
+AGAIN = "run the verb that writes it again"
+"""What to do where a file of a run cannot be used."""
 
 _ROUNDING = 1e-9
 """A coefficient below this, in SI units, is what rounding leaves of zero."""
@@ -22,7 +23,7 @@ _ROUNDING = 1e-9
 
 def json_text(document: Mapping[str, Any]) -> str:
     """`document` as JSON, in ASCII letters; numbers that are not finite become null."""
-    return json.dumps(plain(document), indent=2, allow_nan=False)
+    return json.dumps(json_values(document), indent=2, allow_nan=False)
 
 
 def write_results(folder: Path, document: Mapping[str, Any]) -> None:
@@ -34,13 +35,12 @@ def read_results(folder: Path) -> dict[str, Any]:
     """The document that a verb left in `folder`; raises `InputError` where there is none."""
     settle(folder)
     path = folder / RESULTS
-    again = "run the verb that writes it again"
     try:
         document = json.loads(current(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
-        raise InputError(f"{path} cannot be read ({problem}); {again}.") from problem
+        raise unreadable(path, problem, AGAIN) from problem
     if not isinstance(document, dict):
-        raise InputError(f"{path} holds no results of a verb; {again}.")
+        raise InputError(f"{path} holds no results of a verb; {AGAIN}.")
     return document
 
 
@@ -82,21 +82,6 @@ def identifiability_spectrum(found: Identifiability) -> dict[str, Any]:
         "singular_values": found.singular_values,
         "diagonal": found.diagonal,
     }
-
-
-def plain(value: Any) -> Any:
-    """`value` as JSON has it: lists for arrays, null for numbers that are not finite, text for paths."""
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, np.generic):
-        return plain(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value
 
 
 def springs_block(estimate: Estimate, truth: Mapping[str, float] | None = None) -> dict[str, Any]:

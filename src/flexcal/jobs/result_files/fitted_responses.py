@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.files.formats import ArrayForm, NpzFile
-from flexcal.files.transaction import atomic_path
+from flexcal.files.formats import ArrayForm, NpzFile, write_npz
+from flexcal.jobs.result_files.document import AGAIN
 from flexcal.report.results import FittedResponse
 
 FITTED = "fitted_responses.npz"
@@ -29,13 +29,12 @@ def write_fitted_responses(folder: Path, responses: Sequence[FittedResponse]) ->
             array = np.array(value, dtype=str) if isinstance(value, tuple) else np.asarray(value)
             small = array.astype(_SINGLE[array.dtype.name]) if array.ndim == 3 else array
             arrays[f"{field.name}_{item.pose + 1}"] = small
-    with atomic_path(folder / FITTED) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    write_npz(folder / FITTED, arrays)
 
 
 def read_fitted_responses(folder: Path) -> tuple[FittedResponse, ...]:
     """What `write_fitted_responses` left; raises `InputError` where the file is not there or not such a one."""
-    file = NpzFile(folder / FITTED, "run the verb that writes it again")
+    file = NpzFile(folder / FITTED, AGAIN)
     poses = file.read({"pose": ArrayForm("whole", ("poses",))})["pose"]
     return tuple(_response(file, pose) for pose in poses.tolist())
 

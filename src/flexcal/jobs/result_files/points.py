@@ -18,15 +18,15 @@ from flexcal.calibration.verification import (
     MeasuredPoints,
 )
 from flexcal.data.poses import PoseSet
-from flexcal.errors import InputError
-from flexcal.files.formats import ArrayForm, NpzFile
+from flexcal.errors import InputError, unreadable
+from flexcal.files.formats import ArrayForm, NpzFile, write_npz
 from flexcal.files.transaction import atomic_path, current
+from flexcal.jobs.result_files.document import AGAIN
 from flexcal.units import LARGEST
 
 POINTS, ARM, LOADS = "points.csv", "arm.npz", "gravity_loads.npz"
 _MODELS = (DECLARED, NOMINAL, OWN, RIGID, CALIBRATED)
 _TEXTS = ("target", "station")
-_AGAIN = "run the verb that writes it again"
 
 
 def write_points(folder: Path, points: MeasuredPoints) -> None:
@@ -87,17 +87,17 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
         errors = {model: vectors(f"{model}_d") for model in _MODELS if f"{model}_dx" in table.columns}
         ambiguous = table["ambiguous"].cast(pl.Boolean).to_numpy()
         if CALIBRATED not in errors or not joints or not len(table):
-            raise InputError(f"{path} lacks columns or rows; run the verb that writes it again.")
+            raise InputError(f"{path} lacks columns or rows; {AGAIN}.")
         return MeasuredPoints(poses, errors, ambiguous, column("parameter_rms"), column("scatter_rms"))
     except (pl.exceptions.PolarsError, OSError) as problem:
-        raise _unreadable(path, problem) from problem
+        raise unreadable(path, problem, AGAIN) from problem
 
 
 def _numbers(path: Path, columns: pl.DataFrame) -> np.ndarray:
     values = columns.cast(pl.Float64).to_numpy()
     if (np.abs(values) > LARGEST).any():
         raise InputError(
-            f"{path} holds {values[np.abs(values) > LARGEST][0]:g}, which is no measurement; {_AGAIN}."
+            f"{path} holds {values[np.abs(values) > LARGEST][0]:g}, which is no measurement; {AGAIN}."
         )
     return values
 
@@ -112,13 +112,12 @@ def write_arm(folder: Path, arms: ArmPoses) -> None:
         "tip": arms.tip,
     }
     arrays |= {f"errors_{model}": errors for model, errors in arms.errors.items()}
-    with atomic_path(folder / ARM) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    write_npz(folder / ARM, arrays)
 
 
 def read_arm(folder: Path) -> ArmPoses:
     """What `write_arm` left; raises `InputError` where the file is not there or not such a one."""
-    file = NpzFile(folder / ARM, _AGAIN)
+    file = NpzFile(folder / ARM, AGAIN)
     forms = {
         "corners": ArrayForm("real", ("drawn", "corners", 3)),
         "surface": ArrayForm("real", ("in full", "vertices", 3)),
@@ -139,8 +138,7 @@ def read_arm(folder: Path) -> ArmPoses:
 def write_loads(folder: Path, loads: GravityLoads) -> None:
     """Leave `loads` as gravity_loads.npz in `folder`, atomically."""
     arrays = {"torque": loads.torque} | {f"along_{model}": along for model, along in loads.along.items()}
-    with atomic_path(folder / LOADS) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    write_npz(folder / LOADS, arrays)
 
 
 def read_loads(folder: Path) -> GravityLoads | None:
@@ -148,7 +146,7 @@ def read_loads(folder: Path) -> GravityLoads | None:
     path = folder / LOADS
     if not current(path).is_file():
         return None
-    file = NpzFile(path, _AGAIN)
+    file = NpzFile(path, AGAIN)
     loads = ArrayForm("real", ("points", "joints"))
     found = file.read({name: loads for name in ("torque", *_of_models(file, "along_"))})
     return GravityLoads(
@@ -162,12 +160,3 @@ def _of_models(file: NpzFile, prefix: str) -> list[str]:
 
 def _vectors(prefix: str, values: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{prefix}{axis}": values[:, k] for k, axis in enumerate("xyz")}
-
-
-def _unreadable(path: Path, problem: Exception) -> InputError:
-    reason = (
-        problem.strerror
-        if isinstance(problem, OSError) and problem.strerror
-        else " ".join(str(problem).split())
-    )
-    return InputError(f"{path} cannot be read ({reason}); run the verb that writes it again.")

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from flexcal.files.formats import ArrayForm, NpzFile
-from flexcal.files.transaction import atomic_path
+from flexcal.files.formats import ArrayForm, NpzFile, write_npz
 from flexcal.frequency.arbitrary import LocalResponse
 
 RESPONSE = "response.npz"
@@ -17,17 +16,9 @@ def write_response_arrays(
     folder: Path, response: LocalResponse, modal: np.ndarray, masses: np.ndarray
 ) -> None:
     """Write the response, that of the modal model (L, n_y, n_u) and that of the masses (L,), empty where there are none, atomically."""
-    with atomic_path(folder / RESPONSE) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(
-            stream,
-            frequencies_hz=response.frequencies_hz,
-            response=response.response,
-            covariance=response.covariance,
-            coherence=response.coherence,
-            std=response.std,
-            modal=modal,
-            masses=masses,
-        )
+    names = ("frequencies_hz", "response", "covariance", "coherence", "std")
+    arrays = {name: getattr(response, name) for name in names}
+    write_npz(folder / RESPONSE, arrays | {"modal": modal, "masses": masses})
 
 
 def read_response_arrays(folder: Path) -> dict[str, np.ndarray]:

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.dynamics.diagnostics import TorquePrediction
-from flexcal.files.formats import ArrayForm, NpzFile
-from flexcal.files.transaction import atomic_path
+from flexcal.files.formats import ArrayForm, NpzFile, write_npz
+from flexcal.jobs.result_files.document import AGAIN
 
 PREDICTIONS = "predictions.npz"
 _ARRAYS = ("time", "measured", "predicted", "frequencies_hz", "measured_density", "residual_density")
@@ -28,13 +28,12 @@ def write_predictions(folder: Path, predictions: Sequence[TorquePrediction]) -> 
         arrays |= {
             f"{name}_{k}": np.asarray(getattr(log, name), _KIND.get(name, np.float32)) for name in _ARRAYS
         }
-    with atomic_path(folder / PREDICTIONS) as temporary, temporary.open("wb") as stream:
-        np.savez_compressed(stream, **arrays)  # type: ignore[arg-type]
+    write_npz(folder / PREDICTIONS, arrays)
 
 
 def read_predictions(folder: Path) -> tuple[TorquePrediction, ...]:
     """What `write_predictions` left; raises `InputError` where the file is not there or not such a one."""
-    file = NpzFile(folder / PREDICTIONS, "run the verb that writes it again")
+    file = NpzFile(folder / PREDICTIONS, AGAIN)
     logs = file.read(
         {
             "names": ArrayForm("text", ("logs",)),

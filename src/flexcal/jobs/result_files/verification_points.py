@@ -10,8 +10,9 @@ import polars as pl
 
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.data.poses import PoseSet
-from flexcal.errors import InputError
+from flexcal.errors import unreadable
 from flexcal.files.transaction import atomic_path, current
+from flexcal.jobs.result_files.document import AGAIN
 
 if TYPE_CHECKING:
     from flexcal.jobs.two_stage import TwoStageRun
@@ -76,6 +77,4 @@ def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
         measured = points(vectors("measured_"), vectors("sigma_"), "scatter_rms")
         return measured, points(vectors(""), np.zeros((size, 3)), "model_rms")
     except (pl.exceptions.PolarsError, TypeError, OSError) as problem:
-        raise InputError(
-            f"{path} cannot be read ({' '.join(str(problem).split())}); run the verb that writes it again."
-        ) from problem
+        raise unreadable(path, problem, AGAIN) from problem

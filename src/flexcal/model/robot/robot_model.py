@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
-from difflib import get_close_matches
 from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
@@ -14,6 +13,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
+from flexcal.files.structuring import suggestion
 from flexcal.files.transaction import current
 from flexcal.kernels import Tree
 from flexcal.model.parts import (
@@ -294,10 +294,7 @@ class RobotModel:
     def value(self, name: str) -> float:
         """One named value, SI; raises `FlexcalError` that suggests close names."""
         if name not in self.values:
-            close = get_close_matches(name, self.values, 3)
-            raise FlexcalError(
-                f"unknown parameter '{name}'{'; did you mean ' + ', '.join(close) if close else ''}."
-            )
+            raise FlexcalError(f"unknown parameter '{name}'{suggestion(name, list(self.values), 3) or '.'}")
         return self.values[name]
 
     def with_values(self, values: Mapping[str, float]) -> RobotModel:

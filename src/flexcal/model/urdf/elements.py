@@ -10,7 +10,7 @@ from xml.sax.saxutils import quoteattr
 
 import numpy as np
 
-from flexcal.errors import InputError
+from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import current
 from flexcal.units import LARGEST
 
@@ -85,7 +85,7 @@ def read_elements(path: Path) -> Element:
     try:
         content = current(path).read_bytes()
     except OSError as problem:
-        raise InputError(f"{path} cannot be read ({problem.strerror}); check the file.") from problem
+        raise unreadable(path, problem, "check the file") from problem
     try:
         parser.Parse(content, True)
     except expat.ExpatError as problem:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
-from collections.abc import Mapping
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from flexcal.files.formats import json_values
 from flexcal.files.transaction import write_text
 from flexcal.report.layout.blocks import FigureBlock, Page
 from flexcal.report.layout.error_axis import ladder
@@ -47,7 +46,7 @@ def page_html(page: Page) -> str:
             script="\n".join((folder / name).read_text("utf-8") for name in _SCRIPTS),
             specifications={block.id: figure_json(block) for block in page.figures},
             dark_colours=script_json(dark_of()),
-            document=script_json(_plain(page.document)),
+            document=script_json(json_values(page.document)),
             plotly=get_plotlyjs() if used else "",
         )
     )
@@ -80,16 +79,3 @@ def script_json(value: Any) -> str:
     """Compact JSON that cannot end the script element around it."""
     text = json.dumps(value, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
     return text.replace("<", "\\u003c").replace("\u2028", "\\u2028").replace("\u2029", "\\u2029")
-
-
-def _plain(value: Any) -> Any:
-    """Plain JSON values; what is not finite becomes null."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
-    if hasattr(value, "tolist"):
-        return _plain(value.tolist())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value if isinstance(value, (str, int, float, bool, type(None))) else str(value)
