@@ -8,7 +8,7 @@ from .estimates_file import (
     sha256_of,
     write_estimates,
 )
-from .json_values import json_values
+from .json_conversion import json_values
 from .npz_reader import ArrayForm, NpzFile, refuse_foreign
 from .npz_writer import write_npz
 from .yaml_reader import YamlFile, read_yaml, read_yaml_file

@@ -1,4 +1,4 @@
-"""Values of JSON documents."""
+"""Conversion of documents to values of JSON."""
 
 from __future__ import annotations
 
