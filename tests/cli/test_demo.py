@@ -20,6 +20,8 @@ STAGE_ONE = {
     "damping": {"joint_1": {"drive": QUANTITY}},
 }
 DOCUMENT = {
+    "kind": "demo",
+    "schema": 1,
     "stage1": STAGE_ONE,
     "cad_alone": {
         "stage1": STAGE_ONE,

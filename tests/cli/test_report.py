@@ -59,6 +59,8 @@ def test_folders_without_anything_to_report(run, ur5_folder: Path, tmp_path: Pat
     assert "no results.json" in refused(run, tmp_path, "report", tmp_path / "none")
     (tmp_path / "measured").mkdir()
     (tmp_path / "measured" / "results.json").write_text('{"kind": "poses", "poses": 3}\n')
+    assert "not of this version" in refused(run, tmp_path, "report", tmp_path / "measured")
+    (tmp_path / "measured" / "results.json").write_text('{"kind": "measurement", "schema": 1, "poses": 3}\n')
     assert "no calibration" in refused(run, tmp_path, "report", tmp_path / "measured")
     (tmp_path / "measured" / "results.json").write_text("{")
     assert "cannot be read" in refused(run, tmp_path, "report", tmp_path / "measured")
@@ -78,7 +80,7 @@ def test_two_calibrations_are_compared(run, calibrated: Path, tmp_path: Path) ->
     assert "no results.json" in refused(run, tmp_path, "report", calibrated, "--compare", folder / "none")
     old = folder / "old"
     old.mkdir()
-    (old / "results.json").write_text('{"verification": {}, "rms_mm": {}, "provenance": {}}')
+    (old / "results.json").write_text('{"kind": "verification", "schema": 1, "rms_mm": {}, "provenance": {}}')
     header, *_ = rows = (calibrated / "points.csv").read_text("utf-8").splitlines()
     (old / "points.csv").write_text("\n".join(rows) + "\n", "utf-8")
     assert "lacks 'robot'" in refused(run, tmp_path, "report", calibrated, "--compare", old)

@@ -72,6 +72,6 @@ def test_what_has_no_customer_version(folders: Path, capsys: pytest.CaptureFixtu
     assert "--customer" in capsys.readouterr().err
     assert main(["report", str(folders / "fit"), "--customer", "--compare", str(folders / "check")]) == 2
     (folders / "other").mkdir()
-    (folders / "other" / "results.json").write_text('{"robot": "r", "stage1": {}}')
+    (folders / "other" / "results.json").write_text('{"kind": "stiffness", "schema": 1, "robot": "r"}')
     assert main(["report", str(folders / "other"), "--customer"]) == 2
     assert "no calibration or verification" in capsys.readouterr().err

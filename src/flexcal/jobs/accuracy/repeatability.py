@@ -31,7 +31,7 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
     stored_estimates,
 )
-from flexcal.jobs.result_files import write_results
+from flexcal.jobs.result_files import header, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pages import RepeatabilityStudy, write_repeatability_report
@@ -87,6 +87,7 @@ class RobotRepeatability:
         rows = [self._pose(pose) for pose in self.visited]
         keys = ["rp_mm", "vap_mm", *(f"ap_{kind}_mm" for kind in self.errors)]
         return {
+            **header("repeatability"),
             "poses": len(rows),
             "visits": {
                 "fewest": min(row["visits"] for row in rows),

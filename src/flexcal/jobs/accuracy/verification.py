@@ -46,7 +46,7 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
 )
 from flexcal.jobs.pages import report_folder
-from flexcal.jobs.result_files import write_arm, write_points, write_results
+from flexcal.jobs.result_files import header, write_arm, write_points, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
@@ -118,7 +118,7 @@ class RobotVerification:
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
-        return {**self._numbers, "verdict": self.trust.document()}
+        return {**header("verification"), **self._numbers, "verdict": self.trust.document()}
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:

@@ -57,6 +57,7 @@ from flexcal.jobs.inputs import TARGETS, TARGETS_BETWEEN, require_distinct_files
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import (
     estimates_target,
+    header,
     identifiability_block,
     identifiability_spectrum,
     quantities,
@@ -117,7 +118,7 @@ class RobotCalibration:
 
     def document(self) -> dict[str, Any]:
         """The content of results.json; `identifiability` is that of kinematics and backlash, within it `selected` of all terms."""
-        return {**self._numbers, "verdict": self.trust.document()}
+        return {**header("calibration"), **self._numbers, "verdict": self.trust.document()}
 
     @cached_property
     def found_points(self) -> dict[str, dict[str, Any]]:

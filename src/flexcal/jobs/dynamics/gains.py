@@ -28,7 +28,7 @@ from flexcal.jobs.logs import (
     require_no_wrenches,
     scratch_folder,
 )
-from flexcal.jobs.result_files import quantities, write_results
+from flexcal.jobs.result_files import header, quantities, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, gain_checks
@@ -113,6 +113,7 @@ class IdentifiedGains:
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         return {
+            **header("gains"),
             "robot": self.robot,
             "parameters": quantities(self.factors),
             "halves": self._halves,

@@ -15,7 +15,7 @@ from flexcal.dynamics.signals import LogFaults, external_torque
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance, read_estimates
-from flexcal.jobs.result_files import estimates_target, quantities, store_block, write_results
+from flexcal.jobs.result_files import estimates_target, header, quantities, store_block, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
@@ -44,7 +44,7 @@ class RobotInertials:
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
-        return {**self._numbers, "verdict": self.trust.document()}
+        return {**header("inertials"), **self._numbers, "verdict": self.trust.document()}
 
     @property
     def _numbers(self) -> dict[str, Any]:

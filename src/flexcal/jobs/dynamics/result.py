@@ -27,6 +27,7 @@ from flexcal.jobs.pages import REPORT, report_folder
 from flexcal.jobs.result_files import (
     ESTIMATES,
     dropped_parameters,
+    header,
     quantities,
     write_predictions,
     write_results,
@@ -139,7 +140,7 @@ class DynamicsIdentification:
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
-        return {**self._numbers, "verdict": self.trust.document()}
+        return {**header("dynamics"), **self._numbers, "verdict": self.trust.document()}
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:

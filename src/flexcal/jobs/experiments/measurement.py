@@ -16,7 +16,7 @@ from flexcal.errors import InputError, naming
 from flexcal.files.formats import read_yaml, yaml_text
 from flexcal.jobs.experiments.poses import VERIFICATION
 from flexcal.jobs.inputs import read_plan_for_robot
-from flexcal.jobs.result_files import write_results
+from flexcal.jobs.result_files import header, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth, read_truth_of, write_truth
@@ -39,8 +39,9 @@ class Measurement:
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
         return {
+            **header("measurement"),
             "folder": self.folder,
-            "kind": self.kind,
+            "plan_kind": self.kind,
             "plan": self.plan,
             "poses": self.poses,
             "recordings": self.recordings,

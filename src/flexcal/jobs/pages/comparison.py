@@ -9,7 +9,7 @@ from typing import Any
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
-from flexcal.jobs.pages.report import OF_CALIBRATION, OF_VERIFICATION, lacking
+from flexcal.jobs.pages.report import lacking
 from flexcal.jobs.result_files import (
     ESTIMATES,
     RESULTS,
@@ -73,9 +73,9 @@ def _left(folder: Path, name: str) -> Run:
     path = folder / ESTIMATES
     estimates = read_estimates(path) if path.is_file() else {}
     origin: dict[str, str] = {"command": results.get("command", "")}
-    if OF_VERIFICATION in results or OF_CALIBRATION in results:
+    if results["kind"] in ("verification", "calibration"):
         points = read_points(folder, sigma=DEFAULT_SIGMA)
-        verified = OF_VERIFICATION in results
+        verified = results["kind"] == "verification"
         found = results["provenance"] if verified else common_origin(estimates)
         return Run(
             name=name,
@@ -90,7 +90,7 @@ def _left(folder: Path, name: str) -> Run:
             data=_data(found),
             origin=origin | found,
         )
-    if "plan" in results and (folder / VERIFICATION).is_file():
+    if results["kind"] == "demo" and (folder / VERIFICATION).is_file():
         found = common_origin(estimates)
         fresh, _ = read_verification(folder / VERIFICATION)
         return Run(

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
-from flexcal.jobs.pages.report import OF_CALIBRATION, OF_VERIFICATION, calibration_study, lacking
+from flexcal.jobs.pages.report import calibration_study, lacking
 from flexcal.jobs.result_files import read_points, read_results
 from flexcal.report.checks import Trust
 from flexcal.report.pages import CustomerStudy, calibration_checks, verification_checks, write_customer_report
@@ -23,10 +23,10 @@ def customer_report(folder: Path, particulars: MeasurementDetails) -> Path:
     """
     results, path = read_results(folder), folder / CUSTOMER
     try:
-        if OF_VERIFICATION in results:
+        if results["kind"] == "verification":
             points, origin = read_points(folder, sigma=DEFAULT_SIGMA), results["provenance"]
             trust = Trust(verification_checks(results, points))
-        elif OF_CALIBRATION in results:
+        elif results["kind"] == "calibration":
             study = calibration_study(folder)
             points, origin = study.points, study.estimate.provenance
             trust = Trust(calibration_checks(results, study.estimate, points))

@@ -18,6 +18,7 @@ from flexcal.jobs.result_files import (
     ESTIMATES,
     RESULTS,
     VERIFICATION,
+    Kind,
     read_arm,
     read_fitted_responses,
     read_loads,
@@ -51,11 +52,6 @@ from flexcal.report.results import TX90L_PAPER, TwoStageStudy
 from flexcal.units import MILLIMETRE
 
 REPORT = "report.html"
-_DYNAMICS, _INERTIALS, _GAINS, _STIFFNESS = "base_parameters", "trajectories", "declared_gains", "stage1"
-_PAYLOAD, _RESPONSES, _EXCITATION = "declaration", "responses", "excitation"
-OF_CALIBRATION, OF_VERIFICATION, OF_DEMO = "term_selection", "rms_mm", "calibration_fit"
-"""What results.json of `identify dynamics`, `inertials`, `gains`, `stiffness`, `payload` and `response`, of `calibrate`, of `verify` and of
-`demo` holds, and no other; the demo has a `stage1` too."""
 
 
 def report_folder(folder: Path) -> Path:
@@ -68,30 +64,31 @@ def report_folder(folder: Path) -> Path:
             f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out."
         )
     results, path = read_results(folder), folder / REPORT
+    kind: Kind = results["kind"]
     try:
-        if _INERTIALS in results:
+        if kind == "inertials":
             write_inertials_report(path, InertialsStudy(results, _block(folder, "dynamics")))
-        elif _GAINS in results:
+        elif kind == "gains":
             write_gains_report(path, results)
-        elif _PAYLOAD in results:
+        elif kind == "payload":
             payload = PayloadStudy(results, _block(folder, "payload"), read_predictions(folder))
             write_payload_report(path, payload)
-        elif _DYNAMICS in results:
+        elif kind == "dynamics":
             dynamics = DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder))
             write_dynamics_report(path, dynamics)
-        elif OF_VERIFICATION in results:
+        elif kind == "verification":
             points = read_points(folder, sigma=DEFAULT_SIGMA)
             write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
-        elif OF_CALIBRATION in results:
+        elif kind == "calibration":
             write_calibration_report(path, calibration_study(folder))
-        elif OF_DEMO in results:
+        elif kind == "demo":
             write_two_stage_report(path, two_stage_study(folder))
-        elif _STIFFNESS in results:
+        elif kind == "stiffness":
             stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted_responses(folder))
             write_stiffness_report(path, stiffness)
-        elif _EXCITATION in results:
+        elif kind == "excitation":
             write_excitation_report(path, ExcitationStudy(results, read_response_arrays(folder)))
-        elif _RESPONSES in results:
+        elif kind == "response":
             write_response_report(path, ResponseStudy(results, _responses(folder, results)))
         else:
             raise InputError(
@@ -136,7 +133,7 @@ def two_stage_study(folder: Path) -> TwoStageStudy:
 
 
 def _responses(folder: Path, results: Mapping[str, Any]) -> tuple[FrequencyResponse, ...]:
-    return tuple(FrequencyResponse.load(folder / Path(entry["file"]).name) for entry in results[_RESPONSES])
+    return tuple(FrequencyResponse.load(folder / Path(entry["file"]).name) for entry in results["responses"])
 
 
 def _block(folder: Path, block: Block) -> Estimate:

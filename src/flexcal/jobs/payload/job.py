@@ -32,6 +32,7 @@ from flexcal.jobs.payload.planned_recordings import PlannedLogs, with_planned_to
 from flexcal.jobs.payload.remarks import declared_payload, other_payloads, payload_remarks
 from flexcal.jobs.result_files import (
     estimates_target,
+    header,
     quantities,
     store_block,
     write_predictions,
@@ -76,7 +77,7 @@ class RobotPayload:
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
-        return {**self._numbers, "verdict": self.trust.document()}
+        return {**header("payload"), **self._numbers, "verdict": self.trust.document()}
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:

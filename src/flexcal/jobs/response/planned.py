@@ -22,7 +22,7 @@ from flexcal.frequency.periodic import (
     local_polynomial_responses,
     reciprocity,
 )
-from flexcal.jobs.result_files import write_results
+from flexcal.jobs.result_files import header, write_results
 from flexcal.model.robot import RobotModel, sensor_column
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, response_checks
@@ -47,6 +47,7 @@ class IdentifiedResponses:
     def document(self) -> dict[str, Any]:
         """The content of results.json; the relative numbers are medians over lines and diagonal elements."""
         return {
+            **header("response"),
             "robot": self.robot,
             "responses": self._entries,
             "reciprocity": self._pairs,

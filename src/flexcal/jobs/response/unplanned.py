@@ -41,7 +41,7 @@ from flexcal.frequency.arbitrary import (
 from flexcal.importing.columns import ResponseRecords, read_response_records
 from flexcal.jobs.response.feedback import FeedbackCheck
 from flexcal.jobs.response.spectra import measure_spectra
-from flexcal.jobs.result_files import write_response_arrays, write_results
+from flexcal.jobs.result_files import header, write_response_arrays, write_results
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, excitation_checks
 
@@ -89,7 +89,7 @@ class IdentifiedExcitation:
 
     def document(self) -> dict[str, Any]:
         """The content of results.json."""
-        return {**self._numbers, "verdict": self.trust.document()}
+        return {**header("excitation"), **self._numbers, "verdict": self.trust.document()}
 
     @cached_property
     def _numbers(self) -> dict[str, Any]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from flexcal.errors import InputError, unreadable
 from flexcal.estimation import Dropped, Estimate, Identifiability
@@ -21,6 +21,30 @@ _ROUNDING = 1e-9
 """A coefficient below this, in SI units, is what rounding leaves of zero."""
 
 
+Kind = Literal[
+    "calibration",
+    "demo",
+    "dynamics",
+    "excitation",
+    "gains",
+    "inertials",
+    "measurement",
+    "payload",
+    "repeatability",
+    "response",
+    "stiffness",
+    "verification",
+]
+"""What results.json is of."""
+SCHEMA = 1
+"""Version of the form of results.json; it counts up where a key changes its meaning or goes."""
+
+
+def header(kind: Kind) -> dict[str, Any]:
+    """What every results.json begins with."""
+    return {"kind": kind, "schema": SCHEMA}
+
+
 def json_text(document: Mapping[str, Any]) -> str:
     """`document` as JSON, in ASCII letters; numbers that are not finite become null."""
     return json.dumps(json_values(document), indent=2, allow_nan=False)
@@ -32,7 +56,7 @@ def write_results(folder: Path, document: Mapping[str, Any]) -> None:
 
 
 def read_results(folder: Path) -> dict[str, Any]:
-    """The document that a verb left in `folder`; raises `InputError` where there is none."""
+    """The document that a verb left in `folder`; raises `InputError` where there is none, and for one of another schema."""
     settle(folder)
     path = folder / RESULTS
     try:
@@ -41,6 +65,8 @@ def read_results(folder: Path) -> dict[str, Any]:
         raise unreadable(path, problem, AGAIN) from problem
     if not isinstance(document, dict):
         raise InputError(f"{path} holds no results of a verb; {AGAIN}.")
+    if document.get("kind") not in get_args(Kind) or document.get("schema") != SCHEMA:
+        raise InputError(f"{path} is not of this version of flexcal (kind and schema {SCHEMA}); {AGAIN}.")
     return document
 
 

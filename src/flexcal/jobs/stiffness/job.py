@@ -28,6 +28,7 @@ from flexcal.jobs.inputs import common_plan, plan_files, read_responses
 from flexcal.jobs.result_files import (
     dropped_parameters,
     estimates_target,
+    header,
     quantities,
     springs_block,
     store_block,
@@ -80,6 +81,7 @@ class RobotStiffness:
         """The content of results.json."""
         estimate = self.estimate
         return {
+            **header("stiffness"),
             "stage1": springs_block(estimate),
             "fit": {
                 "status": estimate.status,

@@ -12,6 +12,7 @@ from flexcal.calibration.verification import Verification, prediction_document
 from flexcal.estimation import Estimate
 from flexcal.export import ExportedFile
 from flexcal.jobs.result_files import (
+    header,
     identifiability_block,
     identifiability_spectrum,
     quantities,
@@ -33,6 +34,7 @@ def two_stage_document(run: TwoStageRun, exported: ExportedFile) -> dict[str, An
     stage_one = {kind: _springs(run, estimate, kind) for kind in ("stiffness", "damping")}
     rigid = {f"rigid_{len(c.poses)}": v for c, v in zip(run.rigid, run.rigid_verification, strict=True)}
     return {
+        **header("demo"),
         "dynamics": None if run.dynamics is None else {"parameters": quantities(run.dynamics, run.truth)},
         "cad_alone": None if run.cad_alone is None else _cad_alone(run, run.cad_alone),
         "stage1": stage_one
