@@ -27,7 +27,7 @@ from flexcal.jobs.logs import (
     scratch_folder,
     weight_faults,
 )
-from flexcal.model.robot import RobotModel
+from flexcal.model.robot import DynamicsConfig, RobotModel
 from flexcal.progress import Progress, silent
 
 JointLogs = Sequence[str | Path | Recording]
@@ -39,6 +39,7 @@ def identify_dynamics(
     logs: JointLogs,
     *,
     estimator: Estimator = _DEFAULT,
+    friction: str | tuple[str, ...] | None = None,
     hold_out: float = 0.0,
     validate: JointLogs = (),
     flexible: bool = False,
@@ -60,6 +61,8 @@ def identify_dynamics(
         96 bytes a sample of six joints, and 48 for their arm sides.
     estimator : Estimator
         All but `WLS`, `OLS` and `SDP`, and learning, go through the logs again, in this process alone.
+    friction : str or tuple of str, optional
+        "auto", "classic" or names of terms, as `dynamics: friction:` of robot.yaml, whose entry is taken by default.
     hold_out : float
         Share (0 to 1) at the end of every log that is predicted instead of fitted, with what the filters would carry over.
     validate : sequence of path or Recording
@@ -108,12 +111,11 @@ def identify_dynamics(
             jobs=jobs,
             progress=progress,
         )
-        friction = select_friction(
-            model, model.config.dynamics.friction, divided.equations, treatment.decimation
-        )
+        declared = (model.config.dynamics if friction is None else DynamicsConfig(friction=friction)).friction
+        selection = select_friction(model, declared, divided.equations, treatment.decimation)
         sensor = model.config.force_sensor
         shifted = sensor is not None and sensor.offset == "estimated"
-        terms = (*friction.terms, SensorOffset()) if shifted else friction.terms
+        terms = (*selection.terms, SensorOffset()) if shifted else selection.terms
         observation = with_backlash(Observation(model, terms, springs, bearings), divided.equations)
         base = BaseParameters.of(observation)
         systems = divided.equations(observation)
@@ -124,8 +126,8 @@ def identify_dynamics(
         rows = divided.rows(observation, base)
         estimate = with_nominal_uncertainty(train, estimator.fit(train, rows))
         essential = essential_parameters(train, estimate)
-        if friction.spread is not None:
-            estimate = friction.spread.widened(estimate)
+        if selection.spread is not None:
+            estimate = selection.spread.widened(estimate)
         external = None
         if model.force_sensor is not None:
             wide = replace(observation, terms=(*observation.terms, ExternalExcess()))
@@ -144,7 +146,7 @@ def identify_dynamics(
             hold_out=hold_out,
             validated=tuple(others),
             essential=essential,
-            friction=friction,
+            friction=selection,
             motors=observation.motors,
             treatment=treatment,
             signals=preprocessing_document(treatment, divided.logs),

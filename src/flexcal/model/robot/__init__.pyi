@@ -1,6 +1,6 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
 from .attached_payload import carried_inertias, holding, last_frame, with_point_at_frame
-from .config import AcceptanceConfig, RobotConfig, SignalConfig
+from .config import AcceptanceConfig, DynamicsConfig, RobotConfig, SignalConfig
 from .parameter_names import (
     FRICTION_PARAMETERS,
     GEOMETRY,
@@ -54,6 +54,7 @@ __all__ = [
     "STATION",
     "AcceptanceConfig",
     "ArmSensor",
+    "DynamicsConfig",
     "Posterior",
     "RobotConfig",
     "RobotModel",
