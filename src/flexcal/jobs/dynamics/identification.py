@@ -15,7 +15,7 @@ from flexcal.dynamics.friction import select_friction
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation, SensorOffset
 from flexcal.dynamics.regression import RegressionData
 from flexcal.dynamics.residual import require_scikit_learn
-from flexcal.errors import InputError
+from flexcal.errors import FlexcalError, InputError
 from flexcal.jobs.dynamics.flexible_model import require_flexible_bearings, require_flexible_drives
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
@@ -57,8 +57,8 @@ def identify_dynamics(
     model : RobotModel
         Nominal robot, with `model.config.dynamics` as robot.yaml declares it.
     logs : sequence of path or Recording
-        Joint logs of unloaded motions, as files or in memory. Files are read in blocks and filtered into temporary files, which take
-        96 bytes a sample of six joints, and 48 for their arm sides.
+        Joint logs of unloaded motions, as files or in memory, there in SI units of the joints. Files are read in blocks and filtered into
+        temporary files, which take 96 bytes a sample of six joints, and 48 for their arm sides.
     estimator : Estimator
         All but `WLS`, `OLS` and `SDP`, and learning, go through the logs again, in this process alone.
     friction : str or tuple of str, optional
@@ -94,6 +94,7 @@ def identify_dynamics(
     if learn_residual:
         _require_rigid_and_learnable(flexible)
     begun = time.perf_counter()
+    model = _without_columns(model, [*logs, *validate])
     with scratch_folder() as folder:
         files, others = _files(logs, folder, "log"), _files(validate, folder, "validation")
         require_distinct_files(files, others)
@@ -157,6 +158,19 @@ def identify_dynamics(
             predictions=tuple(divided.predictions(observation, estimate)),
             seconds=time.perf_counter() - begun,
         )
+
+
+def _without_columns(model: RobotModel, logs: JointLogs) -> RobotModel:
+    """The robot for logs in memory, which are in SI units of the joints already; raises `FlexcalError` where they stand beside files."""
+    in_memory = sum(isinstance(log, Recording) for log in logs)
+    if not in_memory or not model.config.signals:
+        return model
+    if in_memory < len(logs):
+        raise FlexcalError(
+            f"{model.path} says how the columns of files are converted (`signals:`), so logs in memory cannot stand beside files; "
+            "give one kind."
+        )
+    return replace(model, config=replace(model.config, signals={}))
 
 
 def _files(logs: JointLogs, folder: Path, name: str) -> list[Path]:

@@ -1,0 +1,72 @@
+"""Identification of dynamics by the library: objects in, one object out, the same as from files."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from planar_arm import Log
+
+from flexcal import IRLS, SDP, FlexcalError, RobotModel, identify_dynamics, read_recording
+from flexcal.jobs.dynamics import DynamicsIdentification, identify_robot_dynamics
+
+
+@pytest.fixture(scope="module")
+def files(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """robot.yaml and a log of 10 s with torque noise."""
+    return Log(duration=10.0, position_noise=1e-5, torque_noise=0.1, memory=0.05).write(
+        tmp_path_factory.mktemp("arm"), 3
+    )
+
+
+@pytest.fixture(scope="module")
+def found(files: tuple[Path, Path]) -> DynamicsIdentification:
+    robot, log = files
+    return identify_dynamics(RobotModel.from_yaml(robot), [log], hold_out=0.2)
+
+
+def test_it_is_what_the_command_line_finds(
+    found: DynamicsIdentification, files: tuple[Path, Path], tmp_path: Path
+) -> None:
+    stored = identify_robot_dynamics(files[0], [files[1]], hold_out=0.2, out=tmp_path / "out")
+    assert stored.estimate.values == found.estimate.values
+    np.testing.assert_array_equal(stored.estimate.covariance, found.estimate.covariance)
+    assert (tmp_path / "out" / "report.html").is_file()
+
+
+def test_a_recording_in_memory_is_a_log(found: DynamicsIdentification, files: tuple[Path, Path]) -> None:
+    model = RobotModel.from_yaml(files[0])
+    again = identify_dynamics(model, [read_recording(files[1], model)], hold_out=0.2)
+    assert again.estimate.values == pytest.approx(found.estimate.values, rel=1e-6, abs=1e-9)
+
+
+def test_residuals_and_model_are_those_of_the_estimate(found: DynamicsIdentification) -> None:
+    (residuals,), (prediction,) = found.residuals, found.predictions
+    share = np.linalg.norm(residuals) / np.linalg.norm(prediction.measured)
+    percent = found.document()["error_percent"]
+    assert (
+        min(percent["train"], percent["held_out"])
+        < 100 * share
+        < 1.5 * max(percent["train"], percent["held_out"])
+    )
+    values = found.model.values
+    shared = [name for name in found.estimate.values if name in values]
+    assert shared and all(values[name] == pytest.approx(found.estimate.values[name]) for name in shared)
+
+
+def test_it_shows_itself(found: DynamicsIdentification, tmp_path: Path) -> None:
+    assert "base parameters by wls" in repr(found) and len(repr(found)) < 200
+    assert found.trust.sentence in found.summary()
+    assert "<pre>" in found._repr_html_()
+    page = found.report(tmp_path / "page.html").read_text("utf-8")
+    assert page.startswith("<!DOCTYPE html>") and "Can I trust it?" in page
+
+
+@pytest.mark.parametrize("estimator", [SDP(), IRLS()])
+def test_estimators_are_objects(estimator: SDP | IRLS, files: tuple[Path, Path]) -> None:
+    found = identify_dynamics(RobotModel.from_yaml(files[0]), [files[1]], estimator=estimator)
+    assert found.estimator == estimator.name and found.document()["error_percent"]["train"] < 20
+
+
+def test_an_unknown_friction_is_refused(files: tuple[Path, Path]) -> None:
+    with pytest.raises(FlexcalError, match="friction must be 'auto', 'classic' or a list of terms"):
+        identify_dynamics(RobotModel.from_yaml(files[0]), [files[1]], friction="stiction")
