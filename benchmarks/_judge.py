@@ -49,7 +49,7 @@ class Judge:
         samples = len(q)
         columns = self.observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q)))
         found = np.zeros((self.model.n * samples, len(self.observation.names)))
-        for joint, (block, members) in enumerate(zip(columns, self.observation.members, strict=True)):
+        for joint, (block, members) in enumerate(zip(columns, self.observation.column_indices, strict=True)):
             found[joint * samples : (joint + 1) * samples, members] = block.T
         return found[:, list(self.base.found.kept)]
 

@@ -22,7 +22,7 @@ from benchmarks.peers import PeerAbsentError, run_peer
 from flexcal.data.recordings import Decimation, Recording, write_recording
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import JointLog, Motion
 from flexcal.model.robot import RobotModel
 
@@ -55,8 +55,8 @@ def run() -> list[tuple[str, float, str]]:
         log = JointLog.read(folder / "log.parquet", observation.model, CUTOFF_HZ, folder)
         peer, undecimated, decimated = best_times(
             lambda: dense(observation, swing),
-            lambda: weighted_least_squares(observe(observation, base, [log], Decimation(1))),
-            lambda: weighted_least_squares(observe(observation, base, [log], Decimation(10))),
+            lambda: weighted_least_squares(assemble_regression(observation, base, [log], Decimation(1))),
+            lambda: weighted_least_squares(assemble_regression(observation, base, [log], Decimation(10))),
         )
         peer *= 1e6 / SHORT
         figaroh, how = _figaroh(swing)
@@ -106,7 +106,7 @@ def motion(observation: Observation, number: np.ndarray) -> Motion:
     still = Motion(number / RATE_HZ, q, dq, ddq, np.zeros_like(q))
     x = np.where(observation.values() == 0, 1.0, observation.values())
     columns = observation.columns(still)
-    torque = np.stack([x[m] @ c for m, c in zip(observation.members, columns, strict=True)], axis=1)
+    torque = np.stack([x[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)], axis=1)
     torque += NOISE * np.random.default_rng(int(number[0])).normal(size=torque.shape)
     return Motion(still.time, q, dq, ddq, torque)
 

@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.cli.main import main as flexcal
-from flexcal.files.transaction import settle
+from flexcal.files.transaction import recover
 
 HERE = Path(__file__).parent
 EXAMPLES = HERE.parent / "examples"
@@ -117,7 +117,7 @@ def killed_runs(case: Case, number: int, count: int, rng: np.random.Generator) -
                 time.sleep(rng.uniform(0.0, 1.2 * last_part))
             told = _stopped(process, number, folder)
             raw = _kind(out, before, references["new"], case)
-            settle(out)
+            recover(out)
             settled = _kind(out, before, references["new"], case)
             if settled is None or (raw is not None and raw != settled):
                 found["torn"] += 1

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from benchmarks.peers import PeerAbsentError, run_peer
-from flexcal.design.optimality import DOptimal, SpectralCriterion, choose, exchange
+from flexcal.design.optimality import DOptimal, SpectralCriterion, exchange, exchange_on_shortlist
 from flexcal.design.poses import (
     base_sensitivity,
     measurement_order,
@@ -21,7 +21,7 @@ from flexcal.design.poses import (
     random_candidates,
     random_poses,
 )
-from flexcal.design.poses.feasibility import tool_weight
+from flexcal.design.poses.feasibility import tool_error_weight
 from flexcal.design.poses.selection import criterion_named
 from flexcal.design.scene import CollisionChecker
 from flexcal.estimation import Sensitivity
@@ -50,10 +50,12 @@ def many(model: RobotModel) -> list[tuple[str, float, str]]:
     checker = CollisionChecker(model)
     drawing, q = timed(lambda: random_candidates(checker, CANDIDATES, np.random.default_rng(1), preload=True))
     rows, base = best(lambda: base_sensitivity(pose_sensitivity(model, q)))
-    weight = tool_weight(base, model, random_poses(model, 300, np.random.default_rng(2)).q)
+    weight = tool_error_weight(base, model, random_poses(model, 300, np.random.default_rng(2)).q)
     results = []
     for name in ("c", "D", "E"):
-        choice, _ = best(lambda name=name: choose(base.sensitivity, POSES, criterion_named(name, weight)))
+        choice, _ = best(
+            lambda name=name: exchange_on_shortlist(base.sensitivity, POSES, criterion_named(name, weight))
+        )
         told = f"{rows:.2f} s rows and base parameters, {choice:.2f} s choice; before that {drawing:.1f} s to draw and check them"
         label = f"{POSES} poses of {CANDIDATES}, {name}: limit {SECONDS:g} s"
         results.append((label, SECONDS / (rows + choice), told))

@@ -3,7 +3,7 @@
 from plotly import io
 from plotly.io.base_renderers import MimetypeRenderer
 
-from flexcal.report.layout.palette import dark_of
+from flexcal.report.layout.palette import dark_colours
 from flexcal.report.layout.rendering import script_json
 
 
@@ -12,7 +12,7 @@ class PageRenderer(MimetypeRenderer):
 
     def to_mimebundle(self, fig_dict: dict) -> dict[str, str]:
         layout = {key: value for key, value in fig_dict["layout"].items() if key != "template"}
-        drawing = script_json({"data": fig_dict["data"], "layout": layout, "dark": dark_of()})
+        drawing = script_json({"data": fig_dict["data"], "layout": layout, "dark": dark_colours()})
         height = layout.get("height", 400)
         script = f'<script type="application/json">{drawing}</script>'
         return {"text/html": f'<div class="plotly-figure" style="height: {height}px">{script}</div>'}

@@ -56,7 +56,7 @@ inline void reflect(const double* v, double head, double scale, double* r, doubl
 }
 
 // triangle: (k, k) by rows, upper. rows: (k, m), every column's m values together; spent.
-inline void append(double* triangle, double* rows, std::ptrdiff_t k, std::ptrdiff_t m) {
+inline void update(double* triangle, double* rows, std::ptrdiff_t k, std::ptrdiff_t m) {
     for (std::ptrdiff_t start = 0; start < m; start += rows_together) {
         const std::ptrdiff_t count = m - start < rows_together ? m - start : rows_together;
         for (std::ptrdiff_t c = 0; c < k; ++c) {

@@ -87,7 +87,7 @@ def produced(model: RobotModel) -> dict[str, str]:
     )
     gains = [gain_name(joint) for joint in model.joint_names]
     names = {name: unit_of(name) for name in (*model.values, *gains)}
-    return names | {item.name: item.unit for item in stiffness_parameters(model, [response], gaps=True)}
+    return names | {item.name: item.unit for item in stiffness_parameters(model, [response], backlash=True)}
 
 
 def test_every_name_is_in_the_table_with_its_unit(root: Path, tx90l: RobotModel) -> None:

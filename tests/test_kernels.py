@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flexcal import _kernels
-from flexcal.kernels import append
+from flexcal.kernels import update
 from flexcal.model.robot import RobotModel
 
 
@@ -32,7 +32,7 @@ def test_builds_agree_bit_by_bit(tx90l: RobotModel, rng: np.random.Generator) ->
         tree.torque_regressor(geometry, tx90l.gravity, *states, places, out)
         adjoint = tree.torque_regressor_adjoint(geometry, tx90l.gravity, *states, places, out)
         factor = np.zeros((60, 60))
-        build.append(factor, out[:60].copy())
+        build.update(factor, out[:60].copy())
         found.append((out, adjoint, factor))
     for ours, theirs in zip(*found, strict=True):
         np.testing.assert_array_equal(ours, theirs)
@@ -46,7 +46,7 @@ def test_the_triangle_is_that_of_numpy(rows: int, rng: np.random.Generator) -> N
     columns[5] = 0.0
     factor = np.zeros((17, 17))
     for part in (columns[:, :rows], columns[:, rows:]):
-        append(factor, part.copy())
+        update(factor, part.copy())
     assert (np.tril(factor, -1) == 0).all()
     np.testing.assert_allclose(factor.T @ factor, columns @ columns.T, rtol=0, atol=1e-12 * 2 * rows)
     if 2 * rows >= 17:
@@ -149,7 +149,7 @@ _KERNELS = [
     ("torque_regressor", (*_MOTION, "out"), {}),
     ("torque_regressor_adjoint", (*_MOTION, "weights"), {}),
     ("build", ("placements", "translations", "normals", "bearings"), {"parents": [-1, 0, 1], "prismatic": [False] * 3}),
-    ("append", ("triangle", "rows"), {}),
+    ("update", ("triangle", "rows"), {}),
     ("closed_loop", (*_LOOP, *_SIGNALS), {**_PLANT, "encoder_resolution": 0.0, "rate_filter": 1.0}),
     ("geared_loop", (*_GEARED, *_SIGNALS[1:3], "angle_log", "torque_log"), {**_PLANT, "count": 0.0, "filter": 1.0}),
 ]  # fmt: skip

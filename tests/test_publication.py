@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import Publication, Stage, atomic_path, current, settle, write_text
+from flexcal.files.transaction import FileTransaction, Stage, atomic_path, current_path, recover, write_text
 from flexcal.files.transaction.staging_folder import PREFIX
 
 STEPS = {
@@ -72,7 +72,7 @@ def whole(folder: Path) -> str:
 
 def write_run(folder: Path, text: str) -> None:
     """Three files, one of which the other run does not write."""
-    with Publication() as run:
+    with FileTransaction() as run:
         for name in ("a", text, "b"):
             write_text(folder / name, text)
         gone = folder / ("old" if text == "new" else "new")
@@ -90,7 +90,7 @@ def test_killed_at_any_step(tmp_path: Path) -> None:
         write_run(folder, "old")
         if not killed_at(step, lambda folder=folder: write_run(folder, "new")):
             break
-        settle(folder)
+        recover(folder)
         ended[whole(folder)] += 1
         write_run(folder, "new")
         assert whole(folder) == "new"
@@ -109,15 +109,15 @@ def test_killed_while_the_rest_is_finished(tmp_path: Path) -> None:
         if not killed_at(step, lambda folder=folder: write_run(folder, "new")):
             break
         for again in range(100):
-            if not killed_at(again, lambda folder=folder: settle(folder)):
+            if not killed_at(again, lambda folder=folder: recover(folder)):
                 break
-        settle(folder)
+        recover(folder)
         whole(folder)
 
 
 def test_two_folders_change_together(tmp_path: Path) -> None:
     def write(text: str) -> None:
-        with Publication():
+        with FileTransaction():
             for folder in ("one", "two"):
                 write_text(tmp_path / folder / "a", text)
 
@@ -128,10 +128,10 @@ def test_two_folders_change_together(tmp_path: Path) -> None:
         if not killed_at(step, lambda step=step: write(str(step + 1))):
             break
         first, second = ("one", "two") if step % 2 else ("two", "one")
-        settle(tmp_path / first)
+        recover(tmp_path / first)
         text = (tmp_path / first / "a").read_text()
         assert text in (before, str(step + 1))
-        settle(tmp_path / second)
+        recover(tmp_path / second)
         assert (tmp_path / second / "a").read_text() == text
         assert os.listdir(tmp_path / "one") == os.listdir(tmp_path / "two") == ["a"]
         seen.add(text == before)
@@ -141,17 +141,17 @@ def test_two_folders_change_together(tmp_path: Path) -> None:
 def test_current_leads_to_what_waits(tmp_path: Path) -> None:
     path = tmp_path / "a.txt"
     path.write_text("old")
-    with Publication():
+    with FileTransaction():
         write_text(path, "new")
         assert path.read_text() == "old"
-        assert current(path).read_text() == "new" and current(path).suffix == ".txt"
+        assert current_path(path).read_text() == "new" and current_path(path).suffix == ".txt"
         write_text(path, "newer")
-        assert current(path).read_text() == "newer"
+        assert current_path(path).read_text() == "newer"
     assert path.read_text() == "newer" and os.listdir(tmp_path) == ["a.txt"]
 
 
 def test_a_file_may_be_written_bit_by_bit(tmp_path: Path) -> None:
-    with Publication(), atomic_path(tmp_path / "big.csv") as temporary:
+    with FileTransaction(), atomic_path(tmp_path / "big.csv") as temporary:
         with temporary.open("w") as stream:
             for row in range(1000):
                 stream.write(f"{row}\n")
@@ -162,7 +162,7 @@ def test_a_file_may_be_written_bit_by_bit(tmp_path: Path) -> None:
 def test_a_file_of_ours_that_somebody_changed_meanwhile_stays(tmp_path: Path) -> None:
     path = tmp_path / "estimates.yaml"
     write_text(path, "old")
-    with pytest.raises(InputError, match="changed by another program"), Publication():
+    with pytest.raises(InputError, match="changed by another program"), FileTransaction():
         write_text(path, "new")
         path.write_text("theirs, and longer")
     assert path.read_text() == "theirs, and longer" and os.listdir(tmp_path) == ["estimates.yaml"]
@@ -174,10 +174,10 @@ def test_what_somebody_wrote_after_the_kill_is_not_replaced(tmp_path: Path) -> N
         assert killed_at(step, lambda: write_run(tmp_path, "new"))
         if any((stage / "journal.json").exists() for stage in tmp_path.glob(PREFIX + "*")):
             break
-        settle(tmp_path)
+        recover(tmp_path)
     (tmp_path / "b").write_text("written by hand")
     with pytest.raises(InputError, match="b was changed after a run"):
-        settle(tmp_path)
+        recover(tmp_path)
     assert (tmp_path / "b").read_text() == "written by hand"
 
 
@@ -189,7 +189,7 @@ def test_leftovers_go_but_nothing_else(tmp_path: Path) -> None:
     (theirs / "thesis.tex").write_text("mine")
     in_child(lambda: Stage.open(tmp_path, "flexcal demo", ("x",)) and None)
     assert len(os.listdir(tmp_path)) == 3
-    settle(tmp_path)
+    recover(tmp_path)
     assert sorted(os.listdir(tmp_path)) == sorted([alive.path.name, theirs.name])
     assert (theirs / "thesis.tex").read_text() == "mine"
 
@@ -224,7 +224,7 @@ def test_renaming_that_fails_is_finished_later(tmp_path: Path, monkeypatch: pyte
         patch.setattr(Path, "replace", fails)
         with pytest.raises(InputError, match="the next flexcal that opens the folder does it"):
             write_run(tmp_path, "new")
-    settle(tmp_path)
+    recover(tmp_path)
     assert whole(tmp_path) == "new"
 
 
@@ -258,5 +258,5 @@ def test_what_is_read_once_or_has_no_end_is_not_read(tmp_path: Path) -> None:
         (Path("/dev/zero"), "device"),
     ):
         with pytest.raises(InputError, match=f"{path} is a {kind}, not a file; write its content to a file"):
-            current(path)
-    assert current(tmp_path / "none") == tmp_path / "none" and current(tmp_path) == tmp_path
+            current_path(path)
+    assert current_path(tmp_path / "none") == tmp_path / "none" and current_path(tmp_path) == tmp_path

@@ -31,7 +31,7 @@ from .dynamics.friction import select_friction
 from .dynamics.inertials import identify_with_prior, trajectory_error
 from .dynamics.inverse_model import CLASSIC, BaseParameters, Observation
 from .dynamics.payload import identify_payload
-from .dynamics.regression import experiment_system, observe
+from .dynamics.regression import assemble_regression, experiment_system
 from .dynamics.residual import read_learned_residual
 from .dynamics.signals import JointLog, Window
 from .elasticity.identification import identify_stiffness
@@ -96,6 +96,7 @@ __all__ = [
     "VirtualCell",
     "Window",
     "accuracy_map",
+    "assemble_regression",
     "calibrate",
     "compensate",
     "design_poses",
@@ -116,7 +117,6 @@ __all__ = [
     "is_physically_consistent",
     "local_polynomial_responses",
     "next_poses",
-    "observe",
     "point_kinematics",
     "predict",
     "predict_torques",

@@ -1,3 +1,3 @@
 from flexcal._kernels import Tree as Tree
-from flexcal._kernels import append as append
 from flexcal._kernels import closed_loop as closed_loop
+from flexcal._kernels import update as update

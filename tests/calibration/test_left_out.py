@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexcal.calibration.error_model import order_folds, repeated_pose_numbers
-from flexcal.calibration.term_selection.leave_out_errors import left_out
+from flexcal.calibration.term_selection.leave_out_errors import leave_out_fit
 
 
 @pytest.mark.parametrize("folds", [40, 8, 3])
@@ -15,7 +15,7 @@ def test_left_out_errors_are_those_of_fits_without_the_fold(folds: int, rng: np.
     free, held = rng.standard_normal((40, 3, 9)), rng.standard_normal((40, 3, 4))
     residuals = 1e-4 * rng.standard_normal((40, 3))
     fold, penalty = order_folds(40, folds), 2.5
-    found = left_out([free, held], [0.0, penalty], residuals, [fold]).distances[0]
+    found = leave_out_fit([free, held], [0.0, penalty], residuals, [fold]).distances[0]
     both = np.concatenate([free, held], axis=2)
     for k in range(folds):
         inside = both[fold != k].reshape(-1, 13)
@@ -28,7 +28,7 @@ def test_left_out_errors_are_those_of_fits_without_the_fold(folds: int, rng: np.
 def test_what_the_fit_leaves_is_that_of_least_squares(rng: np.random.Generator) -> None:
     columns, residuals = rng.standard_normal((50, 3, 6)), 1e-4 * rng.standard_normal((50, 3))
     left = np.linalg.lstsq(columns.reshape(150, 6), residuals.ravel(), rcond=None)[1]
-    found = left_out([columns], [0.0], residuals, [])
+    found = leave_out_fit([columns], [0.0], residuals, [])
     assert found.squares == pytest.approx(left[0], rel=1e-5)
     assert found.freedom == pytest.approx(6, abs=1e-3)
 
@@ -37,7 +37,7 @@ def test_a_column_that_one_pose_alone_sees_is_held_there(rng: np.random.Generato
     """Without that pose nothing is known of it: the prediction stays where it was, and nothing blows up."""
     columns, residuals = rng.standard_normal((30, 3, 4)), 1e-4 * rng.standard_normal((30, 3))
     columns[1:, :, 3] = 0.0
-    found = left_out([columns], [0.0], residuals, [np.arange(30)]).distances[0]
+    found = leave_out_fit([columns], [0.0], residuals, [np.arange(30)]).distances[0]
     assert found[0] < 1e-3
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from flexcal.calibration.error_model import ErrorGroups, LinearFit, Scatter
+from flexcal.calibration.error_model import ErrorComponents, ErrorGroups, LinearFit
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
 
@@ -62,7 +62,7 @@ def test_likelihood_and_its_derivatives(
 ) -> None:
     fit = drawn(visits, command)
     stds = dict(zip(names, np.linspace(1e-5, 3e-5, len(names)).tolist(), strict=True)) | {"share": 0.7}
-    seen = RestrictedLikelihood.of(PointSums.of(fit), names, Scatter(**stds))
+    seen = RestrictedLikelihood.of(PointSums.of(fit), names, ErrorComponents(**stds))
     tied, free, rest = fit.tied.reshape(90, -1), fit.free.reshape(90, -1), fit.residual.ravel()
     whole = 1e-12 * np.eye(90) + tied @ tied.T
     whole += sum(std**2 * derivative(fit, name) for name, std in stds.items())
@@ -79,14 +79,14 @@ def test_likelihood_and_its_derivatives(
     columns = 1e-5 * np.random.default_rng(6).normal(size=(30, 3, 2))
     both = np.c_[columns.reshape(90, 2), rest]
     if "share" not in names and set(fit.cells.blocks) <= set(names):
-        products = fit.products(Scatter(**stds), columns)
+        products = fit.products(ErrorComponents(**stds), columns)
         np.testing.assert_allclose(products, both.T @ projection @ both, rtol=1e-8)
 
 
 @pytest.mark.parametrize("visits", [ONE_POINT, SEVERAL_POINTS])
 def test_visits_have_the_covariance_of_their_points(visits: np.ndarray) -> None:
     fit = drawn(visits)
-    scatter = Scatter(share=1.0, robot=2e-5, pose=3e-5, angular=1e-5)
+    scatter = ErrorComponents(share=1.0, robot=2e-5, pose=3e-5, angular=1e-5)
     jointly = scatter.jointly(fit.sigma, fit.turns, fit.cells)
     alone = scatter.independent(fit.sigma, fit.turns)
     for rows, block in zip(fit.cells.visits, jointly, strict=True):
@@ -110,7 +110,7 @@ def test_components_are_those_of_a_search_without_derivatives() -> None:
     sums = PointSums.of(fit)
 
     def deviance(x: np.ndarray) -> float:
-        scatter = Scatter(share=1.0, robot=float(x[0]) * 1e-5, order=float(x[1]) * 1e-5)
+        scatter = ErrorComponents(share=1.0, robot=float(x[0]) * 1e-5, order=float(x[1]) * 1e-5)
         return RestrictedLikelihood.of(sums, ("order",), scatter).deviance - 2 * np.log(abs(x[1]))
 
     best = minimize(deviance, [3.0, 3.0], method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-10})

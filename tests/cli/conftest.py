@@ -16,7 +16,7 @@ import pytest
 from cli_files import copied
 
 from flexcal.cli.main import main
-from flexcal.files.transaction import Publication
+from flexcal.files.transaction import FileTransaction
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ _stale: list[str] = []
 
 
 def _watch(event: str, arguments: tuple[Any, ...]) -> None:
-    running = Publication.running() if event == "open" and isinstance(arguments[0], str | Path) else None
+    running = FileTransaction.running() if event == "open" and isinstance(arguments[0], str | Path) else None
     if running is None or running.waiting(Path(arguments[0])) is None:
         return
     if sys._getframe(2).f_code.co_name != "_digest_on_disk":  # the ledger is about the old one

@@ -31,7 +31,7 @@ def test_a_motion_of_another_day(tmp_path: Path, friction: str, most: float) -> 
     model = RobotModel.from_yaml(tmp_path / "robot.yaml", estimates=False)
     read = JointLog.read(tmp_path / "fresh.csv", model, found.treatment.cutoff_hz, tmp_path)
     motion = Motion.joined(read.blocks())
-    columns = zip(observation.columns(motion), observation.members, strict=True)
+    columns = zip(observation.columns(motion), observation.column_indices, strict=True)
     time = fresh["t"].to_numpy()
     inside = (time >= motion.time[0]) & (time <= motion.time[-1])
     assert inside.mean() > 0.98

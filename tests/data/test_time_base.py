@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from flexcal.data.recordings import TimeBase, TimeSummary, uniform_blocks
 from flexcal.data.recordings.irregular_interpolation import interpolated
-from flexcal.data.recordings.time_base import gaps
+from flexcal.data.recordings.time_base import sampling_gaps
 from flexcal.errors import FlexcalError
 
 FILL = 0.02
@@ -202,10 +202,10 @@ def test_three_samples() -> None:
 
 def test_lost_sample_and_gap() -> None:
     t = np.array([0, 1, 2, 4, 5, 9, 10.0])
-    assert gaps(t).tolist() == [4]
+    assert sampling_gaps(t).tolist() == [4]
     _, _, (base,) = on_base(t[:5], t[:5, None])
     assert (base.lost, base.samples, base.time_step) == (1, 6, 1.0)
-    assert gaps(np.array([1.0])).size == 0
+    assert sampling_gaps(np.array([1.0])).size == 0
 
 
 def test_one_stamp_is_too_few() -> None:

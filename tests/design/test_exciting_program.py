@@ -17,7 +17,7 @@ from flexcal.design.trajectories import (
     design_trajectories,
     sequence,
 )
-from flexcal.design.trajectories.criterion import torque_goal
+from flexcal.design.trajectories.criterion import excitation_criterion
 from flexcal.design.trajectories.excitation_problem import ExcitationProblem
 from flexcal.design.trajectories.feasible_start import feasible_postures, feasible_start_motion
 from flexcal.design.trajectories.limit_usage import MotionLimits
@@ -34,7 +34,7 @@ def program(
     columns = BaseRegressor.of(model, None if criterion == "c" else 0.0)
     limits = MotionLimits.of(model)
     of = ("payload.mass", "link_3.com_x") if criterion == "c" else ()
-    goal = torque_goal(columns, criterion, of, np.ones(columns.rank), 400.0)
+    goal = excitation_criterion(columns, criterion, of, np.ones(columns.rank), 400.0)
     motions = MotionSpace.of("fourier", 5, 10.0, 100, limits, **space)
     clearance = Clearance(CollisionChecker(model), NEAR)
     return ExcitationProblem(motions, columns, goal, np.full(model.n, 0.01), limits, clearance)

@@ -12,14 +12,14 @@ from flexcal.design.frequency import (
     PlannedResponses,
     choose_frequency_poses,
     flat_multisine,
+    optimal_amplitudes,
     payload_placements,
-    shaped,
     static_amplitude_share,
     stiffness_curve,
     within_preload,
 )
 from flexcal.design.frequency.amplitude_spectrum import MOST, ROOM
-from flexcal.design.frequency.backlash_limit import CREST, backlash_load, share
+from flexcal.design.frequency.backlash_limit import CREST, amplitude_share, backlash_load
 from flexcal.design.frequency.candidates import FrequencyPoseCandidates
 from flexcal.design.frequency.multisines import DROOP, EXCITATION
 from flexcal.design.frequency.response_jacobian import thinned
@@ -54,7 +54,7 @@ def choice(tx90l, plan):
 @pytest.fixture(scope="module")
 def amplitudes(tx90l, plan, choice):
     flat = PlannedResponses.of(tx90l, within_preload(tx90l, replace(plan, poses=choice.poses)))
-    return flat, shaped(tx90l, flat)
+    return flat, optimal_amplitudes(tx90l, flat)
 
 
 def test_candidates_have_room_and_touch_nothing_and_are_preloaded(tx90l, plan, choice):
@@ -68,14 +68,14 @@ def test_candidates_have_room_and_touch_nothing_and_are_preloaded(tx90l, plan, c
     for pose in q:
         one = replace(plan, poses=pose[None])
         assert static_amplitude_share(tx90l, one) >= 1 - 1e-9
-        assert share(backlash_load(tx90l, pose, plan), plan.amplitude) >= 1
+        assert amplitude_share(backlash_load(tx90l, pose, plan), plan.amplitude) >= 1
 
 
 def test_the_limit_of_a_gap_is_gravity_over_its_crest(tx90l, plan):
     """Without reference motion three standard deviations of the drive's torque, from a time series, meet gravity."""
     q = np.radians([0, 60.1, -105, 79.6, 67.5, 0])
     still = replace(plan, reference_amplitude=0.0, poses=q[None])
-    allowed = share(backlash_load(tx90l, q, still), still.amplitude)
+    allowed = amplitude_share(backlash_load(tx90l, q, still), still.amplitude)
     system = linearise(tx90l, q)
     moved = closed_loop_motion(system, still.frequencies_hz, still.kp[:3], still.kd[:3])
     strain = (
@@ -115,7 +115,7 @@ def test_shaped_amplitudes_keep_all_limits_and_tell_more(tx90l, plan, choice, am
         swing = np.sqrt(np.sum(np.abs(moved) ** 2 * found.amplitude.T[:, None] ** 2, axis=(0, 2)) / 2 / 3)
         assert np.all(CREST * swing < DROOP / 2)
     for q in choice.poses:
-        assert share(backlash_load(tx90l, q, found), found.amplitude) >= 1 - 1e-9
+        assert amplitude_share(backlash_load(tx90l, q, found), found.amplitude) >= 1 - 1e-9
     over = found.amplitude / flat.plan.amplitude
     assert over.max() <= MOST + 1e-9
     np.testing.assert_array_equal(found.detection_lines, plan.detection_lines)

@@ -37,7 +37,7 @@ def _error(tx90l, found, measured, chosen):
     others = found.base.sensitivity.jacobian[list(chosen)].reshape(-1, len(found.base.scale)) / like_these
     rows = np.vstack([known, others])
     covariance = np.linalg.inv(rows.T @ rows + found.base.sensitivity.prior_information)
-    return np.sqrt(np.trace(found.tool_weight @ covariance))
+    return np.sqrt(np.trace(found.tool_error_weight @ covariance))
 
 
 def _places(model, q):
@@ -82,7 +82,9 @@ def test_payloads_and_unknown_noise(tx90l, found, measured, rng):
     vague = next_poses(found, replace(measured, sigma_given=False), 2, rng=rng)
     rows = found.base.columns(pose_sensitivity(tx90l, measured.q, found.setup).jacobian).reshape(-1, 29)
     covariance = np.linalg.inv(rows.T @ rows + found.base.sensitivity.prior_information)
-    assert vague.tool_error[0] == pytest.approx(np.sqrt(np.trace(found.tool_weight @ covariance)), rel=1e-6)
+    assert vague.tool_error[0] == pytest.approx(
+        np.sqrt(np.trace(found.tool_error_weight @ covariance)), rel=1e-6
+    )
 
 
 def test_bad_input(found, measured, rng):

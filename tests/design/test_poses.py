@@ -54,9 +54,9 @@ def test_29_directions_are_kept(design):
 
 
 def test_c_optimal_predicts_a_smaller_error_at_poses_it_never_saw(tx90l, design, rng):
-    from flexcal.design.poses.feasibility import tool_weight
+    from flexcal.design.poses.feasibility import tool_error_weight
 
-    fresh = tool_weight(design.base, tx90l, random_poses(tx90l, 400, rng).q)
+    fresh = tool_error_weight(design.base, tx90l, random_poses(tx90l, 400, rng).q)
     chosen = tool_error(design.base, fresh, design.selection.chosen)
     drawn = [tool_error(design.base, fresh, rng.choice(800, 40, replace=False)) for _ in range(100)]
     assert chosen < 0.95 * min(drawn)
@@ -124,7 +124,7 @@ def test_measure_where_you_will_work(tx90l, rng):
     there = design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=corner)
     everywhere = design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600)
     assert there.tool_error < 0.97 * tool_error(
-        everywhere.base, there.tool_weight, everywhere.selection.chosen
+        everywhere.base, there.tool_error_weight, everywhere.selection.chosen
     )
 
 
@@ -158,7 +158,7 @@ def test_criteria_against_their_definitions(design):
     singular = np.linalg.svd(rows, compute_uv=False)
     with_prior = rows.T @ rows + design.base.sensitivity.prior_information
     expected = {
-        "c": np.sqrt(np.trace(design.tool_weight @ np.linalg.inv(with_prior))),
+        "c": np.sqrt(np.trace(design.tool_error_weight @ np.linalg.inv(with_prior))),
         "A": np.trace(np.linalg.inv(with_prior)),
         "D": np.mean(np.log(np.linalg.eigvalsh(with_prior))),
         "E": singular[-1] ** 2,

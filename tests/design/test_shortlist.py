@@ -1,8 +1,15 @@
 import numpy as np
 import pytest
 
-from flexcal.design.optimality import DOptimal, SpectralCriterion, TraceOptimal, choose, exchange, shortlist
-from flexcal.design.optimality.shortlist import promises
+from flexcal.design.optimality import (
+    DOptimal,
+    SpectralCriterion,
+    TraceOptimal,
+    exchange,
+    exchange_on_shortlist,
+    shortlist,
+)
+from flexcal.design.optimality.shortlist import predicted_gains
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters, Sensitivity
 
@@ -29,7 +36,7 @@ def test_a_promise_is_the_growth_of_the_merit_per_weight(many, criterion):
         / (2 * step)
         for block in few.jacobian
     ]  # fmt: skip
-    np.testing.assert_allclose(promises(few, chosen, criterion), growth, rtol=1e-4)
+    np.testing.assert_allclose(predicted_gains(few, chosen, criterion), growth, rtol=1e-4)
 
 
 def test_the_promise_for_sigma_min_is_that_of_a_power_mean_of_the_eigenvalues(many):
@@ -44,7 +51,7 @@ def test_the_promise_for_sigma_min_is_that_of_a_power_mean_of_the_eigenvalues(ma
     growth = np.array(
         [mean(information + step * b.T @ b) - mean(information - step * b.T @ b) for b in few.jacobian]
     )
-    found = promises(few, chosen, SpectralCriterion("E"))
+    found = predicted_gains(few, chosen, SpectralCriterion("E"))
     np.testing.assert_allclose(found / found.max(), growth / growth.max(), atol=5e-3)
 
 
@@ -54,7 +61,7 @@ def test_the_promise_for_sigma_min_is_that_of_a_power_mean_of_the_eigenvalues(ma
 def test_nothing_is_lost_against_the_exchange_over_all(many, criterion, monkeypatch):
     monkeypatch.setattr(shortlist, "MANY", 500)
     monkeypatch.setattr(shortlist, "SHORT", 150)
-    found, full = choose(many, 12, criterion), exchange(many, 12, criterion)
+    found, full = exchange_on_shortlist(many, 12, criterion), exchange(many, 12, criterion)
     assert len(set(found.chosen)) == 12
     rows = many.jacobian[found.chosen].reshape(-1, 6)
     prior = many.prior_information if criterion.uses_prior else 0.0
@@ -68,10 +75,12 @@ def test_nothing_is_lost_against_the_exchange_over_all(many, criterion, monkeypa
 
 def test_few_candidates_are_exchanged_all_at_once(many):
     few = many.subset(np.arange(300))
-    np.testing.assert_array_equal(choose(few, 9, DOptimal()).chosen, exchange(few, 9, DOptimal()).chosen)
+    np.testing.assert_array_equal(
+        exchange_on_shortlist(few, 9, DOptimal()).chosen, exchange(few, 9, DOptimal()).chosen
+    )
 
 
 def test_bad_input(many, monkeypatch):
     monkeypatch.setattr(shortlist, "MANY", 500)
     with pytest.raises(FlexcalError, match="cannot choose 1501 of 1500"):
-        choose(many, 1501, DOptimal())
+        exchange_on_shortlist(many, 1501, DOptimal())

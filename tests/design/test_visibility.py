@@ -6,7 +6,7 @@ import pytest
 
 from flexcal.design.poses import random_candidates
 from flexcal.design.scene import CollisionChecker, MeasuringSetup, station_position, visible
-from flexcal.design.scene.visibility import blocked
+from flexcal.design.scene.visibility import line_of_sight_blocked
 from flexcal.errors import FlexcalError
 from flexcal.model.kinematics import link_frames, point_kinematics
 from flexcal.model.parts import rpy_rotation
@@ -45,7 +45,7 @@ def test_line_of_sight_against_points_along_the_beam(tx90l, rng):
     origin = station_position(tx90l)
     q = np.concatenate([q, rng.uniform(-2, 2, (200, 6))])
     target = point_kinematics(tx90l, q, jacobians=False).position
-    found = blocked(checker, q, origin, target, 0.01, 0.03)
+    found = line_of_sight_blocked(checker, q, origin, target, 0.01, 0.03)
     span = target - origin
     length = np.linalg.norm(span, axis=1)
     reach = (length - 0.03)[:, None] * np.linspace(0, 1, 600)

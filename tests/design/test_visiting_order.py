@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from flexcal.design.poses import measurement_order
-from flexcal.design.poses.ordering import blocked, move_seconds
+from flexcal.design.poses.ordering import move_collides, move_seconds
 from flexcal.design.scene import CollisionChecker
 from flexcal.model.robot import RobotModel
 
@@ -44,9 +44,9 @@ def test_a_move_takes_as_long_as_its_slowest_joint(checker):
 def test_a_straight_move_through_the_post_is_blocked(checker):
     side, other = np.array([-1.0, 0.0]), np.array([1.0, 0.0])
     assert not checker.collides(np.stack([side, other])).any()
-    assert blocked(checker, side, other) and blocked(checker, other, side)
-    assert not blocked(checker, side, np.array([-0.6, 0.0]))
-    assert not blocked(checker, np.array([-1.0, 2.6]), np.array([1.0, 2.6]))  # folded, it passes beside
+    assert move_collides(checker, side, other) and move_collides(checker, other, side)
+    assert not move_collides(checker, side, np.array([-0.6, 0.0]))
+    assert not move_collides(checker, np.array([-1.0, 2.6]), np.array([1.0, 2.6]))  # folded, it passes beside
 
 
 def test_a_thin_move_does_not_slip_between_samples(checker, rng):
@@ -57,14 +57,14 @@ def test_a_thin_move_does_not_slip_between_samples(checker, rng):
     for start, end in pairwise(free):
         fine = start + np.linspace(0, 1, 4000)[:, None] * (end - start)
         if without_margin.collides(fine).any():
-            assert blocked(checker, start, end)
+            assert move_collides(checker, start, end)
 
 
 def test_the_order_against_every_order(checker):
     """As few blocked moves as there can be, and then as little time."""
     assert not checker.collides(POSES).any()
     seconds = move_seconds(checker, POSES)
-    touching = np.array([[blocked(checker, a, b) for b in POSES] for a in POSES])
+    touching = np.array([[move_collides(checker, a, b) for b in POSES] for a in POSES])
     found = measurement_order(checker, POSES)
     assert sorted(found.order) == list(range(6))
     ways = [np.array(way) for way in permutations(range(6))]

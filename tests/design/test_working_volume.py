@@ -10,7 +10,7 @@ from flexcal.design.poses import (
     working_box,
     working_points,
 )
-from flexcal.design.poses.feasibility import tool_weight
+from flexcal.design.poses.feasibility import tool_error_weight
 from flexcal.design.poses.selection import tool_error
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError
@@ -53,7 +53,7 @@ def test_the_criterion_is_the_directly_predicted_error_in_the_volume(tx90l, box,
         _, jacobian = geometry_jacobian(tx90l, pose[None])
         kept = jacobian[0][:, list(base.identifiability.kept)] * base.scale
         squares.append(np.trace(kept @ covariance @ kept.T))
-    weight = tool_weight(base, tx90l, box.q[:40])
+    weight = tool_error_weight(base, tx90l, box.q[:40])
     assert tool_error(base, weight, chosen) == pytest.approx(np.sqrt(np.mean(squares)), rel=1e-6)
 
 
@@ -62,7 +62,7 @@ def test_poses_chosen_for_the_volume_are_better_there(tx90l, box):
         design_poses(tx90l, 15, rng=np.random.default_rng(2), candidates=600, working=working)
         for working in (box.q, None)
     )
-    elsewhere = tool_error(anywhere.base, there.tool_weight, anywhere.selection.chosen)
+    elsewhere = tool_error(anywhere.base, there.tool_error_weight, anywhere.selection.chosen)
     assert there.tool_error < 0.95 * elsewhere
 
 

@@ -14,9 +14,9 @@ class LogCholesky:
 
     def __init__(self, cones: Sequence[Cone], size: int) -> None:
         self.cones = [cone for cone in cones if np.isfinite(cone.std)]
-        self.inverse = [np.linalg.pinv(c.basis.reshape(len(c.members), -1).T) for c in self.cones]
+        self.inverse = [np.linalg.pinv(c.basis.reshape(len(c.column_indices), -1).T) for c in self.cones]
         self.size = size
-        self.free = np.setdiff1d(np.arange(size), np.concatenate([c.members for c in self.cones]))
+        self.free = np.setdiff1d(np.arange(size), np.concatenate([c.column_indices for c in self.cones]))
 
     def start(self) -> np.ndarray:
         """Every matrix at its reference, and nothing else."""
@@ -43,11 +43,11 @@ class LogCholesky:
                 rate[-1] = mass * (HIGH - LOW) * share * (1 - share) / (2 * own[-1])
             factor = np.zeros((cone.size, cone.size))
             factor[tuple(places.T)] = own
-            values[cone.members] = inverse @ (cone.floor * cone.reference + factor @ factor.T).ravel()
+            values[cone.column_indices] = inverse @ (cone.floor * cone.reference + factor @ factor.T).ravel()
             for (row, column), slope in zip(places, rate, strict=True):
                 unit = np.zeros_like(factor)
                 unit[row, column] = slope
-                slopes[cone.members, at] = inverse @ (unit @ factor.T + factor @ unit.T).ravel()
+                slopes[cone.column_indices, at] = inverse @ (unit @ factor.T + factor @ unit.T).ravel()
                 at += 1
         values[self.free], slopes[self.free, range(at, len(x))] = x[at:], 1.0
         return values, slopes

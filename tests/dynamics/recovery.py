@@ -16,7 +16,7 @@ NOISE = np.array([3.0, 2.0, 1.0, 0.3, 0.2, 0.05])
 
 def driven(observation: Observation, motion: Motion, truth: np.ndarray) -> Motion:
     """The motion with the torques (N, n) of the true parameters (p,)."""
-    parts = zip(observation.members, observation.columns(motion), strict=True)
+    parts = zip(observation.column_indices, observation.columns(motion), strict=True)
     return replace(motion, torque=np.stack([truth[m] @ c for m, c in parts], axis=1))
 
 

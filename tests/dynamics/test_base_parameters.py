@@ -49,7 +49,7 @@ def test_base_parameters_give_the_same_torques(
     parameters = rng.normal(size=len(observation.names))
     regrouped = np.zeros(len(parameters))
     regrouped[list(found.kept)] = found.regrouping @ parameters
-    for members, columns in zip(observation.members, observation.columns(motion), strict=True):
+    for members, columns in zip(observation.column_indices, observation.columns(motion), strict=True):
         expected = parameters[members] @ columns
         assert np.abs(regrouped[members] @ columns - expected).max() < 1e-8 * np.abs(expected).max()
 
@@ -66,4 +66,6 @@ def test_coupled_friction_is_that_of_one_motor(tx40: RobotModel, motion: Motion)
     one = 0.3 * push + 0.7 * speed + 2.0 * np.sign(speed)
     columns = observation.columns(motion)
     for joint in (4, 5):
-        np.testing.assert_allclose(parameters[observation.members[joint]] @ columns[joint], one, atol=1e-12)
+        np.testing.assert_allclose(
+            parameters[observation.column_indices[joint]] @ columns[joint], one, atol=1e-12
+        )

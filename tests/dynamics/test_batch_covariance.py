@@ -11,7 +11,13 @@ from scipy.signal import lfilter
 from flexcal.data.recordings import Decimation, read_recording
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import RegressionData, batch_length, batched, observe, rows
+from flexcal.dynamics.regression import (
+    RegressionData,
+    assemble_regression,
+    batch_length,
+    batched,
+    regression_blocks,
+)
 from flexcal.dynamics.regression.batches import BATCHES
 from flexcal.dynamics.signals import Motion, Window
 
@@ -24,7 +30,7 @@ def tour(observation: Observation, sines: Callable[[int, float], Motion]) -> Mot
     """Eighty seconds of six joints on sums of sines, with the torques of the CAD robot and unit friction."""
     motion = sines(8000, RATE)
     columns = observation.columns(motion)
-    torques = [truth(observation)[m] @ c for m, c in zip(observation.members, columns, strict=True)]
+    torques = [truth(observation)[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)]
     return replace(motion, torque=np.stack(torques, axis=1))
 
 
@@ -49,7 +55,7 @@ def inside(
     names = dict(zip(observation.names, truth(observation), strict=True))
     for _ in range(runs):
         noisy = replace(tour, torque=tour.torque + NOISE * coloured(rng, tour.torque.shape))
-        found = weighted_least_squares(observe(observation, base, [noisy], Decimation(2)))
+        found = weighted_least_squares(assemble_regression(observation, base, [noisy], Decimation(2)))
         expected = found.regrouped(names)
         kept = base.found.kept_names
         intervals = [found.interval(name) or (np.nan, np.nan) for name in kept]
@@ -85,14 +91,14 @@ class Recorded:
 
     def __init__(self, observation: Observation, base: BaseParameters, motion: Motion) -> None:
         self.observation, self.base = observation, base
-        self.data = observe(observation, base, [motion], Decimation(100))
+        self.data = assemble_regression(observation, base, [motion], Decimation(100))
         self.length = batch_length(motion, Decimation(100), BATCHES)
-        found = rows(observation, motion, Decimation(100), Window())
+        found = regression_blocks(observation, motion, Decimation(100), Window())
         self.parts = [part.where(~part.still) for part in found]
         self.number = np.concatenate([part.number for part in self.parts])
         self.sigma = np.array([sigma for sigma, _ in self.data.noise()])
         wide = np.zeros((len(self.number), 6, len(observation.names)))
-        for joint, members in enumerate(observation.members):
+        for joint, members in enumerate(observation.column_indices):
             columns = np.hstack([part.columns[joint] for part in self.parts])
             wide[:, joint, members] = columns.T / self.sigma[joint]
         torque = np.hstack([part.torque for part in self.parts]).T
@@ -104,7 +110,7 @@ class Recorded:
         parts, end = [], 0
         for part in self.parts:
             begin, end = end, end + len(part)
-            torque = part.predicted(self.observation.members, self.observation.values())
+            torque = part.predicted(self.observation.column_indices, self.observation.values())
             torque += (errors[begin:end] * self.sigma).T
             reduced = [np.vstack([own[:-1], y]) for own, y in zip(part.reduced, torque, strict=True)]
             parts.append(replace(part, reduced=reduced))
@@ -203,8 +209,8 @@ def test_a_joint_that_moves_once_is_not_certain(
     moves = (np.arange(8000) // 60 == 50)[:, None] | (np.arange(6) < 5)
     still = replace(tour, dq=tour.dq * moves, ddq=tour.ddq * moves)
     columns = observation.columns(still)
-    torques = [truth(observation)[m] @ c for m, c in zip(observation.members, columns, strict=True)]
+    torques = [truth(observation)[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)]
     noisy = replace(still, torque=np.stack(torques, axis=1) + NOISE * rng.normal(size=(8000, 6)))
-    found = weighted_least_squares(observe(observation, base, [noisy], Decimation(1)))
+    found = weighted_least_squares(assemble_regression(observation, base, [noisy], Decimation(1)))
     viscous, speed = found.std("joint_6.viscous"), still.dq[moves[:, 5], 5]
     assert viscous is not None and viscous > 0.5 * NOISE[5] / np.linalg.norm(speed - speed.mean())

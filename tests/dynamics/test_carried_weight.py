@@ -68,6 +68,6 @@ def test_accelerations_against_the_weight_are_no_other_sign(tx90l: RobotModel, t
     torque = torque_regressor(tx90l, q, dq, ddq) @ inertial_parameters(tx90l) + 0.1 * noise
     log = log_of(Recording(STEP, q, torque), tx90l, tmp_path)
     weight = log.weight
-    correlation = weight.of_both[1] / np.sqrt(weight.weight_squares[1] * weight.torque_squares[1])
+    correlation = weight.cross_products[1] / np.sqrt(weight.weight_squares[1] * weight.torque_squares[1])
     assert correlation < -0.9
     require_joint_torques([log], tx90l)

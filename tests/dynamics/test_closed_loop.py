@@ -19,7 +19,7 @@ from flexcal.dynamics.estimators import (
 )
 from flexcal.dynamics.friction.terms import CoulombWarmUp
 from flexcal.dynamics.inverse_model import CLASSIC, Observation
-from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import Motion
 from flexcal.dynamics.simulation import SimulatedExperiment
 from flexcal.dynamics.simulation import experiment as simulated_experiment
@@ -129,7 +129,7 @@ def test_without_noise_the_truth_comes_back(
     truth, short = true_values(declared), clean.part(0, 800)
     for observation in (declared, unknown):
         rows = recorded(observation, short, 2)
-        data = observe(observation, rows.base, [short], Decimation(2))
+        data = assemble_regression(observation, rows.base, [short], Decimation(2))
         found = instrumental_variables(data, rows)
         assert found.rank == 13
         assert np.abs(errors(found, observation, truth)[0]).max() < 1e-9
@@ -151,7 +151,7 @@ def scores(
     for _ in range(runs):
         log = parted(noisy(clean, rng))
         rows = recorded(unknown, log, 2)
-        data = observe(unknown, rows.base, [log], Decimation(2))
+        data = assemble_regression(unknown, rows.base, [log], Decimation(2))
         for found, kept in (
             (weighted_least_squares(data), linear),
             (instrumental_variables(data, rows), free),
@@ -189,7 +189,7 @@ def test_intervals_of_instrumental_variables_cover(unknown: Observation, clean: 
 def test_didim_with_the_true_controller_holds_the_truth(declared: Observation, clean: Motion) -> None:
     motion = noisy(clean, np.random.default_rng(4))
     rows = recorded(declared, motion, 2)
-    data = observe(declared, rows.base, [motion], Decimation(2))
+    data = assemble_regression(declared, rows.base, [motion], Decimation(2))
     error, std = errors(direct_and_inverse(data, rows), declared, true_values(declared))
     assert np.mean(np.abs(error / std) < 2.5) > 0.9
     linear, _ = errors(weighted_least_squares(data), declared, true_values(declared))
@@ -203,7 +203,7 @@ def test_a_joint_that_never_moves_does_not_in_the_simulation(unknown: Observatio
     still = replace(clean, q=clean.q * elbow, dq=clean.dq * elbow, ddq=clean.ddq * elbow)
     still = recovery.driven(unknown, still, truth)
     rows = recorded(unknown, still, 2)
-    data = observe(unknown, rows.base, [still], Decimation(2))
+    data = assemble_regression(unknown, rows.base, [still], Decimation(2))
     found = direct_and_inverse(data, rows)
     seen = {name for name, known in zip(unknown.names, found.identifiable, strict=True) if known}
     assert not seen & {"shoulder.rotor_inertia", "shoulder.viscous", "shoulder.coulomb"}
@@ -231,7 +231,7 @@ def test_it_starts_from_cad_where_no_robot_can_be_built_of_the_data(
 ) -> None:
     """And ends where it does otherwise."""
     rows = recorded(unknown, clean.part(0, 800), 2)
-    data = observe(unknown, rows.base, [clean.part(0, 800)], Decimation(2))
+    data = assemble_regression(unknown, rows.base, [clean.part(0, 800)], Decimation(2))
     usual = instrumental_variables(data, rows).parameters.coordinates()
 
     def refuse(data: RegressionData) -> Estimate:

@@ -12,7 +12,7 @@ import pytest
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import JointLog, Motion
 from flexcal.jobs.logs import choose_preprocessing
 from flexcal.model.robot import RobotModel
@@ -112,13 +112,13 @@ class Arm:
         observation = Observation(model, CLASSIC)
         base = BaseParameters.of(observation)
         log = JointLog.read(folder / "log.parquet", model, cutoff_hz, folder)
-        estimate = weighted_least_squares(observe(observation, base, [log], decimation))
+        estimate = weighted_least_squares(assemble_regression(observation, base, [log], decimation))
         found = estimate.parameters.coordinates()
         time = 0.02 * np.arange(1000)
         q, dq, ddq = self.states(time)
         torque = self.torque(q, dq, ddq)
         columns = observation.columns(Motion(time, q, dq, ddq, torque))
-        pairs = zip(columns, observation.members, strict=True)
+        pairs = zip(columns, observation.column_indices, strict=True)
         predicted = np.transpose([found[members] @ own for own, members in pairs])
         truth = self.truth()
         beside = base.found.regrouping @ (found - [truth[name] for name in base.found.names])

@@ -11,7 +11,7 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.drives import drive_gains
 from flexcal.dynamics.estimators import instrumental_fit
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import Batch, RegressionData, observe
+from flexcal.dynamics.regression import Batch, RegressionData, assemble_regression
 from flexcal.errors import FlexcalError
 
 
@@ -25,7 +25,7 @@ def recorded(arm: Observation, noise: float, seed: int) -> RegressionData:
     rng = np.random.default_rng(seed)
     motions = [swings(arm, held, 7) for held in (0 * HELD, HELD)]
     noisy = [replace(m, torque=m.torque + noise * rng.normal(size=m.torque.shape)) for m in motions]
-    return observe(arm, BaseParameters.of(arm), noisy, Decimation(1))
+    return assemble_regression(arm, BaseParameters.of(arm), noisy, Decimation(1))
 
 
 def test_without_noise_the_gains_come_back(arm: Observation) -> None:
@@ -61,7 +61,7 @@ def dense_least_squares(arm: Observation, noise: float) -> np.ndarray:
     for held in (0 * HELD, HELD):
         motion = swings(arm, held, 7)
         torque = motion.torque + noise * rng.normal(size=motion.torque.shape)
-        for joint, (members, columns) in enumerate(zip(arm.members, arm.columns(motion), strict=True)):
+        for joint, (members, columns) in enumerate(zip(arm.column_indices, arm.columns(motion), strict=True)):
             robot, gains = np.zeros((len(motion), len(arm.names))), np.zeros((len(motion), 2))
             robot[:, members], gains[:, joint] = columns.T, -torque[:, joint]
             loaded = robot[:, 10:20] if held.any() else np.zeros((len(motion), 10))
@@ -89,7 +89,9 @@ def test_a_current_of_the_other_sign(arm: Observation) -> None:
     """Its gain is below zero, and known as well as any."""
     motions = [swings(arm, held, 7) for held in (0 * HELD, HELD)]
     turned = [replace(m, torque=m.torque * [1, -1]) for m in motions]
-    found = drive_gains(observe(arm, BaseParameters.of(arm), turned, Decimation(1)), [0.0, HELD[0]])
+    found = drive_gains(
+        assemble_regression(arm, BaseParameters.of(arm), turned, Decimation(1)), [0.0, HELD[0]]
+    )
     assert found.parameters.coordinates() == pytest.approx(GAINS * [1, -1], rel=1e-9)
     assert found.identifiable == (True, True) and found.dropped == ()
 
@@ -97,7 +99,7 @@ def test_a_current_of_the_other_sign(arm: Observation) -> None:
 def test_two_payloads_are_not_one(arm: Observation) -> None:
     """Their centres of mass and inertias are not the same, and one estimate of them would pass for both."""
     motions = [swings(arm, held, 7) for held in (0 * HELD, HELD, 0.5 * HELD)]
-    data = observe(arm, BaseParameters.of(arm), motions, Decimation(1))
+    data = assemble_regression(arm, BaseParameters.of(arm), motions, Decimation(1))
     with pytest.raises(FlexcalError, match="payloads of 2 and 4 kg are two"):
         drive_gains(data, [0.0, 4.0, 2.0])
 
@@ -107,7 +109,9 @@ def test_a_payload_that_was_not_held(arm: Observation) -> None:
     noise = np.random.default_rng(0)
     free = [swings(arm, 0 * HELD, 7) for _ in range(2)]
     noisy = [replace(m, torque=m.torque + 0.3 * noise.normal(size=m.torque.shape)) for m in free]
-    found = drive_gains(observe(arm, BaseParameters.of(arm), noisy, Decimation(1)), [0.0, HELD[0]])
+    found = drive_gains(
+        assemble_regression(arm, BaseParameters.of(arm), noisy, Decimation(1)), [0.0, HELD[0]]
+    )
     assert found.identifiable == (False, False)
 
 

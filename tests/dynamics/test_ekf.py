@@ -12,7 +12,7 @@ from flexcal.dynamics.estimators import kalman_filter, weighted_least_squares
 from flexcal.dynamics.estimators.ekf import POSITION_NOISE
 from flexcal.dynamics.friction import Presliding, WarmUp
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.dynamics.simulation import discretise_motion
 from flexcal.errors import FlexcalError
@@ -43,7 +43,7 @@ def clean(
 
 def filtered(observation: Observation, base: BaseParameters, motion: Motion) -> tuple[Estimate, Estimate]:
     """And weighted least squares."""
-    data = observe(observation, base, [motion], Decimation(1))
+    data = assemble_regression(observation, base, [motion], Decimation(1))
     return kalman_filter(data, recorded(observation, base, motion)), weighted_least_squares(data)
 
 

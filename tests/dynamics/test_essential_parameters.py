@@ -9,7 +9,7 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.diagnostics import essential_parameters
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import Motion
 from flexcal.estimation import Estimate
 from flexcal.model.robot import RobotModel
@@ -27,9 +27,11 @@ def fitted(tx40: RobotModel, swing: Motion) -> tuple[RegressionData, Estimate]:
     truth = np.zeros(len(observation.names))
     truth[list(base.found.kept)] = beta
     columns = observation.columns(swing)
-    torque = np.stack([truth[m] @ c for m, c in zip(observation.members, columns, strict=True)], axis=1)
+    torque = np.stack(
+        [truth[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)], axis=1
+    )
     torque += 0.01 * np.linalg.norm(torque, axis=0) / np.sqrt(len(torque)) * rng.normal(size=torque.shape)
-    data = observe(observation, base, [replace(swing, torque=torque)], Decimation(1))
+    data = assemble_regression(observation, base, [replace(swing, torque=torque)], Decimation(1))
     return data, weighted_least_squares(data)
 
 

@@ -18,7 +18,7 @@ from flexcal.dynamics.estimators import (
 )
 from flexcal.dynamics.estimators.physical_constraints import feasible_set
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
 from flexcal.export import write_urdf
@@ -85,9 +85,11 @@ def simulated(
         *(part[::every, :n] for part in (swing.q, swing.dq, swing.ddq, swing.torque)),
     )
     columns = observation.columns(few)
-    torque = np.stack([values[m] @ c for m, c in zip(observation.members, columns, strict=True)], axis=1)
+    torque = np.stack(
+        [values[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)], axis=1
+    )
     torque = torque + noise * NOISE[:n] * np.random.default_rng(8).normal(size=torque.shape)
-    return observe(
+    return assemble_regression(
         observation, BaseParameters.of(observation), [replace(few, torque=torque)], Decimation(1)
     ), values
 
@@ -97,7 +99,7 @@ def with_torques(data: RegressionData, parameters: np.ndarray) -> RegressionData
     subsystems = []
     for s in data.subsystems:
         factor = s.triangle.factor.copy()
-        factor[:, -1] = s.triangle.matrix @ parameters[s.members]
+        factor[:, -1] = s.triangle.matrix @ parameters[s.column_indices]
         subsystems.append(replace(s, triangle=replace(s.triangle, factor=factor)))
     return replace(data, subsystems=tuple(subsystems))
 
@@ -165,7 +167,9 @@ def recorded(tx40: RobotModel, examples: Path) -> tuple[RegressionData, Regressi
     observation, decimation = Observation(tx40, CLASSIC), Decimation(100)
     base, motions = BaseParameters.of(observation), [Motion.of(recording, 100.0)]
     early, late = [Window(end=6.1)], [Window(start=6.3)]
-    return tuple(observe(observation, base, motions, decimation, windows=w) for w in (early, late))  # pyright: ignore[reportReturnType]
+    return tuple(
+        assemble_regression(observation, base, motions, decimation, windows=w) for w in (early, late)
+    )  # pyright: ignore[reportReturnType]
 
 
 def test_a_real_robot_is_made_of_bodies_and_predicted_no_worse(
@@ -243,7 +247,7 @@ def test_the_urdf_has_the_bodies_and_needs_the_torques(
     for k in (0, 700, 1900):
         state = [part[k, : model.n] for part in (swing.q, swing.dq, swing.ddq)]
         links = pin.rnea(other, other.createData(), *state)
-        for joint, (members, block) in enumerate(zip(data.observation.members, columns, strict=True)):
+        for joint, (members, block) in enumerate(zip(data.observation.column_indices, columns, strict=True)):
             drive = members >= 10 * model.n
             expected = values[members] @ block[:, k] - values[members[drive]] @ block[drive, k]
             assert links[joint] == pytest.approx(expected, abs=1e-9)

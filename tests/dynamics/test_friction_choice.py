@@ -21,9 +21,9 @@ from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, DriveTerm, O
 from flexcal.dynamics.regression import (
     ExperimentSystem,
     RegressionData,
+    assemble_regression,
     experiment_system,
     folds,
-    observe,
     prediction_errors,
 )
 from flexcal.dynamics.regression import blocks as rows
@@ -45,7 +45,9 @@ def with_torques(
     truth = observation.values()
     classic = len(Observation(model, CLASSIC).names)
     truth[60:classic], truth[classic:] = 2.0, size
-    torques = [truth[m] @ c for m, c in zip(observation.members, observation.columns(motion), strict=True)]
+    torques = [
+        truth[m] @ c for m, c in zip(observation.column_indices, observation.columns(motion), strict=True)
+    ]
     return replace(motion, torque=np.stack(torques, axis=1) + NOISE * rng.normal(size=(len(motion), model.n)))
 
 
@@ -94,10 +96,10 @@ def test_the_error_is_that_of_predicting_each_block_from_rows_apart_from_it(
     classic = BaseParameters.of(Observation(tx40, CLASSIC)).found.kept
     fixed = [observation.names.index(Observation(tx40, CLASSIC).names[i]) for i in classic]
     group = list(range(width - 6, width))
-    parts = [p.where(~p.still) for p in rows.rows(observation, motion, decimation, Window())]
+    parts = [p.where(~p.still) for p in rows.regression_blocks(observation, motion, decimation, Window())]
     number = np.concatenate([p.number for p in parts]) // system.batch_rows
     matrices, torques = [], []
-    for joint, members in enumerate(observation.members):
+    for joint, members in enumerate(observation.column_indices):
         stack = np.hstack([np.vstack([p.columns[joint], p.torque[joint]]) for p in parts]).T
         wide = np.zeros((len(stack), width))
         wide[:, members] = stack[:, :-1]
@@ -133,7 +135,7 @@ def test_the_error_is_that_of_predicting_each_block_from_rows_apart_from_it(
         for wide, torque in zip(matrices, torques, strict=True):
             missed += np.sum((torque[inside] - wide[inside][:, columns] @ x) ** 2)
             size += np.sum(torque[inside] ** 2)
-    blocks = folds([system], observation.members, width, fixed, purge)
+    blocks = folds([system], observation.column_indices, width, fixed, purge)
     (found,) = prediction_errors(blocks, fixed, [group])
     assert found == pytest.approx(np.sqrt(missed / size), rel=1e-5)
     assert found < prediction_errors(blocks, fixed, [[]])[0]
@@ -144,7 +146,7 @@ def test_one_block_teaches_nothing_about_itself(tx40: RobotModel, swing: Motion)
     motion = with_torques(tx40, (), swing, 0.0, 6)
     system = experiment_system(observation, motion, Decimation(4), Window(), mask_standstill=True, batches=1)
     with pytest.raises(FlexcalError, match="too short to choose friction by cross-validation"):
-        folds([system], observation.members, len(observation.names), [0], 10)
+        folds([system], observation.column_indices, len(observation.names), [0], 10)
 
 
 def test_a_column_that_the_data_leave_at_zero_is_named(tx40: RobotModel, swing: Motion) -> None:
@@ -154,7 +156,9 @@ def test_a_column_that_the_data_leave_at_zero_is_named(tx40: RobotModel, swing: 
         tx40, (), replace(swing, q=swing.q * still, dq=swing.dq * still, ddq=swing.ddq * still), 0.0, 3
     )
     observation = Observation(tx40, (*CLASSIC, SublinearViscous()))
-    data: RegressionData = observe(observation, BaseParameters.of(observation), [motion], Decimation(4))
+    data: RegressionData = assemble_regression(
+        observation, BaseParameters.of(observation), [motion], Decimation(4)
+    )
     silent = {f"joint_3.{key}" for key in ("rotor_inertia", "viscous", "coulomb", "sublinear_viscous")}
     assert set(data.silent) == silent
     remarks = dynamics_remarks(data, weighted_least_squares(data))

@@ -16,7 +16,7 @@ from flexcal.dynamics.friction import (
     WarmUp,
 )
 from flexcal.dynamics.friction.catalogue import LIBRARY, candidate_shapes
-from flexcal.dynamics.friction.scale import Scale
+from flexcal.dynamics.friction.scale import ExcitationScale
 from flexcal.dynamics.friction.terms import dahl
 from flexcal.dynamics.inverse_model import CLASSIC, DriveTerm, Observation
 from flexcal.dynamics.regression import blocks as rows
@@ -100,7 +100,7 @@ def test_the_load_is_that_of_the_links(tx40: RobotModel, motion: Motion) -> None
 
 def library(model: RobotModel) -> tuple[DriveTerm, ...]:
     inertials = inertial_parameters(model).ravel()
-    scale = Scale(np.ones(model.n), np.ones(model.n), 10.0, inertials)
+    scale = ExcitationScale(np.ones(model.n), np.ones(model.n), 10.0, inertials)
     return (AsymmetricCoulomb(), *(candidate_shapes(name, scale)[-1].term for name in LIBRARY))
 
 
@@ -122,7 +122,7 @@ def test_terms_that_remember_do_not_see_the_blocks(
     decimation = Decimation(4)
 
     def all_rows(window: Window) -> np.ndarray:
-        parts = list(rows.rows(observation, swing, decimation, window))
+        parts = list(rows.regression_blocks(observation, swing, decimation, window))
         return np.hstack([np.vstack(part.reduced) for part in parts])
 
     monkeypatch.setattr(rows, "_BLOCK", 10**6)

@@ -9,7 +9,7 @@ from recovery import NOISE, driven, errors, recorded
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import RecordedRows, huber_least_squares, weighted_least_squares
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.estimation import Estimate
 
@@ -22,7 +22,7 @@ def clean(observation: Observation, truth: np.ndarray, swing: Motion) -> Motion:
 
 
 def robust(observation: Observation, base: BaseParameters, motions: list[Motion]) -> Estimate:
-    data = observe(observation, base, motions, Decimation(1))
+    data = assemble_regression(observation, base, motions, Decimation(1))
     return huber_least_squares(data, recorded(observation, base, *motions))
 
 
@@ -49,7 +49,7 @@ def test_it_is_the_minimum_of_the_loss(
     columns = observation.columns(clean)
 
     def missed(motion: Motion, at: np.ndarray) -> np.ndarray:
-        predicted = [at[m] @ c for m, c in zip(observation.members, columns, strict=True)]
+        predicted = [at[m] @ c for m, c in zip(observation.column_indices, columns, strict=True)]
         return motion.torque - np.stack(predicted, axis=1)
 
     scales = [1.4826 * np.median(np.abs(missed(motion, x)), axis=0) for motion in motions]
@@ -72,7 +72,7 @@ def test_a_second_pass_gives_the_equations_of_the_first(
     """Decimated and in windows; weights of one change nothing, and residuals are those that the factors know the norm of."""
     noisy = replace(swing, torque=rng.normal(size=swing.torque.shape))
     windows = [Window(end=4.0), Window(start=5.0)]
-    data = observe(observation, base, [noisy, noisy], Decimation(4), windows=windows)
+    data = assemble_regression(observation, base, [noisy, noisy], Decimation(4), windows=windows)
     again = RecordedRows(observation, base, [noisy, noisy], windows, Decimation(4))
     residuals = again.residuals(truth)
     weighted = again.weighted([np.ones_like(r) for r in residuals])
@@ -80,7 +80,7 @@ def test_a_second_pass_gives_the_equations_of_the_first(
         np.testing.assert_array_equal(first.triangle.factor, second.triangle.factor)
         own = residuals[first.experiment][first.equation]
         assert np.isfinite(own).sum() == first.triangle.rows
-        expected = first.triangle.residual(truth[first.members])
+        expected = first.triangle.residual(truth[first.column_indices])
         assert np.sqrt(np.nansum(own**2)) == pytest.approx(expected, rel=1e-10)
 
 
@@ -93,7 +93,7 @@ def test_gross_errors_leave_the_intervals_true(
         wrong = np.where(rng.random(clean.torque.shape) < 0.05, 30.0, 1.0)
         noisy = replace(clean, torque=clean.torque + wrong * NOISE * rng.normal(size=clean.torque.shape))
         found = robust(observation, base, [noisy])
-        plain = weighted_least_squares(observe(observation, base, [noisy], Decimation(1)))
+        plain = weighted_least_squares(assemble_regression(observation, base, [noisy], Decimation(1)))
         misses = errors(plain, observation, truth)
         for name, error in errors(found, observation, truth).items():
             low, high = found.interval(name) or (np.nan, np.nan)

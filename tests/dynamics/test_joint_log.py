@@ -10,12 +10,12 @@ from flexcal.data.recordings import Decimation, Recording, read_recording, write
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.estimators.column_noise import PerturbedLog
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import ExperimentSystem, observe, rows
+from flexcal.dynamics.regression import ExperimentSystem, assemble_regression, regression_blocks
 from flexcal.dynamics.signals import JointLog, Motion, Window, joint_log
 from flexcal.errors import FlexcalError
 from flexcal.jobs.dynamics.remarks import dynamics_remarks
-from flexcal.jobs.logs import LogSegment, Treatment, assemble_log_systems, read_logs
-from flexcal.jobs.logs.regression_systems import split
+from flexcal.jobs.logs import LogSegment, Preprocessing, assemble_log_systems, read_logs
+from flexcal.jobs.logs.regression_systems import split_hold_out
 from flexcal.progress import silent
 
 STEP = 1 / 200
@@ -47,7 +47,7 @@ def test_blocks_give_the_whole(
         np.testing.assert_allclose(parts.ddq, motion.ddq, atol=1e-10)
         estimates = [
             weighted_least_squares(
-                observe(observation, BaseParameters.of(observation), [experiment], Decimation(2))
+                assemble_regression(observation, BaseParameters.of(observation), [experiment], Decimation(2))
             )
             for experiment in (log, motion)
         ]
@@ -58,9 +58,9 @@ def test_blocks_give_the_whole(
 
 def systems(logs: list[Path], observation: Observation, scratch: Path, jobs: int) -> list[ExperimentSystem]:
     """Those of the first 70 % and of the rest of every log."""
-    treatment, parts = Treatment(10.0, Decimation(4), True), []
+    treatment, parts = Preprocessing(10.0, Decimation(4), True), []
     for log in read_logs(logs, observation.model, treatment, scratch, jobs=jobs):
-        early, late = split(log, treatment, 0.3)
+        early, late = split_hold_out(log, treatment, 0.3)
         assert late is not None
         parts += [LogSegment(log, early), LogSegment(log, late)]
     return assemble_log_systems(parts, observation, treatment, batches=16, jobs=jobs, progress=silent)
@@ -96,11 +96,11 @@ def test_the_same_call_on_dask(logs: list[Path], observation: Observation, tmp_p
 def test_a_window_reads_no_more_than_it_needs(swing: Motion, observation: Observation) -> None:
     """The rows of a window are those that all rows have there, number and all."""
     decimation = Decimation(4)
-    everything = list(rows(observation, swing, decimation, Window()))
+    everything = list(regression_blocks(observation, swing, decimation, Window()))
     number, time = (np.concatenate([getattr(part, key) for part in everything]) for key in ("number", "time"))
     np.testing.assert_array_equal(number, np.arange(len(number)))
     np.testing.assert_allclose(time, swing.time[decimation.support :: 4][: len(time)])
-    part = list(rows(observation, swing, decimation, Window(6.0, 7.0)))
+    part = list(regression_blocks(observation, swing, decimation, Window(6.0, 7.0)))
     inside = (time >= 6.0) & (time < 7.0)
     np.testing.assert_array_equal(np.concatenate([p.number for p in part]), number[inside])
     for joint in range(6):
@@ -132,8 +132,8 @@ def test_nothing_reaches_across_a_gap(
     assert "0.25 s between gaps are too short for the filters and left out" in log.time_stamps
     joined = Motion.joined(log.blocks())
     np.testing.assert_allclose(joined.ddq, np.concatenate([m.ddq for m in motions]), atol=1e-8)
-    found = list(rows(observation, log, Decimation(4), Window()))
-    expected = [list(rows(observation, motion, Decimation(4), Window())) for motion in motions]
+    found = list(regression_blocks(observation, log, Decimation(4), Window()))
+    expected = [list(regression_blocks(observation, motion, Decimation(4), Window())) for motion in motions]
     number = np.concatenate([part.number for part in found])
     assert (np.diff(number) > 0).all() and number[-1] <= log.samples // 4
     for joint in range(6):
@@ -164,7 +164,7 @@ def test_a_joint_that_never_moves(swing: Motion, observation: Observation, tmp_p
     assert np.ptp(motion.q[:, 1]) == 0 and abs(motion.q[0, 1] - 0.4) < 1e-5
     noisy = Motion.joined(PerturbedLog(log, observation.model, np.full(6, 1e-4), 1).blocks())
     assert not noisy.dq[:, 1].any() and np.ptp(noisy.q[:, 1]) == 0
-    data = observe(observation, BaseParameters.of(observation), [log], Decimation(2))
+    data = assemble_regression(observation, BaseParameters.of(observation), [log], Decimation(2))
     assert data.silent == ("joint_2.rotor_inertia", "joint_2.viscous", "joint_2.coulomb")
     estimate = weighted_least_squares(data)
     assert not set(data.silent) & {n for n, k in zip(data.names, estimate.identifiable, strict=True) if k}

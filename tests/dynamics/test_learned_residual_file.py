@@ -13,7 +13,7 @@ from two_links import true_values, two_links
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.residual import (
     LEARNED,
     GaussianProcess,
@@ -36,7 +36,7 @@ def estimate(tmp_path: Path, rng: np.random.Generator) -> Estimate:
     q, dq, ddq = rng.normal(size=(3, 60, 2))
     motion = driven(arm, Motion(np.arange(60.0), q, dq, ddq, np.zeros_like(q)), true_values(arm))
     noisy = replace(motion, torque=motion.torque + rng.normal(size=q.shape))
-    return weighted_least_squares(observe(arm, BaseParameters.of(arm), [noisy], Decimation(1)))
+    return weighted_least_squares(assemble_regression(arm, BaseParameters.of(arm), [noisy], Decimation(1)))
 
 
 @pytest.fixture

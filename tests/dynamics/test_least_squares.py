@@ -11,7 +11,7 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.diagnostics import essential_parameters
 from flexcal.dynamics.estimators import ordinary_least_squares, weighted_least_squares
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import RegressionData, TriangularFactor, observe
+from flexcal.dynamics.regression import RegressionData, TriangularFactor, assemble_regression
 from flexcal.dynamics.regression import blocks as rows
 from flexcal.dynamics.signals import Motion, Window
 from flexcal.errors import FlexcalError
@@ -32,7 +32,9 @@ def truth(observation: Observation) -> np.ndarray:
 
 @pytest.fixture(scope="module")
 def clean(observation: Observation, truth: np.ndarray, swing: Motion) -> Motion:
-    torques = [truth[m] @ c for m, c in zip(observation.members, observation.columns(swing), strict=True)]
+    torques = [
+        truth[m] @ c for m, c in zip(observation.column_indices, observation.columns(swing), strict=True)
+    ]
     return replace(swing, torque=np.stack(torques, axis=1))
 
 
@@ -53,7 +55,7 @@ def test_without_noise_the_truth_comes_back(
     clean: Motion,
     truth: np.ndarray,
 ) -> None:
-    data = observe(observation, base, [clean], Decimation(factor))
+    data = assemble_regression(observation, base, [clean], Decimation(factor))
     found = estimator(data)
     assert found.rank == 61
     assert max(map(abs, errors(found, observation.names, truth).values())) < 1e-10
@@ -68,7 +70,9 @@ def test_the_identified_robot_needs_the_measured_torques(
     clean: Motion,
 ) -> None:
     """What Pinocchio's regressor makes of the robot that carries the estimate, with its drives added, is what was measured."""
-    robot = observation.model.with_estimate(estimator(observe(observation, base, [clean], Decimation(1))))
+    robot = observation.model.with_estimate(
+        estimator(assemble_regression(observation, base, [clean], Decimation(1)))
+    )
     model = pin.buildModelFromUrdf(str(robot.urdf))
     data = model.createData()
     links = (
@@ -96,7 +100,7 @@ def test_weighted_intervals_cover(
     clean = Motion(*(part[::4] for part in (clean.time, clean.q, clean.dq, clean.ddq, clean.torque)))
     for _ in range(24):
         noisy = replace(clean, torque=clean.torque + NOISE * rng.normal(size=clean.torque.shape))
-        data = observe(observation, base, [noisy], Decimation(1))
+        data = assemble_regression(observation, base, [noisy], Decimation(1))
         found, plain = weighted_least_squares(data), ordinary_least_squares(data)
         for name, error in errors(found, observation.names, truth).items():
             low, high = found.interval(name) or (np.nan, np.nan)
@@ -111,15 +115,17 @@ def test_blocks_and_experiments_add_up(
 ) -> None:
     rng = np.random.default_rng(1)
     noisy = replace(clean, torque=clean.torque + NOISE * rng.normal(size=clean.torque.shape))
-    whole = ordinary_least_squares(observe(observation, base, [noisy], Decimation(4)))
+    whole = ordinary_least_squares(assemble_regression(observation, base, [noisy], Decimation(4)))
     monkeypatch.setattr(rows, "_BLOCK", 100)
-    data = observe(observation, base, [noisy], Decimation(4))
+    data = assemble_regression(observation, base, [noisy], Decimation(4))
     assert data.subsystems[0].triangle.rows == whole_rows(noisy, Decimation(4))
     assert ordinary_least_squares(data).parameters.coordinates() == pytest.approx(
         whole.parameters.coordinates(), abs=1e-9
     )
     halves = [Window(end=5.0), Window(start=5.0)]
-    two = ordinary_least_squares(observe(observation, base, [noisy, noisy], Decimation(4), windows=halves))
+    two = ordinary_least_squares(
+        assemble_regression(observation, base, [noisy, noisy], Decimation(4), windows=halves)
+    )
     assert two.parameters.coordinates() == pytest.approx(whole.parameters.coordinates(), abs=1e-9)
 
 
@@ -134,14 +140,16 @@ def test_standstill_is_left_out_and_counted(
     held = Motion(
         np.arange(2500) / 200, clean.q[at], clean.dq[at] * (np.arange(2500) < 2000)[:, None], clean.ddq[at], clean.torque[at]
     )  # fmt: skip
-    data = observe(observation, base, [held], Decimation(1))
+    data = assemble_regression(observation, base, [held], Decimation(1))
     assert data.masked == 500
     assert (
-        observe(observation, base, [held], Decimation(1), mask_standstill=False).subsystems[0].triangle.rows
+        assemble_regression(observation, base, [held], Decimation(1), mask_standstill=False)
+        .subsystems[0]
+        .triangle.rows
         == 2500
     )
     with pytest.raises(FlexcalError, match="no equations remain of the motion"):
-        observe(observation, base, [held], Decimation(1), windows=[Window(start=10.5)])
+        assemble_regression(observation, base, [held], Decimation(1), windows=[Window(start=10.5)])
 
 
 def test_a_joint_that_never_moves_is_named_and_the_rest_identified(
@@ -149,8 +157,12 @@ def test_a_joint_that_never_moves_is_named_and_the_rest_identified(
 ) -> None:
     locked = swing.q * [1, 1, 1, 1, 1, 0], swing.dq * [1, 1, 1, 1, 1, 0], swing.ddq * [1, 1, 1, 1, 1, 0]
     still = Motion(swing.time, *locked, swing.torque)
-    torques = [truth[m] @ c for m, c in zip(observation.members, observation.columns(still), strict=True)]
-    data = observe(observation, base, [replace(still, torque=np.stack(torques, axis=1))], Decimation(1))
+    torques = [
+        truth[m] @ c for m, c in zip(observation.column_indices, observation.columns(still), strict=True)
+    ]
+    data = assemble_regression(
+        observation, base, [replace(still, torque=np.stack(torques, axis=1))], Decimation(1)
+    )
     found = weighted_least_squares(data)
     assert found.rank < 61
     hidden = {entry.name for entry in found.dropped}
@@ -202,9 +214,9 @@ def test_what_is_not_finite_is_refused(observation: Observation, base: BaseParam
     torque = clean.torque.copy()
     torque[70, 2] = np.nan
     with pytest.raises(FlexcalError, match="the equations of the motion are not finite"):
-        observe(observation, base, [replace(clean, torque=torque)], Decimation(1))
+        assemble_regression(observation, base, [replace(clean, torque=torque)], Decimation(1))
 
 
 def test_too_few_rows_for_a_noise(observation: Observation, base: BaseParameters, motion: Motion) -> None:
     with pytest.raises(FlexcalError, match="do not determine its noise"):
-        weighted_least_squares(observe(observation, base, [motion.part(0, 20)], Decimation(1)))
+        weighted_least_squares(assemble_regression(observation, base, [motion.part(0, 20)], Decimation(1)))

@@ -21,7 +21,7 @@ def test_the_kept_columns_give_back_all(robot: RobotModel, rng: np.random.Genera
     q, dq, ddq, torque = rng.normal(size=(4, 50, robot.n))
     motion = Motion(np.arange(50.0), q, dq, ddq, torque)
     parts = np.split(observation.reduced(motion), np.cumsum(observation.widths)[:-1])
-    every = zip(observation.columns(motion), observation.spread, parts, torque.T, strict=True)
+    every = zip(observation.columns(motion), observation.projection, parts, torque.T, strict=True)
     for whole, spread, part, own in every:
         assert len(part) - 1 < len(whole)
         np.testing.assert_allclose(spread.T @ part[:-1], whole, rtol=0, atol=1e-9 * np.abs(whole).max())

@@ -11,7 +11,7 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import maximum_likelihood, weighted_least_squares
 from flexcal.dynamics.friction import Presliding, WarmUp
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import Motion, RepeatedMotion, Window
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
@@ -28,7 +28,7 @@ def clean(observation: Observation, truth: np.ndarray, sines: Callable[[int, flo
 
 def likeliest(observation: Observation, base: BaseParameters, *motions: Motion) -> tuple[Estimate, Estimate]:
     """And weighted least squares."""
-    data = observe(observation, base, motions, Decimation(1))
+    data = assemble_regression(observation, base, motions, Decimation(1))
     return maximum_likelihood(data, recorded(observation, base, *motions)), weighted_least_squares(data)
 
 

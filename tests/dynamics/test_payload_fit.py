@@ -22,12 +22,12 @@ from flexcal.dynamics.payload.rigid_body import (
     nearest_body,
     payload_from_link_frame,
 )
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import Motion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.model.parts import PSEUDO_INERTIA
-from flexcal.model.robot import RobotModel, holding
+from flexcal.model.robot import RobotModel, with_payload
 from flexcal.model.torques import torque_regressor
 
 BODY = np.array([2.0, 0.05, -0.03, 0.08, 0.02, 0.001, -0.002, 0.03, 0.003, 0.015])
@@ -42,7 +42,7 @@ def arm(tx40: RobotModel) -> Observation:
 
 def held_by(model: RobotModel) -> RobotModel:
     """With a payload to be found in the frame of the last link."""
-    return holding(model, model.joints[-1].link, 1.0, np.zeros(3), np.zeros((3, 3)))
+    return with_payload(model, model.joints[-1].link, 1.0, np.zeros(3), np.zeros((3, 3)))
 
 
 def loaded(arm: Observation, truth: np.ndarray) -> np.ndarray:
@@ -58,7 +58,7 @@ def found(
     arm: Observation, motions: list[Motion], carries: list[bool], dynamics: Estimate | None = None
 ) -> PayloadFit:
     base, held = BaseParameters.of(arm), arm.model.payload
-    data = observe(arm, base, motions, Decimation(1))
+    data = assemble_regression(arm, base, motions, Decimation(1))
     assert held is not None
     return identify_payload(PayloadEquations(data, carries, held, RobotPrior.of(arm, base, dynamics)))
 
@@ -89,14 +89,16 @@ def test_what_is_predicted_is_what_was_measured(
     base = BaseParameters.of(arm)
     for added in (0 * noise, noise):
         noisy = [replace(each, torque=each.torque + added) for each in pair]
-        data = observe(arm, base, noisy, Decimation(1), mask_standstill=False)
+        data = assemble_regression(arm, base, noisy, Decimation(1), mask_standstill=False)
         assert held is not None
         equations = PayloadEquations(data, [True, False], held, RobotPrior.of(arm, base, None))
         fit = identify_payload(equations)
         left = []
         for each, carries in zip(noisy, (True, False), strict=True):
             found = equations.coefficients(fit.unknowns, carries)
-            predicted = [found[m] @ own[:-1] for m, own in zip(arm.members, arm.systems(each), strict=True)]
+            predicted = [
+                found[m] @ own[:-1] for m, own in zip(arm.column_indices, arm.systems(each), strict=True)
+            ]
             left.append(each.torque - np.array(predicted).T)
         missed = np.linalg.norm(np.concatenate(left), axis=0)
         size = np.linalg.norm(np.concatenate([each.torque for each in noisy]), axis=0)
@@ -111,7 +113,7 @@ def test_without_noise_from_identified_dynamics(
 ) -> None:
     """The block of an earlier identification in place of recordings, its regrouped parameters left where CAD has them."""
     motion = sines(1000, 100.0)
-    data = observe(arm, base, [recovery.driven(arm, motion, truth)], Decimation(1))
+    data = assemble_regression(arm, base, [recovery.driven(arm, motion, truth)], Decimation(1))
     block = weighted_least_squares(data)
     known = Observation(arm.model.with_estimate(block), CLASSIC)
     fit = found(known, [recovery.driven(arm, motion, loaded(arm, truth))], [True], block)
@@ -147,7 +149,7 @@ def moments_matrix(moments: np.ndarray) -> np.ndarray:
 
 def test_a_plane_arm_tells_what_lies_in_its_plane(tmp_path: Path) -> None:
     """Mass and centre of mass in the plane; the other coordinate and the inertia stay as declared, by name."""
-    robot = holding(two_links(tmp_path), "lower", 1.0, np.array([0.0, 0.07, 0.0]), np.zeros((3, 3)))
+    robot = with_payload(two_links(tmp_path), "lower", 1.0, np.array([0.0, 0.07, 0.0]), np.zeros((3, 3)))
     arm = Observation(robot, CLASSIC)
     pair = [level(swing_of(arm, held, 7)) for held in (HELD, 0 * HELD)]
     fit = found(arm, pair, [True, False])
@@ -171,7 +173,7 @@ def level(motion: Motion) -> Motion:
 
 
 def test_nothing_held_is_refused(tmp_path: Path) -> None:
-    robot = holding(two_links(tmp_path), "lower", 1.0, np.zeros(3), np.zeros((3, 3)))
+    robot = with_payload(two_links(tmp_path), "lower", 1.0, np.zeros(3), np.zeros((3, 3)))
     arm = Observation(robot, CLASSIC)
     rng = np.random.default_rng(0)
     clean = [level(swing_of(arm, 0 * HELD, seed)) for seed in (7, 8)]
@@ -182,7 +184,7 @@ def test_nothing_held_is_refused(tmp_path: Path) -> None:
 
 def scores(folder: Path, seeds: range) -> np.ndarray:
     """Errors over half the intervals (seeds, 3) of mass and centre of mass in the plane, the noise coloured: an AR(1) of 0.8."""
-    robot = holding(two_links(folder), "lower", 1.0, np.zeros(3), np.zeros((3, 3)))
+    robot = with_payload(two_links(folder), "lower", 1.0, np.zeros(3), np.zeros((3, 3)))
     arm = Observation(robot, CLASSIC)
     clean = [level(swing_of(arm, held, 7 + k)) for k, held in enumerate((HELD, 0 * HELD))]
     truth = dict(

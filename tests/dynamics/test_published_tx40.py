@@ -45,7 +45,7 @@ def test_with_its_faults_the_published_estimate_comes_back(tx40: RobotModel, mot
     kept = [i for i in BaseParameters.of(observation).found.kept if names[i] != "joint_6.rotor_inertia"]
     systems = []
     for joint, (columns, members) in enumerate(
-        zip(observation.columns(motion), observation.members, strict=True)
+        zip(observation.columns(motion), observation.column_indices, strict=True)
     ):
         torque = twice_decimated(motion.torque[:, joint])
         wide = np.zeros((len(names), len(torque)))

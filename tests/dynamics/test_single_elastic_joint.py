@@ -17,7 +17,7 @@ from flexcal.dynamics.inverse_model import (
     RotorInertia,
     Viscous,
 )
-from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import ArmSide, Motion
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
@@ -69,7 +69,7 @@ def swing() -> Motion:
 
 
 def equations(observation: Observation, motion: Motion) -> RegressionData:
-    return observe(observation, BaseParameters.of(observation), [motion], Decimation(1))
+    return assemble_regression(observation, BaseParameters.of(observation), [motion], Decimation(1))
 
 
 def test_all_eight_parameters(observation: Observation, swing: Motion) -> None:
@@ -89,7 +89,7 @@ def test_the_equations_are_those_of_the_thesis(observation: Observation, swing: 
     arm = np.array([ddq, dq, np.sign(dq), q - motor, -one, zero, zero, zero])
     alone = np.array([zero, zero, zero, motor - q, one, push, rate, np.sign(rate)])
     for columns, members, row in zip(
-        observation.columns(swing), observation.members, (arm + alone, alone), strict=True
+        observation.columns(swing), observation.column_indices, (arm + alone, alone), strict=True
     ):
         shown = {observation.names[m]: c for m, c in zip(members, columns, strict=True)}
         for name, expected in zip(EIGHT, row, strict=True):
@@ -117,12 +117,12 @@ def test_noise_on_the_arm_side_lowers_the_stiffness_by_what_is_said(
 def test_a_gap_seen_from_one_side_is_told_from_nothing(observation: Observation, swing: Motion) -> None:
     """The offset takes it up by name, the stiffness loses nothing, and no gap is assumed for a next pass."""
     (spring,) = observation.springs
-    onesided = replace(observation, springs=(replace(spring, play=DriveBacklash(-1.0, 0.0)),))
+    onesided = replace(observation, springs=(replace(spring, backlash=DriveBacklash(-1.0, 0.0)),))
     found = weighted_least_squares(equations(onesided, swing))
     (hidden,) = (entry for entry in found.dropped if entry.name == "hinge.drive.gap_torque")
     assert hidden.absorbed_by == (("hinge.drive.torque_offset", pytest.approx(1.0)),)
     assert found.values["hinge.drive.stiffness"] == pytest.approx(K, rel=1e-8)
-    assert spring.with_backlash(observation.model, found.values).play == DriveBacklash(
+    assert spring.with_backlash(observation.model, found.values).backlash == DriveBacklash(
         pytest.approx(OFFSET / K), 0.0
     )
 

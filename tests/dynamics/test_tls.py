@@ -19,7 +19,7 @@ from flexcal.dynamics.estimators import (
 )
 from flexcal.dynamics.estimators.column_noise import position_noise
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
-from flexcal.dynamics.regression import RegressionData, observe
+from flexcal.dynamics.regression import RegressionData, assemble_regression
 from flexcal.dynamics.signals import JointLog, Motion
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
@@ -42,7 +42,7 @@ def fitted(
     observation: Observation, base: BaseParameters, motion: Motion, noisy: Motion
 ) -> tuple[Estimate, Estimate]:
     """Total and plain."""
-    data = observe(observation, base, [motion], Decimation(1))
+    data = assemble_regression(observation, base, [motion], Decimation(1))
     return total_least_squares(
         data, regressor_errors(recorded(observation, base, motion), [noisy])
     ), weighted_least_squares(data)
@@ -80,7 +80,9 @@ def test_noisy_columns_bend_least_squares_and_not_this(
             kept.append(np.array(list(missed.values())))
             counted.append(covered(estimate, missed))
         blind.append(
-            errors(unwhitened(observe(observation, base, [noisy], Decimation(1))), observation, truth)
+            errors(
+                unwhitened(assemble_regression(observation, base, [noisy], Decimation(1))), observation, truth
+            )
         )
     assert np.median(bias(total)) < 1.2 and np.median(bias(plain)) > 2.0
     assert 0.92 < np.mean(inside) < 0.98
@@ -112,7 +114,7 @@ def test_signs_and_constants_are_exact(
     wrong = regressor_errors(recorded(observation, base, clean), [spoilt(clean, rng)])
     for s in wrong.subsystems:
         size = np.linalg.norm(s.triangle.matrix, axis=0)
-        names = [observation.names[m] for m in s.members]
+        names = [observation.names[m] for m in s.column_indices]
         exact = [name.rpartition(".")[2].startswith(("coulomb", "torque_offset")) for name in names]
         assert any(exact) and np.all(size[exact] == 0.0)
         noisy = [name.rpartition(".")[2].startswith(("viscous", "rotor_inertia")) for name in names]

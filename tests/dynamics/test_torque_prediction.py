@@ -25,7 +25,10 @@ def swinging(tx40: RobotModel, swing: Motion) -> tuple[Observation, np.ndarray, 
     observation = Observation(tx40, CLASSIC)
     parameters = rng.normal(size=len(observation.names))
     exact = np.stack(
-        [parameters[m] @ w for m, w in zip(observation.members, observation.columns(swing), strict=True)],
+        [
+            parameters[m] @ w
+            for m, w in zip(observation.column_indices, observation.columns(swing), strict=True)
+        ],
         axis=1,
     )
     return observation, parameters, replace(swing, torque=exact + NOISE * rng.normal(size=exact.shape))

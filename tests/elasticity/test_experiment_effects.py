@@ -58,7 +58,7 @@ def test_shift_is_quadratic_in_the_amplitude_and_vanishes_at_rest(tx90l, poses):
 def test_compliance_of_a_gap(tx90l, poses, rng):
     """That of the twist against a Gaussian torque through zero; a drive held far from zero torque never opens its gap."""
     q, plan = poses["default"][0], plan_of(tx90l, poses["default"][:1])
-    added = DriveTorque.of(tx90l, q, None, plan).gap_compliance().mean(axis=0)
+    added = DriveTorque.of(tx90l, q, None, plan).backlash_compliance().mean(axis=0)
     motion, system = ReferenceMotion.of(plan), linearise(tx90l, q)
     size = multisine_torque(tx90l, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
     torque = size[0] * rng.standard_normal(400_000)
@@ -69,7 +69,7 @@ def test_compliance_of_a_gap(tx90l, poses, rng):
     assert 1 / stiffness * (1 + half_gap * added[0]) == pytest.approx(compliance, rel=2e-3)
     assert 1e-5 * added[1] < 1e-6
     swaying = replace(plan, reference_amplitude=np.deg2rad(3.0))
-    moving = DriveTorque.of(tx90l, q, None, swaying).gap_compliance()
+    moving = DriveTorque.of(tx90l, q, None, swaying).backlash_compliance()
     assert moving.mean(axis=0)[1] > added[1]
 
 

@@ -19,7 +19,7 @@ from flexcal.elasticity.response_model import (
 )
 from flexcal.elasticity.time_periodic import DriveTorque, ReferenceMotion, reference_shift
 from flexcal.estimation import Parameters
-from flexcal.model.robot import Posterior, declared, spring_names, uncertain_inertials
+from flexcal.model.robot import Posterior, declared_parameter, spring_names, uncertain_inertials
 
 VISCOUS = np.array([1.6, 1.3, 1.8])
 """As in the synthetic responses."""
@@ -79,7 +79,7 @@ def test_inertials_known_from_before_count_as_known(tx90l, poses, synthesise, dr
     responses = synthesise(truth, poses["default"][:2], noise=0.05, rng=rng, payload=0.0, step=16)
     names = uncertain_inertials(tx90l, range(6))
     known = tx90l.with_values({name: truth.value(name) for name in names})
-    items = Parameters(declared(known, name) for name in names)
+    items = Parameters(declared_parameter(known, name) for name in names)
     width = np.diag((1e-4 * items.prior_std()) ** 2)
     informed = replace(known, posterior=Posterior(items, width))
     springs = [f"joint_{i}.{spring}.stiffness" for i in (1, 2, 3) for spring in ("drive", "bearing_x")]
@@ -229,7 +229,7 @@ def test_half_gap_is_found(tx90l, poses, synthesise, rng):
     half_gap, responses = {1: 4e-5, 2: 6e-5}, []
     dragging = replace(tx90l, viscous=tx90l.viscous * np.append(VISCOUS, np.ones(3)))
     for q in poses["default"]:
-        added = DriveTorque.of(dragging, q, None, plan).gap_compliance()[0]
+        added = DriveTorque.of(dragging, q, None, plan).backlash_compliance()[0]
         soft = {
             f"joint_{axis + 1}.drive.{key}": 1 / (1 + size * added[axis])
             for axis, size in half_gap.items()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from flexcal.frequency.arbitrary import ExcitationRecord, Feedback, feedback, tones
+from flexcal.frequency.arbitrary import ExcitationRecord, Feedback, detect_tones, feedback
 
 POLE, GAIN, STEP = 0.9, 0.2, 1e-2
 """x' = 0.9 x + 0.2 u"""
@@ -102,12 +102,12 @@ def test_few_lines_are_named() -> None:
     t, rng = STEP * np.arange(2000), np.random.default_rng(5)
     one, two = np.sin(2 * np.pi * 7.03 * t), np.sin(2 * np.pi * 11 * t)
     zero = np.zeros(2000)
-    single = tones([record(one, zero)])
+    single = detect_tones([record(one, zero)])
     assert single is not None and single.frequencies_hz == pytest.approx((7.03,), abs=0.01)
     assert "a sine of one frequency, 7.03 Hz" in single.sentence
-    pair = tones([record(one, zero), record(two, zero)])
+    pair = detect_tones([record(one, zero), record(two, zero)])
     assert pair is not None and pair.alone and len(pair.frequencies_hz) == 2
-    nearly = tones([record(one + 0.1 * rng.normal(size=2000), zero)])
+    nearly = detect_tones([record(one + 0.1 * rng.normal(size=2000), zero)])
     assert nearly is not None and not nearly.alone and "nearly a sine" in nearly.sentence
-    assert tones([record(rng.normal(size=2000), zero)]) is None
-    assert tones([record(np.sin(2 * np.pi * (0.1 * t + 0.5 * t**2)), zero)]) is None
+    assert detect_tones([record(rng.normal(size=2000), zero)]) is None
+    assert detect_tones([record(np.sin(2 * np.pi * (0.1 * t + 0.5 * t**2)), zero)]) is None

@@ -112,7 +112,7 @@ def pendulum(*, stiffness: float = 2e4, damping: float = 0.0, gravity: float = 9
         viscous=np.zeros(1),
         coulomb=np.zeros(1),
         ratio=np.array([100.0]),
-        gaps=(0,),
+        backlash_joints=(0,),
         gravity=np.array([0.0, 0.0, -gravity]),
         point=("tip", 0, np.array([0.8, 0.0, 0.0])),
         station=("tracker", np.zeros(3)),
@@ -123,7 +123,7 @@ def test_a_gear_at_rest_against_its_closed_form() -> None:
     """Gap, hardening, hysteresis and transmission error of one drive under 10 kg at 0.8 m."""
     robot = replace(
         ideal_robot(pendulum()),
-        gap=np.array([4e-5]),
+        backlash=np.array([4e-5]),
         hardening=np.array([[0, 0, 2e5]]),
         hysteresis=np.array([1e-5]),
         error_amplitude=np.array([[5e-5, 2e-5, 1e-5, 5e-6]]),

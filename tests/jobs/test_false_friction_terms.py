@@ -36,7 +36,7 @@ def test_selection_widens_the_intervals(tmp_path: Path) -> None:
     robot, path = Log(torque_noise=0.1, stribeck=4.0, velocity=0.3).write(tmp_path, 3, friction="auto")
     found = identify_robot_dynamics(robot, [path])
     assert "stribeck" in found.friction.names
-    spread = found.friction.spread
+    spread = found.friction.uncertainty
     remark = found.document()["selection_remark"]
     assert (spread is None) == (remark is None)
     if spread is not None:

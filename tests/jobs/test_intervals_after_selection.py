@@ -31,7 +31,7 @@ def inside(found: DynamicsIdentification, seed: int, log: Log) -> tuple[np.ndarr
     )
     quantile, x = student.ppf(0.975, estimate.covariance_freedom), estimate.parameters.coordinates()
     torques, frictions = [], []
-    for joint, members in enumerate(observation.members):
+    for joint, members in enumerate(observation.column_indices):
         driven = np.array([observation.names[number].startswith("j") for number in members])
         glides = np.where(driven[:, None], gliding[joint] - rest[joint], 0.0)
         covariance = estimate.covariance[np.ix_(members, members)]

@@ -38,7 +38,7 @@ def _torques_inside(found: DynamicsIdentification, estimate: Estimate) -> np.nda
     true, x = torque(q, dq, ddq), estimate.parameters.coordinates()
     quantile = student.ppf(0.975, estimate.covariance_freedom)
     held = []
-    for joint, (members, own) in enumerate(zip(observation.members, columns, strict=True)):
+    for joint, (members, own) in enumerate(zip(observation.column_indices, columns, strict=True)):
         covariance = estimate.covariance[np.ix_(members, members)]
         std = np.sqrt(np.einsum("it,ij,jt->t", own, covariance, own))
         held.append(np.abs(x[members] @ own - true[:, joint]) < quantile * std)

@@ -15,7 +15,7 @@ from flexcal.dynamics.diagnostics import GravityRatio, weight_shares
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.friction.terms import Cables
 from flexcal.dynamics.inverse_model import CLASSIC, BaseParameters, Observation
-from flexcal.dynamics.regression import observe
+from flexcal.dynamics.regression import assemble_regression
 from flexcal.dynamics.signals import Motion
 from flexcal.jobs.dynamics.remarks import undeclared_spring_remarks
 from flexcal.report.checks import check_weight_shares
@@ -37,7 +37,7 @@ def shoulder_weight(q: np.ndarray) -> np.ndarray:
 
 
 def fitted(arm: Observation, motion: Motion) -> tuple:
-    data = observe(arm, BaseParameters.of(arm), [motion], Decimation(1))
+    data = assemble_regression(arm, BaseParameters.of(arm), [motion], Decimation(1))
     return data, weighted_least_squares(data)
 
 

@@ -25,7 +25,7 @@ from flexcal.report.figures import (
     verification_errors,
 )
 from flexcal.report.figures.error_distributions import expected_quantiles
-from flexcal.report.layout import INK, PAGE, canvas, decades
+from flexcal.report.layout import INK, PAGE, canvas, log_ticks
 from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections.geometry import exaggeration
 
@@ -121,7 +121,7 @@ def test_rank_is_marked_where_it_is(study: TwoStageStudy) -> None:
 
 
 def test_ticks_keep_their_size() -> None:
-    assert decades(-1, 1)["ticktext"] == ["10⁻¹", "1", "10"]
+    assert log_ticks(-1, 1)["ticktext"] == ["10⁻¹", "1", "10"]
 
 
 def test_arrows_are_round_and_short() -> None:

@@ -42,7 +42,7 @@ def test_the_numbers_are_those_of_the_whole_report(
 def test_truth_is_not_asked_for(stiffness: StiffnessStudy) -> None:
     page = stiffness_page(stiffness)
     assert [section.id for section in page.sections] == ["stage1", "provenance"]
-    assert page.verdict.rungs == () and len(page.verdict.facts) == 1
+    assert page.verdict.error_ranges == () and len(page.verdict.facts) == 1
 
 
 def test_a_bad_fit_is_not_trusted(stiffness: StiffnessStudy) -> None:

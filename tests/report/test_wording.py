@@ -18,7 +18,7 @@ from flexcal.report.layout import (
     tally,
     worst,
 )
-from flexcal.report.layout.error_axis import ladder
+from flexcal.report.layout.error_axis import place_ranges
 
 
 def test_millimetres() -> None:
@@ -46,24 +46,24 @@ def test_percent_and_ratio() -> None:
     assert ratio(1.0, 0.0) == "many times"
 
 
-def test_ladder_places_are_logarithmic() -> None:
-    rungs = (
+def test_places_on_the_error_axis_are_logarithmic() -> None:
+    ranges = (
         ErrorRange("a", 1e-5, 1e-4, 1e-3, "elastic"),
         ErrorRange("b", math.nan, 1e-3, 1e-2, "published"),
         ErrorRange("nothing", math.nan, math.nan, math.nan, "floor"),
     )
-    steps = ladder(rungs).steps
-    assert [s.rung.label for s in steps] == ["a", "b"]
+    steps = place_ranges(ranges).steps
+    assert [s.error_range.label for s in steps] == ["a", "b"]
     a, b = steps
     assert a.mean is not None and a.p90 is not None and a.maximum is not None
     assert a.p90 - a.mean == pytest.approx(a.maximum - a.p90)
     assert b.mean is None and b.start == pytest.approx(a.maximum) and b.texts[0] == NOTHING
-    assert all(0 <= place <= 100 for place, _ in ladder(rungs).ticks)
+    assert all(0 <= place <= 100 for place, _ in place_ranges(ranges).ticks)
     assert all(s.start >= 0 and s.start + s.width <= 100 for s in steps)
 
 
-def test_ladder_without_numbers_is_empty() -> None:
-    assert ladder((ErrorRange("a", math.nan, math.nan, math.nan, "floor"),)).steps == ()
+def test_an_error_axis_without_numbers_is_empty() -> None:
+    assert place_ranges((ErrorRange("a", math.nan, math.nan, math.nan, "floor"),)).steps == ()
 
 
 def test_cells_span_what_belongs_to_them() -> None:

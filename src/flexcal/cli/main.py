@@ -107,7 +107,7 @@ def _was_interrupted(problem: BaseException | None) -> bool:
 def _carry_out(verb: Verb, arguments: list[str]) -> int:
     import tyro
 
-    from flexcal.cli.arguments.parse_errors import refusal, refuse_unknown_options
+    from flexcal.cli.arguments.parse_errors import parse_error, refuse_unknown_options
     from flexcal.cli.folders.overwrite_protection import complete_interrupted_runs, outputs
 
     command = command_class(verb)
@@ -125,7 +125,7 @@ def _carry_out(verb: Verb, arguments: list[str]) -> int:
     except SystemExit as stop:
         if stop.code == 0:  # --help
             return 0
-        raise refusal(verb, said.getvalue()) from None
+        raise parse_error(verb, said.getvalue()) from None
     complete_interrupted_runs(parsed)
     with outputs(verb.name, parsed.out, verb.leaves, page=verb.page, beside=verb.beside):
         parsed.run()

@@ -61,8 +61,8 @@ class ConicFit:
         for cone in self.cones:
             if np.isfinite(cone.std):
                 rows, one = cone.rows()
-                matrices.append(rows @ plane[cone.members] / cone.std)
-                rights.append((one - rows @ self.least[cone.members]) / cone.std)
+                matrices.append(rows @ plane[cone.column_indices] / cone.std)
+                rights.append((one - rows @ self.least[cone.column_indices]) / cone.std)
         return np.vstack(matrices), np.concatenate(rights)
 
     def _nearest(
@@ -88,8 +88,8 @@ class ConicFit:
         for cone in self.cones:
             rows, one = cone.rows()
             kinds.append(clarabel.PSDTriangleConeT(cone.size))
-            blocks.append(_bordered(rows @ (plane * units)[cone.members], 0.0)[1:])
-            bounds.append(rows @ self.least[cone.members] - cone.floor * one)
+            blocks.append(_bordered(rows @ (plane * units)[cone.column_indices], 0.0)[1:])
+            bounds.append(rows @ self.least[cone.column_indices] - cone.floor * one)
         settings = clarabel.DefaultSettings()
         settings.verbose = False
         quadratic, linear = csc_matrix((count + 1, count + 1)), np.eye(count + 1)[0]

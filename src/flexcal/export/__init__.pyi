@@ -4,16 +4,15 @@ from .mjcf_file import write_mjcf
 from .mujoco_spec import mjcf_spec
 from .offset_fit import undetermined_offsets
 from .offset_table import render_offsets
-from .representation_error import Distances, Loss, UnrepresentedTerm, measure_export_error
+from .representation_error import ExportErrors, UnrepresentedTerm, measure_export_error
 from .urdf import write_urdf
 from .written_file import ExportedFile, RenderedModel, write_rendered
 
 __all__ = [
     "FORMATS",
     "Convention",
-    "Distances",
+    "ExportErrors",
     "ExportedFile",
-    "Loss",
     "PlainFormat",
     "RenderedModel",
     "UnrepresentedTerm",

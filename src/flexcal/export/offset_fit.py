@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.export.representation_error import Distances, random_poses, tool_positions
+from flexcal.export.representation_error import PositionErrors, random_poses, tool_positions
 from flexcal.model.kinematics import point_kinematics
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel, propagated_covariance_root
@@ -38,7 +38,7 @@ class OffsetFit:
     determined: np.ndarray
     base: np.ndarray
     tool: np.ndarray
-    before: Distances
+    before: PositionErrors
 
 
 def fit_offsets(
@@ -96,7 +96,7 @@ def _fit(
     rows = np.vstack([columns, _rest_rows(n, len(q))])
     response = _least_squares(rows, np.vstack([spread, np.zeros((9, spread.shape[1]))]))
     std = np.linalg.norm(response, axis=1)
-    before = Distances.of(wanted - offset_tool(nominal, q, still, point))
+    before = PositionErrors.of(wanted - offset_tool(nominal, q, still, point))
     return OffsetFit(
         np.where(held, 0.0, fitted[:n]), std[:n], ~held, fitted[n : n + 6], fitted[n + 6 :], before
     )

@@ -11,7 +11,7 @@ import numpy as np
 from flexcal.export.chain import chain_to
 from flexcal.export.offset_fit import OffsetFit, error_after_offsets, fit_offsets, offset_tool
 from flexcal.export.representation_error import AT_REST, GEOMETRY, ToolMap
-from flexcal.export.transforms import SIX, from_xyz_rpy, transform, xyz_rpy
+from flexcal.export.transforms import XYZ_RPY, from_xyz_rpy, transform, xyz_rpy
 from flexcal.export.written_file import RenderedModel
 from flexcal.model.parts import rotation_vector, vector_rotation
 from flexcal.model.robot import RobotModel
@@ -113,7 +113,7 @@ def render_offsets(
 def offsets_of(text: str, nominal: RobotModel) -> np.ndarray:
     """Parameters (n + 9,) of `offset_tool` that a table's `text` holds; raises `FlexcalError` for a joint that the robot does not have."""
     found = np.zeros(nominal.n + 9)
-    pose: dict[str, float] = dict.fromkeys(SIX, 0.0)
+    pose: dict[str, float] = dict.fromkeys(XYZ_RPY, 0.0)
     lines = (line for line in text.splitlines() if not line.startswith("#"))
     for row in csv.DictReader(lines):
         value = float(row["value"])
@@ -154,7 +154,7 @@ def _csv(model: RobotModel, fit: OffsetFit, chain: tuple[int, ...], *, keep_fram
         writer.writerow([joint.name, "offset", "rad", repr(value), std, f"{value / DEGREE:.6f}", motor, told])
     if not keep_frames:
         for key, value in _base_numbers(fit.base).items():
-            angle = key in SIX[3:]
+            angle = key in XYZ_RPY[3:]
             degrees = f"{value / DEGREE:.6f}" if angle else ""
             writer.writerow(["base", key, "rad" if angle else "m", repr(value), "", degrees, "", ""])
         for key, value in zip("xyz", fit.tool.tolist(), strict=True):

@@ -40,7 +40,7 @@ ToolMap = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Distances:
+class PositionErrors:
     """Mean, 95th percentile and maximum of the tool error, m."""
 
     mean: float
@@ -48,7 +48,7 @@ class Distances:
     max: float
 
     @classmethod
-    def of(cls, errors: np.ndarray) -> Distances:
+    def of(cls, errors: np.ndarray) -> PositionErrors:
         """Of differences of positions (N, 3), m."""
         distance = np.linalg.norm(errors, axis=1)
         return cls(float(distance.mean()), float(np.percentile(distance, 95)), float(distance.max()))
@@ -67,18 +67,18 @@ class UnrepresentedTerm:
     """A term that a format cannot represent, and the tool error where it alone is left out (None: there is no tool)."""
 
     name: str
-    error: Distances | None
+    error: PositionErrors | None
 
 
 @dataclass(frozen=True)
-class Loss:
+class ExportErrors:
     """What is lost: term by term, and the whole `error` between the robot at rest and the file as written, over poses `within` a space.
 
     `error` is None for a robot without points, which has no tool to be off; `payload` is what the robot carries, kg.
     """
 
     terms: tuple[UnrepresentedTerm, ...]
-    error: Distances | None
+    error: PositionErrors | None
     poses: int
     within: str
     payload: float
@@ -117,7 +117,7 @@ def measure_export_error(
     *,
     point: str | None = None,
     absorb: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
-) -> Loss:
+) -> ExportErrors:
     """Loss of a file that puts the target where `tool` says and has no place for `terms`; only those that `model` has count.
 
     The robot carries its declared payload. `absorb` takes joint positions (N, n) and what a term moves the tool by (N, 3), and returns
@@ -126,14 +126,16 @@ def measure_export_error(
     present = [term for term in terms if _leave_out(model, term) is not model]
     payload = float(model.payload_mass[0])
     if not model.points:
-        return Loss(tuple(UnrepresentedTerm(term, None) for term in present), None, 0, "joint range", payload)
+        return ExportErrors(
+            tuple(UnrepresentedTerm(term, None) for term in present), None, 0, "joint range", payload
+        )
     q, within = random_poses(model, point, np.random.default_rng(0))
     full, flank = tool_positions(model, q, point=point)
     lost = []
     for term in present:
         moved = full - tool_positions(_leave_out(model, term), q, point=point, flank=flank)[0]
-        lost.append(UnrepresentedTerm(term, Distances.of(moved if absorb is None else absorb(q, moved))))
-    return Loss(tuple(lost), Distances.of(full - tool(q)), len(q), within, payload)
+        lost.append(UnrepresentedTerm(term, PositionErrors.of(moved if absorb is None else absorb(q, moved))))
+    return ExportErrors(tuple(lost), PositionErrors.of(full - tool(q)), len(q), within, payload)
 
 
 def tool_positions(
@@ -190,7 +192,7 @@ def _leave_out(model: RobotModel, term: str) -> RobotModel:
     return model
 
 
-def _alone(error: Distances | None) -> str:
+def _alone(error: PositionErrors | None) -> str:
     if error is None:
         return ""
     found = error.in_millimetres()

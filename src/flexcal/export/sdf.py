@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.errors import FlexcalError
 from flexcal.export.representation_error import AT_REST, ToolMap
-from flexcal.export.transforms import SIX, from_xyz_rpy, shifted, transform, turned, xyz_rpy
+from flexcal.export.transforms import XYZ_RPY, from_xyz_rpy, shifted, transform, turned, xyz_rpy
 from flexcal.export.urdf_inertials import bodiless_links, bodiless_remark
 from flexcal.export.written_file import RenderedModel
 from flexcal.model.kinematics import link_placement, point_placement
@@ -130,4 +130,4 @@ def _pose(position: np.ndarray, rotation: np.ndarray) -> str:
 
 
 def _matrix(pose: str) -> np.ndarray:
-    return from_xyz_rpy(dict(zip(SIX, map(float, pose.split()), strict=True)))
+    return from_xyz_rpy(dict(zip(XYZ_RPY, map(float, pose.split()), strict=True)))

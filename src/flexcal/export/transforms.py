@@ -6,7 +6,7 @@ import numpy as np
 
 from flexcal.model.parts import axis_rotations, rotation_rpy, rpy_rotation
 
-SIX: tuple[str, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
+XYZ_RPY: tuple[str, ...] = ("x", "y", "z", "roll", "pitch", "yaw")
 X, Y, Z = np.eye(3)
 
 
@@ -20,12 +20,12 @@ def transform(position: np.ndarray, rotation: np.ndarray) -> np.ndarray:
 def xyz_rpy(placement: np.ndarray) -> dict[str, float]:
     """x, y, z (m), roll, pitch, yaw (rad) of a placement (4, 4) = Trans Rz(yaw) Ry(pitch) Rx(roll)."""
     values = [*placement[:3, 3], *rotation_rpy(placement[:3, :3])]
-    return {key: float(value) + 0.0 for key, value in zip(SIX, values, strict=True)}
+    return {key: float(value) + 0.0 for key, value in zip(XYZ_RPY, values, strict=True)}
 
 
 def from_xyz_rpy(numbers: dict[str, float]) -> np.ndarray:
     """The placement (4, 4) that six numbers say."""
-    values = np.array([numbers[key] for key in SIX], dtype=float)
+    values = np.array([numbers[key] for key in XYZ_RPY], dtype=float)
     return transform(values[:3], rpy_rotation(values[3:]))
 
 

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from flexcal.export.representation_error import Loss, ToolMap, measure_export_error
+from flexcal.export.representation_error import ExportErrors, ToolMap, measure_export_error
 from flexcal.files.transaction import write_text
 from flexcal.model.robot import RobotModel
 
@@ -38,7 +38,7 @@ class ExportedFile:
     """The written file, its loss, and remarks; `table` are its rows."""
 
     path: Path
-    loss: Loss
+    loss: ExportErrors
     remarks: tuple[str, ...]
     table: dict[str, Any]
 

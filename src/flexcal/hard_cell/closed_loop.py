@@ -127,13 +127,13 @@ def _angles(arm: Multibody, whole: Multibody, resting: StaticEquilibrium) -> np.
 def _hinges(robot: HardRobot, arm: Multibody) -> np.ndarray:
     """Stiffness, damping, half gap, hardening, stiffness and twist limit of the slipping element (d, 6) of all hinges."""
     none = np.zeros((robot.n, 3))
-    gap, slipping, limit = none.copy(), none.copy(), none.copy()
-    gap[:, 2] = robot.gap
+    backlash, slipping, limit = none.copy(), none.copy(), none.copy()
+    backlash[:, 2] = robot.backlash
     stiffness = np.where(np.isfinite(robot.arm.springs), robot.arm.springs, 0.0)
     slipping[:, 2] = stiffness[:, 2] * robot.hysteresis / HYSTERESIS_TWIST
     limit[:, 2] = HYSTERESIS_TWIST
     return np.column_stack(
-        [arm.springs(v) for v in (stiffness, robot.arm.dampers, gap, robot.hardening, slipping, limit)]
+        [arm.springs(v) for v in (stiffness, robot.arm.dampers, backlash, robot.hardening, slipping, limit)]
     )
 
 

@@ -53,7 +53,7 @@ class ArmDescription:
     viscous: np.ndarray
     coulomb: np.ndarray
     ratio: np.ndarray
-    gaps: tuple[int, ...]
+    backlash_joints: tuple[int, ...]
     gravity: np.ndarray
     point: tuple[str, int, np.ndarray]
     station: tuple[str, np.ndarray]
@@ -116,7 +116,7 @@ def read_description(robot: Path) -> ArmDescription:
         viscous=drive(config.drives.viscous),
         coulomb=drive(config.drives.coulomb),
         ratio=drive(config.drives.ratio, TYPICAL_RATIO),
-        gaps=tuple(names.index(name) for name in config.geometry.backlash),
+        backlash_joints=tuple(names.index(name) for name in config.geometry.backlash),
         gravity=np.array(config.gravity, dtype=float),
         point=(point, index[declared.frame], np.array(declared.xyz, dtype=float)),
         station=(station, np.zeros(3) if place is None else np.array(place, dtype=float)),

@@ -22,7 +22,7 @@ class StaticEquilibrium:
     point: np.ndarray
 
 
-def wound(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarray) -> np.ndarray:
+def spring_twist(torque: np.ndarray, stiffness: np.ndarray, hardening: np.ndarray) -> np.ndarray:
     """Twist x (d,) rad at which k (x + a x³) is `torque` (d,) N m, `stiffness` k and `hardening` a (d,); Newton's method from x = T/k."""
     soft = torque / stiffness
     twist = soft.copy()
@@ -58,9 +58,9 @@ def stand(
     elastic = np.array([part != "motor" for _, part in arm.hinges])
     stiffness = np.where(elastic, arm.springs(robot.arm.springs), 1.0)
     hardening = arm.springs(robot.hardening)
-    gap, offset, load = (np.zeros(len(arm.hinges)) for _ in range(3))
+    backlash, offset, load = (np.zeros(len(arm.hinges)) for _ in range(3))
     driven = twist >= 0
-    gap[twist[driven]] = robot.gap[driven]
+    backlash[twist[driven]] = robot.backlash[driven]
     free = transmission_error(robot, motors) + (0.0 if scatter is None else scatter)
     offset[twist[driven]] = free[driven]
     if slip is not None:
@@ -69,7 +69,7 @@ def stand(
     angles[motor] = motors + np.where(driven, 0.0, free)
     for _ in range(ITERATIONS):
         torque = -arm.gravity(angles) - load
-        found = wound(torque, stiffness, hardening) + gap * np.sign(torque) + offset
+        found = spring_twist(torque, stiffness, hardening) + backlash * np.sign(torque) + offset
         moved = np.abs(found - angles)[elastic].max(initial=0.0)
         angles[elastic] = found[elastic]
         if moved < TOLERANCE:

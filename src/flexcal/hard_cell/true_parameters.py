@@ -35,7 +35,7 @@ class HardRobot:
     """True parameters of an arm; n joints, SI, at the joint.
 
     `bearings_before`: the bearing's axes are fixed to the parent, before the joint's rotation; else they turn with it. `hardening` (n, 3)
-    1/rad²; `hysteresis` (n,) half width of the drive's loop, rad; `gap` (n,) half, rad; `stribeck`, `stribeck_velocity`, `per_load`,
+    1/rad²; `hysteresis` (n,) half width of the drive's loop, rad; `backlash` (n,) half, rad; `stribeck`, `stribeck_velocity`, `per_load`,
     `bristle` (rad) of friction; `error_amplitude`, `error_phase` (n, 4) of the gear; `torque_gain` (n,) true over believed
     torque; `joint_scatter` (n,) rad and `point_scatter` m an axis of every visit, 1σ; `expansion` (links,) relative, at the end of a
     measurement; `payload_excess` kg beyond what is
@@ -46,7 +46,7 @@ class HardRobot:
     bearings_before: bool
     hardening: np.ndarray
     hysteresis: np.ndarray
-    gap: np.ndarray
+    backlash: np.ndarray
     stribeck: np.ndarray
     stribeck_velocity: np.ndarray
     per_load: np.ndarray
@@ -65,7 +65,7 @@ class HardRobot:
     @property
     def n(self) -> int:
         """Number of joints."""
-        return len(self.gap)
+        return len(self.backlash)
 
     def carried(self, declared: float) -> float:
         """Mass, kg, that the arm truly holds where `declared` kg are said."""
@@ -80,7 +80,7 @@ def ideal_robot(arm: ArmDescription, *, bearings_before: bool = True) -> HardRob
         bearings_before=bearings_before,
         hardening=np.zeros((n, 3)),
         hysteresis=zero,
-        gap=zero,
+        backlash=zero,
         stribeck=zero,
         stribeck_velocity=np.ones(n),
         per_load=zero,
@@ -120,8 +120,8 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
         point=(name, link, place + RULER * normal(3)),
         held_com=None if held is None else held + PAYLOAD_COM * normal(3),
     )
-    gap = np.zeros(n)
-    gap[list(arm.gaps)] = uniform(*GAP, len(arm.gaps))
+    backlash = np.zeros(n)
+    backlash[list(arm.backlash_joints)] = uniform(*GAP, len(arm.backlash_joints))
     repeatability = float(uniform(*REPEATABILITY))
     amplitude = np.column_stack([uniform(0, JOINT_ERROR, (n, 2)), uniform(0, MOTOR_ERROR, (n, 2))]) * [
         1,
@@ -136,7 +136,7 @@ def draw_robot(described: ArmDescription, rng: np.random.Generator) -> HardRobot
         bearings_before=bool(rng.integers(2)),
         hardening=np.column_stack([np.zeros((n, 2)), uniform(0, HARDENING, n)]) / HARDENING_TWIST**2,
         hysteresis=uniform(0, HYSTERESIS, n),
-        gap=gap,
+        backlash=backlash,
         stribeck=arm.coulomb * uniform(0, 0.4, n),
         stribeck_velocity=uniform(0.02, 0.1, n),
         per_load=uniform(0, 0.03, n),
@@ -206,6 +206,6 @@ def counterparts(robot: HardRobot) -> dict[str, float]:
             values[f"{link.joint}.{_SPRINGS[component]}.damping"] = float(arm.dampers[j, component])
         if np.isfinite(arm.springs[j, 2]):
             values[f"{link.joint}.drive.hardening"] = float(robot.hardening[j, 2]) * MILLIRADIAN**2
-        if j in arm.gaps:
-            values[f"{link.joint}.backlash"] = float(robot.gap[j])
+        if j in arm.backlash_joints:
+            values[f"{link.joint}.backlash"] = float(robot.backlash[j])
     return values

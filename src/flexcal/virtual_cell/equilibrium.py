@@ -19,14 +19,16 @@ FLANKS = 8
 
 
 @dataclass(frozen=True, eq=False)
-class Rest:
+class StaticEquilibrium:
     """A rest position (d,) of a plant and the torque (m,) N m of each free motor that holds it against gravity."""
 
     position: np.ndarray
     torque: np.ndarray
 
 
-def rest(plant: Plant, data: mujoco.MjData, motors: np.ndarray, slip: np.ndarray | None = None) -> Rest:
+def rest(
+    plant: Plant, data: mujoco.MjData, motors: np.ndarray, slip: np.ndarray | None = None
+) -> StaticEquilibrium:
     """Rest position with the free motors held at `motors` (m,) rad.
 
     Every gap is taken up on the side of the true spring torque τ of the motor on the arm: q_arm = q_M − b sign τ − τ/c. `slip` (d,)
@@ -36,15 +38,15 @@ def rest(plant: Plant, data: mujoco.MjData, motors: np.ndarray, slip: np.ndarray
     start = np.zeros(plant.mjmodel.nv)
     start[plant.motors] = motors
     load = np.zeros_like(start) if slip is None else plant.springs[:, 4] * slip
-    gap = plant.springs[:, 2] > 0
-    flank = np.where(gap, np.sign(gravity_force(plant, data, start)), 0.0)
+    has_backlash = plant.springs[:, 2] > 0
+    flank = np.where(has_backlash, np.sign(gravity_force(plant, data, start)), 0.0)
     passes = 0
     while True:
         passes += 1
         position, torque = _balance(plant, data, start, flank, load)
-        seen = np.where(gap, np.sign(torque), 0.0)
+        seen = np.where(has_backlash, np.sign(torque), 0.0)
         if np.array_equal(seen, flank) or passes == FLANKS:
-            return Rest(position, torque[plant.motors])
+            return StaticEquilibrium(position, torque[plant.motors])
         flank = seen
 
 

@@ -35,7 +35,7 @@ def recurrence(
     return np.block([drift, rate, [zero, one, zero, zero], [zero, zero, one, zero]])
 
 
-def growth(
+def growth_rate(
     mass: np.ndarray, damping: np.ndarray, stiffness: np.ndarray, springs: np.ndarray, step: float
 ) -> float:
     """Fastest growth rate, 1/s, of the free recurrence; an arm that would fall over grows by a few 1/s, a step too long by hundreds."""
@@ -192,15 +192,15 @@ def gravity_stiffness(
 
 def spring_torque(plant: Plant, position: np.ndarray, flank: np.ndarray) -> np.ndarray:
     """Torque (d,) of every spring against its twist, the gap taken up on the side `flank` (d,) = sign of the torque on the arm."""
-    stiffness, _, gap, cubic = plant.springs[:, :4].T
-    stretch = position + gap * flank
+    stiffness, _, half_backlash, cubic = plant.springs[:, :4].T
+    stretch = position + half_backlash * flank
     return stiffness * stretch * (1 + cubic * stretch**2)
 
 
 def spring_tangent(plant: Plant, position: np.ndarray) -> np.ndarray:
     """Tangent stiffness (d,) of every spring at a position (d,), in contact."""
-    stiffness, _, gap, cubic = plant.springs[:, :4].T
-    stretch = np.maximum(np.abs(position) - gap, 0)
+    stiffness, _, half_backlash, cubic = plant.springs[:, :4].T
+    stretch = np.maximum(np.abs(position) - half_backlash, 0)
     return stiffness * (1 + 3 * cubic * stretch**2)
 
 
@@ -249,8 +249,8 @@ def unresolved(plant: Plant) -> str | None:
     sticking[plant.motors, plant.motors] += (plant.frictions[:, 1] + plant.frictions[:, 3]) / plant.frictions[
         :, 2
     ]
-    if growth(linear.mass, linear.damping, linear.stiffness, springs, step) > FALLING:
+    if growth_rate(linear.mass, linear.damping, linear.stiffness, springs, step) > FALLING:
         return "the robot's fastest modes"
-    if growth(linear.mass, sticking, linear.stiffness, springs, step) > FALLING:
+    if growth_rate(linear.mass, sticking, linear.stiffness, springs, step) > FALLING:
         return "the motors' Coulomb friction near standstill"
     return None

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.error_model import distinct
+from flexcal.calibration.error_model import group_numbers
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 
@@ -80,7 +80,7 @@ def _numbers(poses: PoseSet) -> np.ndarray:
     """
     payload = np.zeros(len(poses)) if poses.payload is None else poses.payload
     kinds = [np.unique(labels, return_inverse=True)[1] for labels in (poses.target, poses.station)]
-    exact = distinct(np.column_stack([poses.q, payload, *kinds]))
+    exact = group_numbers(np.column_stack([poses.q, payload, *kinds]))
     rows = np.unique(exact, return_index=True)[1]
     places = np.floor(poses.q[rows][:, [0, -1]] / _CELL).astype(np.int64).tolist()
     first: list[int] = []

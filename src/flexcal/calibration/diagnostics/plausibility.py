@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.fit import Calibration, tolerances
+from flexcal.calibration.fit import Calibration, manufacturing_tolerances
 
 FAR = 50.0
 """Tolerances by which no geometric parameter should be off: 15 mm, 25 mrad."""
@@ -51,7 +51,9 @@ def implausible_shifts(found: Calibration) -> tuple[ImplausibleShift, ...]:
     kept = [name for name in found.identifiability.kept_names if _has_size(name)]
     named = [*kept, *prior.parameters.names]
     end, start = estimate.subset(named).coordinates(), estimate.subset(named).prior_mean()
-    size = np.concatenate([tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))])
+    size = np.concatenate(
+        [manufacturing_tolerances(estimate.subset(kept)), np.sqrt(np.diag(prior.covariance))]
+    )
     limit = np.concatenate([_limits(kept, size), np.full(len(prior.parameters), FAR_FROM_PRIOR)])
     times = np.abs(end - start) / size
     far = [k for k in np.argsort(-times / limit) if times[k] > limit[k]]

@@ -1,19 +1,19 @@
-from .error_components import Scatter, joint_rotation_jacobian, known_scatter, whitened
+from .error_components import ErrorComponents, joint_rotation_jacobian, known_scatter, whitened
 from .error_statistics import ErrorStatistics
 from .folds import are_different, order_folds, repeated_pose_numbers, workspace_folds
-from .groups import SAME_COMMAND, ErrorGroups, block_columns, distinct, occurrence
+from .groups import SAME_COMMAND, ErrorGroups, block_columns, group_numbers, occurrence
 from .variance_components import TRANSMISSION, LinearFit
 
 __all__ = [
     "SAME_COMMAND",
     "TRANSMISSION",
+    "ErrorComponents",
     "ErrorGroups",
     "ErrorStatistics",
     "LinearFit",
-    "Scatter",
     "are_different",
     "block_columns",
-    "distinct",
+    "group_numbers",
     "joint_rotation_jacobian",
     "known_scatter",
     "occurrence",

@@ -18,7 +18,7 @@ _SMALLEST_TURN = 1e-7
 
 
 @dataclass(frozen=True)
-class Scatter:
+class ErrorComponents:
     """Standard deviations of the error components of measured points, each a coordinate (1σ).
 
     `share`: the instrument's noise over the stated sigma, 0 where none is stated (the robot's then contains it); `robot` m, independent
@@ -41,7 +41,7 @@ class Scatter:
         """Standard deviation of the model error of a coordinate, m."""
         return float(np.sqrt(self.workspace**2 + self.order**2 + self.command**2))
 
-    def settled(self, before: Scatter, tolerance: float) -> bool:
+    def settled(self, before: ErrorComponents, tolerance: float) -> bool:
         """Whether every component is where it was, to a share `tolerance` of the whole."""
         own, other = (np.array([s.robot, s.pose, s.workspace, s.order, s.command]) for s in (self, before))
         same = np.abs(own - other).max() <= tolerance * (np.linalg.norm(own) + _SMALLEST)
@@ -109,18 +109,18 @@ def whitened(whitening: np.ndarray, rows: np.ndarray) -> np.ndarray:
     return np.matmul(whitening, rows).reshape(3 * len(rows), rows.shape[2])
 
 
-def known_scatter(model: RobotModel, *, stated: bool) -> Scatter | None:
+def known_scatter(model: RobotModel, *, stated: bool) -> ErrorComponents | None:
     """What a calibration found of the errors of a robot's points; without a calibration the instrument alone where its sigma is `stated`.
 
     A sigma that the calibration did not have is not added: the robot's part there holds the instrument's. None where nothing is known.
     """
     instrument, share, robot, angular, _, pose, _ = model.scatter
     if not model.scatter.any():
-        return Scatter(share=1.0, robot=0.0) if stated else None
+        return ErrorComponents(share=1.0, robot=0.0) if stated else None
     if not stated:
         share = 1.0 if instrument > 0 else 0.0
     alone = np.sqrt(max(robot**2 - pose**2, 0.0))
-    return Scatter(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
+    return ErrorComponents(share=float(share), robot=float(alone), pose=float(pose), angular=float(angular))
 
 
 def joint_rotation_jacobian(at: Prediction) -> np.ndarray:

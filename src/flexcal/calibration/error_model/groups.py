@@ -38,8 +38,8 @@ class ErrorGroups:
     def of(cls, poses: PoseSet) -> ErrorGroups:
         """Rows of one pose number are a visit; those of a target that the visit already has begin another."""
         _, target = np.unique(poses.target, return_inverse=True)
-        visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
-        commands = distinct(np.column_stack([np.round(poses.q / SAME_COMMAND), target]))
+        visit = group_numbers(np.column_stack([poses.pose, occurrence(group_numbers(poses.pose, target))]))
+        commands = group_numbers(np.column_stack([np.round(poses.q / SAME_COMMAND), target]))
         repeated = int((np.bincount(commands) > 1).sum())
         command = commands if repeated >= _FEWEST_REPEATED else None
         size = np.bincount(visit)
@@ -52,8 +52,8 @@ class ErrorGroups:
 
     def subset(self, rows: np.ndarray) -> ErrorGroups:
         """Those of the rows with these indices, or where this mask is true."""
-        blocks = {name: distinct(labels[rows]) for name, labels in self.blocks.items()}
-        return ErrorGroups(distinct(self.pose[rows]), **blocks)
+        blocks = {name: group_numbers(labels[rows]) for name, labels in self.blocks.items()}
+        return ErrorGroups(group_numbers(self.pose[rows]), **blocks)
 
     @property
     def blocks(self) -> dict[str, np.ndarray]:
@@ -93,7 +93,7 @@ def block_columns(labels: np.ndarray) -> np.ndarray:
     return np.kron(rows, np.eye(3)).reshape(len(labels), 3, -1)
 
 
-def distinct(*columns: np.ndarray) -> np.ndarray:
+def group_numbers(*columns: np.ndarray) -> np.ndarray:
     """Numbers (N,) from 0 of the distinct rows, in the order in which they first appear."""
     _, first, inverse = np.unique(np.column_stack(columns), axis=0, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[inverse.ravel()]

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from flexcal.calibration.error_model.arrowhead_matrix import Arrowhead, ArrowheadFactor
-from flexcal.calibration.error_model.error_components import Scatter
+from flexcal.calibration.error_model.error_components import ErrorComponents
 from flexcal.calibration.error_model.groups import COMMAND
 from flexcal.calibration.error_model.incidence_matrices import added
 from flexcal.calibration.error_model.point_sums import PointSums
@@ -36,7 +36,7 @@ class RestrictedLikelihood:
     deviance: float
 
     @classmethod
-    def of(cls, sums: PointSums, names: Sequence[str], scatter: Scatter) -> RestrictedLikelihood:
+    def of(cls, sums: PointSums, names: Sequence[str], scatter: ErrorComponents) -> RestrictedLikelihood:
         """At a scatter, to be derived by the variances of the components `names`."""
         fit = sums.fit
         own = scatter.jointly(fit.sigma, fit.turns, fit.cells)

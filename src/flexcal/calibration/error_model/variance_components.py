@@ -7,7 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from flexcal.calibration.error_model.error_components import Scatter
+from flexcal.calibration.error_model.error_components import ErrorComponents
 from flexcal.calibration.error_model.groups import ErrorGroups
 from flexcal.calibration.error_model.point_sums import PointSums
 from flexcal.calibration.error_model.restricted_likelihood import RestrictedLikelihood
@@ -47,7 +47,7 @@ class LinearFit:
     turns: np.ndarray
     cells: ErrorGroups
 
-    def products(self, scatter: Scatter, columns: np.ndarray) -> np.ndarray:
+    def products(self, scatter: ErrorComponents, columns: np.ndarray) -> np.ndarray:
         """Scalar products (k + 1, k + 1) of further `columns` (N, 3, k) m and, the last, the residual, less what the parameters explain.
 
         They are weighted by the inverse of the residual's marginal covariance, the `tied` numbers and shared errors integrated out.
@@ -59,7 +59,7 @@ class LinearFit:
         own = np.arange(last - columns.shape[2] - 1, last)
         return RestrictedLikelihood.of(sums, names, scatter).products(own)
 
-    def scatter(self, *, stated: bool) -> tuple[Scatter, dict[str, float]]:
+    def scatter(self, *, stated: bool) -> tuple[ErrorComponents, dict[str, float]]:
         """The components, and the standard deviation of each of them that is not zero.
 
         Where a sigma is `stated`, the instrument's part is that, or less where the points scatter clearly less than it says.
@@ -86,7 +86,7 @@ class LinearFit:
         names, scale, variances = self._supported(names, scale, variances, likelihood, share)
         variances = np.where(variances > _NEGLIGIBLE * scale, variances, 0.0)
         stds = dict(zip(names, np.sqrt(variances).tolist(), strict=True))
-        found = Scatter(share=share, **stds)
+        found = ErrorComponents(share=share, **stds)
         return found, self._uncertainties(names, variances, share)
 
     def _supported(
@@ -182,7 +182,9 @@ class LinearFit:
         known = dict(zip(names, variances.tolist(), strict=True))
         squared = known.get("share", 0.0) if share is None else share**2
         stds = {name: float(np.sqrt(value)) for name, value in known.items() if name != "share"}
-        return RestrictedLikelihood.of(self._sums, names, Scatter(share=float(np.sqrt(squared)), **stds))
+        return RestrictedLikelihood.of(
+            self._sums, names, ErrorComponents(share=float(np.sqrt(squared)), **stds)
+        )
 
     def _uncertainties(self, names: list[str], variances: np.ndarray, share: float) -> dict[str, float]:
         """Standard deviations of the components, from the average information."""

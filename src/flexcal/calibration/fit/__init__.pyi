@@ -16,8 +16,8 @@ from .terms import (
     free_joints,
     geometric_parameters,
     loaded_compliances,
+    manufacturing_tolerances,
     moving_joints,
-    tolerances,
 )
 
 __all__ = [
@@ -34,10 +34,10 @@ __all__ = [
     "free_joints",
     "geometric_parameters",
     "loaded_compliances",
+    "manufacturing_tolerances",
     "moving_joints",
     "point_uncertainty",
     "probable_robot",
     "probable_robots",
-    "tolerances",
     "with_calibrated_points",
 ]

@@ -9,7 +9,14 @@ import numpy as np
 
 from flexcal.data.poses import PoseSet
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.robot import SPRINGS, RobotModel, declared, uncertain_inertials, uncertain_payload, unit_of
+from flexcal.model.robot import (
+    SPRINGS,
+    RobotModel,
+    declared_parameter,
+    uncertain_inertials,
+    uncertain_payload,
+    unit_of,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,7 +34,7 @@ class ElasticPrior:
         response: it widens the drive stiffnesses by one scale each.
         """
         names = _names(model, poses)
-        items = [declared(model, name) for name in names]
+        items = [declared_parameter(model, name) for name in names]
         held = model.posterior
         covariance = held.prior(Parameters(items))[1]
         items = [replace(i, prior_std=np.inf) if held.determines(i.name) else i for i in items]

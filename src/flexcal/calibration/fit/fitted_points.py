@@ -10,9 +10,9 @@ import numpy as np
 
 from flexcal.calibration.error_model import (
     TRANSMISSION,
+    ErrorComponents,
     ErrorGroups,
     LinearFit,
-    Scatter,
     are_different,
     joint_rotation_jacobian,
     whitened,
@@ -110,9 +110,9 @@ class PointFit:
         return predict(self.start, self.poses, elastic=False, jacobians=True)
 
     @property
-    def first_scatter(self) -> Scatter:
+    def first_scatter(self) -> ErrorComponents:
         """The error model to begin with: what is stated, and what robots usually have."""
-        return Scatter(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
+        return ErrorComponents(share=1.0 if self.poses.sigma_given else 0.0, robot=_FIRST_SCATTER)
 
     @property
     def hidden(self) -> tuple[str, ...]:
@@ -129,7 +129,7 @@ class PointFit:
 
     def solved(
         self,
-        scatter: Scatter,
+        scatter: ErrorComponents,
         loss: Loss | PlainLoss,
         near: FittedPoints | None = None,
         *,
@@ -176,7 +176,7 @@ class FittedPoints:
     """A solution: `estimate` of the parameters that move, the robot `model`, its prediction `at` the poses on `flank` (N, n)."""
 
     fit: PointFit
-    scatter: Scatter
+    scatter: ErrorComponents
     spread: dict[str, float]
     held: tuple[Undetermined, ...]
     estimate: Estimate
@@ -240,18 +240,18 @@ class FittedPoints:
             self.fit.cells.subset(rows),
         )
 
-    def estimated_scatter(self) -> tuple[Scatter, dict[str, float]]:
+    def estimated_scatter(self) -> tuple[ErrorComponents, dict[str, float]]:
         """Variance components of the residuals, and the standard deviation of each."""
         return self.linear.scatter(stated=self.fit.poses.sigma_given)
 
-    def robust_scatter(self) -> Scatter:
+    def robust_scatter(self) -> ErrorComponents:
         """One scatter for all coordinates, from the median of the residuals' distances."""
         rows = self.residuals.size
         freedom = max(rows - self.fit.identifiability.rank, 1)
         variance = float(np.median((self.residuals**2).sum(axis=1))) / _CHI_MEDIAN * rows / freedom
-        return Scatter(share=0.0, robot=float(np.sqrt(variance)))
+        return ErrorComponents(share=0.0, robot=float(np.sqrt(variance)))
 
-    def undetermined(self, scatter: Scatter) -> tuple[Undetermined, ...]:
+    def undetermined(self, scatter: ErrorComponents) -> tuple[Undetermined, ...]:
         """What the poses leave unknown under some scatter."""
         fit = self.fit
         kept = Parameters(p for p in fit.free if not np.isfinite(p.prior_std))

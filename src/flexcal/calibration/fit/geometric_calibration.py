@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from flexcal.calibration.error_model import ErrorStatistics, LinearFit, Scatter
+from flexcal.calibration.error_model import ErrorComponents, ErrorStatistics, LinearFit
 from flexcal.calibration.fit.elastic_prior import NOTHING_ELASTIC, ElasticPrior
 from flexcal.calibration.fit.fitted_points import FittedPoints, PointFit
 from flexcal.calibration.fit.least_squares_problem import LossName
@@ -41,7 +41,7 @@ class Calibration:
     prior: ElasticPrior
     identifiability: Identifiability
     undetermined: tuple[Undetermined, ...]
-    scatter: Scatter
+    scatter: ErrorComponents
     poses: PoseSet
     residuals: np.ndarray
     linear: LinearFit

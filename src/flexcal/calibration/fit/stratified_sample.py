@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.error_model import SAME_COMMAND, ErrorStatistics, distinct, occurrence
+from flexcal.calibration.error_model import SAME_COMMAND, ErrorStatistics, group_numbers, occurrence
 from flexcal.calibration.measurement import predicted_positions
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
@@ -38,13 +38,13 @@ class StratifiedSample:
         if len(poses) <= most:
             return None
         _, target = np.unique(poses.target, return_inverse=True)
-        visit = distinct(np.column_stack([poses.pose, occurrence(distinct(poses.pose, target))]))
+        visit = group_numbers(np.column_stack([poses.pose, occurrence(group_numbers(poses.pose, target))]))
         first = np.unique(visit, return_index=True)[1]
-        command = distinct(np.round(poses.q[first] / SAME_COMMAND))
+        command = group_numbers(np.round(poses.q[first] / SAME_COMMAND))
         _, station = np.unique(poses.station[first], return_inverse=True)
         stratum = station
         if poses.payload is not None:
-            own = distinct(station, poses.payload[first])
+            own = group_numbers(station, poses.payload[first])
             stratum = own if own.max() < _PAYLOADS * (station.max() + 1) else station
         kept = _kept_visits(command, stratum, most * len(first) // len(poses))
         return cls(np.flatnonzero(np.isin(visit, kept)), len(poses))

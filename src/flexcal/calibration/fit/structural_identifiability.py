@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexcal.calibration.fit.terms import tolerances
+from flexcal.calibration.fit.terms import manufacturing_tolerances
 from flexcal.calibration.measurement import predict
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
@@ -38,7 +38,7 @@ def kinematic_identifiability(
     return analyse(
         columns,
         parameters.names,
-        scale=tolerances(parameters) if scale is None else scale,
+        scale=manufacturing_tolerances(parameters) if scale is None else scale,
         prefer=[*preferred, *prefer],
     )
 

@@ -115,7 +115,7 @@ def _keys(kind: str) -> tuple[str, ...]:
     return (f"{kind}_sin", f"{kind}_cos") if kind.startswith("transmission_") else (kind,)
 
 
-def tolerances(parameters: Parameters) -> np.ndarray:
+def manufacturing_tolerances(parameters: Parameters) -> np.ndarray:
     """Size of a change that matters in each geometric parameter (p,), natural units."""
     return np.array([TOLERANCE[p.unit] for p in parameters])
 

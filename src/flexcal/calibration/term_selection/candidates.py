@@ -27,7 +27,7 @@ _LOAD = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
-class Candidates:
+class CandidateTerms:
     """Terms that may be added to the kinematic ones.
 
     `kinds` are whole terms, `single` terms of one joint by the kind that they belong to, `excluded` (term, reason) those that cannot be
@@ -40,7 +40,7 @@ class Candidates:
     excluded: tuple[tuple[str, str], ...]
 
 
-def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
+def candidates(model: RobotModel, poses: PoseSet) -> CandidateTerms:
     """What gravity, the declared springs and the joints that move leave to be considered on some poses."""
     joints = moving_joints(model, poses)
     masses = carried_mass(model, poses.payload, len(poses))
@@ -85,7 +85,7 @@ def candidates(model: RobotModel, poses: PoseSet) -> Candidates:
             model = wider
             kinds.append("backlash")
     kinds += [f"transmission_{order}" for order in model.harmonics]
-    return Candidates(model, tuple(kinds), single, tuple(excluded))
+    return CandidateTerms(model, tuple(kinds), single, tuple(excluded))
 
 
 def _without_load(model: RobotModel) -> str:

@@ -32,7 +32,7 @@ class LeaveOutErrors:
         return float(max(self.distances[k].max() for k in kinds))
 
 
-def left_out(
+def leave_out_fit(
     columns: Sequence[np.ndarray],
     penalty: Sequence[float],
     residuals: np.ndarray,

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.calibration.fit import Calibration, geometric_parameters
 from flexcal.calibration.measurement import Prediction, predict
-from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, left_out
+from flexcal.calibration.term_selection.leave_out_errors import LeaveOutErrors, leave_out_fit
 from flexcal.model.robot import RobotModel
 from flexcal.units import MILLIMETRE
 
@@ -114,7 +114,7 @@ class TermTrials:
         if terms not in self._fits:
             blocks = [self._block(term) for term in terms] + [self._held]
             penalty = [0.0] * len(terms) + [self._noise]
-            self._fits[terms] = left_out(blocks, penalty, self.rigid.residuals, self.folds)
+            self._fits[terms] = leave_out_fit(blocks, penalty, self.rigid.residuals, self.folds)
         return self._fits[terms]
 
     def mean(self, terms: tuple[str, ...]) -> float:

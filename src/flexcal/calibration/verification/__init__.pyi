@@ -8,7 +8,7 @@ from .best_fit_registration import (
 )
 from .error_scale_test import ErrorScale, error_scale, prediction_document
 from .errors_by_model import CALIBRATED, DECLARED, NOMINAL, OWN, RIGID, MeasuredPoints, errors_before
-from .refitted_placement import Refit, RefittedVerification, refitted
+from .refitted_placement import Refit, RefittedVerification, verify_refitted
 from .uncalibrated_robot import UncalibratedErrors, UncalibratedRobot, uncalibrated_model
 from .unseen_poses import ErrorCovariance, Verification, verify, verify_jointly
 
@@ -35,9 +35,9 @@ __all__ = [
     "error_scale",
     "errors_before",
     "prediction_document",
-    "refitted",
     "rigid_placement",
     "uncalibrated_model",
     "verify",
     "verify_jointly",
+    "verify_refitted",
 ]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.calibration.error_model import distinct
+from flexcal.calibration.error_model import group_numbers
 from flexcal.calibration.measurement import rigid_motion
 from flexcal.data.poses import PoseSet
 from flexcal.model.parts import rotation_vector, vector_rotation
@@ -128,4 +128,4 @@ def can_register(poses: PoseSet) -> bool:
 def _distinct(poses: PoseSet) -> int:
     """Number of joint positions with a target, without repeated visits."""
     labels = [np.unique(names, return_inverse=True)[1] for names in (poses.target, poses.station)]
-    return int(distinct(np.column_stack([poses.q.round(3), *labels])).max(initial=-1)) + 1
+    return int(group_numbers(np.column_stack([poses.q.round(3), *labels])).max(initial=-1)) + 1

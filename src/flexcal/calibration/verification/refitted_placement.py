@@ -39,7 +39,7 @@ class RefittedVerification:
     covariance: ErrorCovariance
 
 
-def refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RefittedVerification:
+def verify_refitted(model: RobotModel, poses: PoseSet, what: Sequence[Refit]) -> RefittedVerification:
     """Verify `model` at `poses` with stations or points fitted again and everything else as calibrated.
 
     Linear least squares leaves one pose out by its hat matrix H: e_i = (I - H_ii)⁻¹ r_i. Raises `FlexcalError` where the poses are too

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexcal.calibration.error_model import (
+    ErrorComponents,
     ErrorGroups,
     ErrorStatistics,
-    Scatter,
     block_columns,
     joint_rotation_jacobian,
     known_scatter,
@@ -158,7 +158,7 @@ def _shared_errors(model: RobotModel, cells: ErrorGroups) -> np.ndarray:
     )
 
 
-def _independent(model: RobotModel, scatter: Scatter, at: Prediction, poses: PoseSet) -> np.ndarray:
+def _independent(model: RobotModel, scatter: ErrorComponents, at: Prediction, poses: PoseSet) -> np.ndarray:
     """Covariance (N, 3, 3) m² of instrument and repeatability."""
     sigma = (
         poses.sigma if poses.sigma_given else np.full(poses.sigma.shape, model.value("scatter.instrument"))

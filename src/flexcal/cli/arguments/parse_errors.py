@@ -27,7 +27,7 @@ def refuse_unknown_options(verb: Verb, arguments: Sequence[str]) -> None:
             raise InputError(f"'flexcal {verb.name}' has no option {name}{near}")
 
 
-def refusal(verb: Verb, said: str) -> InputError:
+def parse_error(verb: Verb, said: str) -> InputError:
     """What the parser said in a box, as one sentence."""
     told = _told(said)
     explained = f"'flexcal {verb.name} --help' explains."

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from flexcal.model.robot import RobotModel
 
 
-def measuring(plan: Path, robot: Path, folder: str) -> str:
+def measure_command(plan: Path, robot: Path, folder: str) -> str:
     """The command line that carries out a plan in the virtual cell, with --robot where that verb would not find the robot by itself."""
     from flexcal.jobs.inputs import robot_file
 

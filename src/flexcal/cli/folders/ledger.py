@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from flexcal.errors import unreadable
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 
 LEDGER = ".flexcal"
 """In every folder that `--out` named: SHA-256 and name of what flexcal wrote there, as sha256sum has it, each verb's lines under a comment
@@ -27,7 +27,7 @@ class Ledger:
         path, verb = folder / LEDGER, ""
         entries: dict[str, tuple[str, str]] = {}
         try:
-            lines = current(path).read_bytes().decode("utf-8", "surrogateescape").split("\n")
+            lines = current_path(path).read_bytes().decode("utf-8", "surrogateescape").split("\n")
         except FileNotFoundError:
             return cls(entries)
         except OSError as problem:

@@ -15,12 +15,12 @@ from flexcal.cli.folders.ledger import LEDGER, Ledger
 from flexcal.data.plans import page_beside
 from flexcal.errors import InputError, unreadable
 from flexcal.files.transaction import (
-    Publication,
+    FileTransaction,
     Stage,
     age,
     living_owner,
+    recover,
     refuse_irregular,
-    settle,
     stages_in,
 )
 
@@ -46,7 +46,7 @@ def outputs(
     elsewhere, appears when it has succeeded, and what an earlier run left under these names goes; when it fails, nothing changes.
     """
     if out is None:
-        with Publication():
+        with FileTransaction():
             yield
         return
     if not names and out.is_dir():
@@ -55,10 +55,10 @@ def outputs(
     own = [glob.escape(path.name) for path in (out, *([page_beside(out)] if page else []))]
     patterns = names or [*own, *(glob.escape(out.stem) + ending for ending in beside)]
     if folder.is_dir():
-        settle(folder)
+        recover(folder)
     place = _Place(verb, folder, patterns, whole_folder=bool(names))
     place.own_files()
-    with Publication() as run:
+    with FileTransaction() as run:
         place.refuse_others(place.stage(run))
         yield
         run.publish(lambda: place.enter(run))
@@ -71,7 +71,7 @@ class _Place:
         self.verb, self.folder, self.patterns = verb, folder, tuple(patterns)
         self.kind = "a folder" if whole_folder else "a file"
 
-    def stage(self, run: Publication) -> Stage:
+    def stage(self, run: FileTransaction) -> Stage:
         """That of the run; raises `InputError` where the folder cannot be made or written to."""
         try:
             return run.stage(self.folder, f"flexcal {self.verb}", self.patterns)
@@ -113,7 +113,7 @@ class _Place:
             found[path] = digest
         return found
 
-    def enter(self, run: Publication) -> None:
+    def enter(self, run: FileTransaction) -> None:
         """Add to the files of a run the ledger with them, and remove those of an earlier one that it did not write again."""
         home = Path(os.path.realpath(self.folder))
         written = {place: file for place, file in run.files.items() if self._is_mine(place, home)}
@@ -161,4 +161,4 @@ def complete_interrupted_runs(parsed: Any) -> None:
     ]
     paths = [item for item in given if isinstance(item, Path)]
     for folder in {path if path.is_dir() else path.parent for path in paths}:
-        settle(folder)
+        recover(folder)

@@ -21,7 +21,7 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
-from flexcal.files.transaction import current, write_text
+from flexcal.files.transaction import current_path, write_text
 from flexcal.units import MILLIMETRE
 
 if TYPE_CHECKING:
@@ -157,7 +157,7 @@ class Calibrate:
         """Write the points to robot.yaml, and calibrate again: the estimates are relative to the declared points."""
         from flexcal.jobs.setup import write_point_position
 
-        text = current(self.robot).read_text(encoding="utf-8")
+        text = current_path(self.robot).read_text(encoding="utf-8")
         try:
             for name, point in found.found_points.items():
                 write_point_position(self.robot, name, point["found_xyz_m"])

@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, Robot, require_at_least, require_robot
-from flexcal.cli.arguments.suggested_commands import measuring
+from flexcal.cli.arguments.suggested_commands import measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
@@ -108,4 +108,6 @@ class DesignFrequency:
             f"{document['lowest_hz']:g} to {document['highest_hz']:g} Hz, {document['recordings']} recordings, "
             f"{document['seconds_on_the_robot'] / 60:.0f} minutes on a real robot"
         )
-        console.finish(document, f"{measuring(self.out, self.robot, 'frequency')}, or record it on the robot")
+        console.finish(
+            document, f"{measure_command(self.out, self.robot, 'frequency')}, or record it on the robot"
+        )

@@ -21,7 +21,7 @@ from flexcal.cli.arguments.shared_options import (
     require_at_least,
     require_robot,
 )
-from flexcal.cli.arguments.suggested_commands import import_command, measuring
+from flexcal.cli.arguments.suggested_commands import import_command, measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 from flexcal.units import MILLIMETRE
@@ -109,7 +109,7 @@ class DesignPoses:
         console.say(f"wrote {self.out}: {self.count} random poses")
         console.finish(
             drawn.document(),
-            f"{measuring(self.out, self.robot, 'unseen')}{import_command(self.robot, 'unseen.csv')}",
+            f"{measure_command(self.out, self.robot, 'unseen')}{import_command(self.robot, 'unseen.csv')}",
         )
 
     def _planned(self, console: Console, plan: Callable[..., Planned]) -> Planned:
@@ -154,7 +154,7 @@ class DesignPoses:
         console.say(f"wrote {self.out}: {document['poses']} poses")
         console.finish(
             document,
-            f"{measuring(self.out, self.robot, 'measured')}{import_command(self.robot, 'measured.csv')}",
+            f"{measure_command(self.out, self.robot, 'measured')}{import_command(self.robot, 'measured.csv')}",
         )
 
     def _continue(self, console: Console) -> None:
@@ -184,7 +184,7 @@ class DesignPoses:
         console.say(f"wrote {self.out}: the next {document['poses']} poses, best first")
         console.finish(
             document,
-            f"{measuring(self.out, self.robot, 'more')}{import_command(self.robot, 'more.csv')}",
+            f"{measure_command(self.out, self.robot, 'more')}{import_command(self.robot, 'more.csv')}",
         )
 
     def _say_pool(self, console: Console, document: Mapping[str, Any]) -> None:

@@ -10,7 +10,7 @@ from tyro.conf import arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import Json, Robot, require_at_least, require_robot
-from flexcal.cli.arguments.suggested_commands import measuring
+from flexcal.cli.arguments.suggested_commands import measure_command
 from flexcal.cli.terminal.console import Console
 from flexcal.errors import InputError
 
@@ -126,4 +126,6 @@ class DesignTrajectory:
             console.say(remark)
         console.say(f"wrote {document['page']}, with figures")
         folder = "loaded" if self.loaded else "exciting"
-        console.finish(document, f"{measuring(self.out, self.robot, folder)}, or record it on the robot")
+        console.finish(
+            document, f"{measure_command(self.out, self.robot, folder)}, or record it on the robot"
+        )

@@ -52,7 +52,7 @@ class TimeBase:
     repeated: int = 0
 
 
-def gaps(t: np.ndarray, longest: float | None = None) -> np.ndarray:
+def sampling_gaps(t: np.ndarray, longest: float | None = None) -> np.ndarray:
     """Indices i where a gap lies between t[i] and t[i + 1]: a step of more than `longest` (s; None: 2.5 median steps)."""
     steps = np.diff(t)
     if not steps.size:
@@ -95,7 +95,7 @@ def uniform_blocks(
             new = merged(in_order(new.t, new.values, 0))
             repairs += new.repairs
         t, values = new.t, new.values
-        edges = [0, *(gaps(t, clock.gap) + 1), t.size]
+        edges = [0, *(sampling_gaps(t, clock.gap) + 1), t.size]
         for first, end in pairwise(edges):
             found = stretch.push(t[first:end], values[first:end], clock, whole=last or end < t.size)
             if found is not None:
@@ -136,7 +136,7 @@ class _EvenTimes:
 
     def times(self, t: np.ndarray) -> np.ndarray:
         """Of the samples with the stamps `t` (N,) that follow."""
-        starts = gaps(t, self._gap) + 1
+        starts = sampling_gaps(t, self._gap) + 1
         if t.size and (self._last is None or t[0] - self._last > self._gap):
             starts = np.concatenate([[0], starts])
         edges = np.unique([0, *starts, t.size])

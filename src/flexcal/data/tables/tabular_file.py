@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, BinaryIO
 import numpy as np
 
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import atomic_path, current
+from flexcal.files.transaction import atomic_path, current_path
 from flexcal.units import LARGEST
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ class TableFile:
     def _parquet_blocks(self, texts: Collection[str], rows: int | None) -> Iterator[Table]:
         import polars as pl
 
-        scan = pl.scan_parquet(current(self.path))
+        scan = pl.scan_parquet(current_path(self.path))
         try:
             schema = scan.collect_schema()
             for column in self.columns:
@@ -173,7 +173,7 @@ def tables_in(folder: Path) -> str:
 
 def _open(path: Path) -> BinaryIO:
     try:
-        return current(path).open("rb")
+        return current_path(path).open("rb")
     except OSError as problem:
         raise unreadable(path, problem) from problem
 
@@ -186,7 +186,7 @@ def _parquet_columns(path: Path) -> tuple[str, ...]:
     except UnicodeEncodeError:
         raise InputError(f"{path}: the path of a Parquet file must be UTF-8; rename what is not.") from None
     try:
-        return tuple(pl.read_parquet_schema(current(path)))
+        return tuple(pl.read_parquet_schema(current_path(path)))
     except (pl.exceptions.PolarsError, OSError) as problem:
         raise InputError(
             f"{path}: not a readable Parquet file ({_one_line(problem)}); export it again."

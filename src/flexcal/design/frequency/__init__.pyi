@@ -1,6 +1,6 @@
-from .amplitude_spectrum import shaped
+from .amplitude_spectrum import optimal_amplitudes
 from .backlash_limit import static_amplitude_share, within_preload
-from .multisines import Schedule, flat_multisine, room
+from .multisines import Schedule, excitation_margin, flat_multisine
 from .payload_placement import Placement, payload_placements
 from .pose_selection import FrequencyPoseSelection, choose_frequency_poses, stiffness_curve
 from .predicted_uncertainty import PlannedResponses
@@ -15,11 +15,11 @@ __all__ = [
     "ResponseSensors",
     "Schedule",
     "choose_frequency_poses",
+    "excitation_margin",
     "flat_multisine",
     "largest_stiffness_std",
+    "optimal_amplitudes",
     "payload_placements",
-    "room",
-    "shaped",
     "static_amplitude_share",
     "stiffness_curve",
     "within_preload",

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.design.frequency.backlash_limit import backlash_load, share, within_preload
+from flexcal.design.frequency.backlash_limit import amplitude_share, backlash_load, within_preload
 from flexcal.design.frequency.predicted_uncertainty import PlannedResponses
 from flexcal.design.frequency.spring_precision import spring_criterion
 from flexcal.model.robot import RobotModel
@@ -20,7 +20,7 @@ ROOM = 2.0
 ITERATIONS = 20
 
 
-def shaped(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
+def optimal_amplitudes(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
     """The plan, whose spectrum is flat, with amplitudes that make `spring_criterion` small in its poses.
 
     No axis gets more than `ROOM` times its torque, and no gap is strained beyond what `backlash_load` allows. The multiplicative algorithm
@@ -54,4 +54,4 @@ def shaped(model: RobotModel, planned: PlannedResponses) -> MultisinePlan:
 def _feasible(power: np.ndarray, allowed: np.ndarray, load: np.ndarray) -> np.ndarray:
     """Amplitudes (E, L): the power lowered, axis by axis to what is `allowed` (E, 1), then on all alike until every gap stays closed."""
     amplitude = np.sqrt(power * np.minimum(1.0, allowed / power.sum(axis=1, keepdims=True)))
-    return min(1.0, share(load, amplitude)) * amplitude
+    return min(1.0, amplitude_share(load, amplitude)) * amplitude

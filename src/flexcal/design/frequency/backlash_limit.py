@@ -61,7 +61,7 @@ def backlash_load(model: RobotModel, q: np.ndarray, plan: MultisinePlan) -> np.n
     return _strain(model, q, plan)[drives] * needed[:, None, None] ** 2
 
 
-def share(load: np.ndarray, amplitude: np.ndarray) -> float:
+def amplitude_share(load: np.ndarray, amplitude: np.ndarray) -> float:
     """The share of `amplitude` (E, L) N m that strains no gap beyond its limit; `load` (..., E, L) is that of `backlash_load`.
 
     0 where the reference motion alone opens a gap; inf without backlash.
@@ -75,7 +75,7 @@ def within_preload(model: RobotModel, plan: MultisinePlan) -> MultisinePlan:
 
     Raises `FlexcalError` where next to nothing would be left, naming the pose.
     """
-    shares = [share(backlash_load(model, q, plan), plan.amplitude) for q in plan.poses]
+    shares = [amplitude_share(backlash_load(model, q, plan), plan.amplitude) for q in plan.poses]
     if min(shares) < LOWEST:
         raise FlexcalError(
             f"gravity does not load the drives with backlash in pose {int(np.argmin(shares)) + 1} enough: their gaps would stay closed "

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexcal.data.plans import MultisinePlan
-from flexcal.design.frequency.backlash_limit import backlash_load, share
-from flexcal.design.frequency.multisines import room
+from flexcal.design.frequency.backlash_limit import amplitude_share, backlash_load
+from flexcal.design.frequency.multisines import excitation_margin
 from flexcal.design.poses import preloaded
 from flexcal.design.scene import CollisionChecker
 from flexcal.errors import FlexcalError
@@ -27,7 +27,7 @@ class FrequencyPoseCandidates:
     def __init__(self, checker: CollisionChecker, plan: MultisinePlan) -> None:
         self.checker, self.plan, self.model = checker, plan, checker.model
         lower, upper = joint_ranges(self.model)
-        need = room(self.model, plan.reference_amplitude)
+        need = excitation_margin(self.model, plan.reference_amplitude)
         self.lower, self.upper = lower + need, upper - need
         for name, low, high, free in zip(self.model.joint_names, self.lower, self.upper, need, strict=True):
             if low >= high:
@@ -68,7 +68,11 @@ class FrequencyPoseCandidates:
         ends = np.outer([0.0, 1.0, -1.0], swing)
         held = q[preloaded(self.model, q, self.plan.payload)]
         free = [x for x in held if not self.checker.collides(x + ends).any()]
-        closed = [x for x in free if share(backlash_load(self.model, x, self.plan), self.plan.amplitude) >= 1]
+        closed = [
+            x
+            for x in free
+            if amplitude_share(backlash_load(self.model, x, self.plan), self.plan.amplitude) >= 1
+        ]
         lost["collision"] += len(held) - len(free)
         lost["gravity preload"] += len(q) - len(held) + len(free) - len(closed)
         return np.array(closed).reshape(-1, self.model.n)

@@ -90,7 +90,7 @@ def flat_multisine(
     )
 
 
-def room(model: RobotModel, reference: float) -> np.ndarray:
+def excitation_margin(model: RobotModel, reference: float) -> np.ndarray:
     """Free range (n,) rad that a pose needs on either side of every joint: the reference motion and `DROOP` on the excited axes."""
     needed = np.zeros(model.n)
     needed[[e.index for e in model.driven]] = reference + DROOP

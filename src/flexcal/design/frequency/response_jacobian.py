@@ -20,7 +20,7 @@ from flexcal.model.robot import (
     FRICTION_TOLERANCE,
     GEOMETRY,
     RobotModel,
-    declared,
+    declared_parameter,
     elastic_inertials,
     mounting_names,
     sensitivity_name,
@@ -107,7 +107,7 @@ def response_parameters(model: RobotModel, plan: MultisinePlan) -> Parameters:
         Parameter(f"{joint.name}.delay", "s", 0.0, prior_std=1 / plan.rate_hz) for joint in model.driven
     )
     inertials = elastic_inertials(model, loaded=plan.payload != 0)
-    errors = (declared(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
+    errors = (declared_parameter(model, f"{name}.{key}") for name in model.joint_names for key in GEOMETRY)
     sensors = (
         item for sensor in model.sensors.values() for item in sensor_parameters(sensor, 1 / plan.rate_hz)
     )

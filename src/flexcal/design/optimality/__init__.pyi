@@ -3,7 +3,7 @@ from .criteria import Criterion, DOptimal, Observability, SpectralCriterion, Tra
 from .exchange_algorithm import exchange
 from .lower_bound import trace_lower_bound
 from .rank_updates import Selection, greedy
-from .shortlist import choose
+from .shortlist import exchange_on_shortlist
 
 __all__ = [
     "ConditionNumberCriterion",
@@ -14,9 +14,9 @@ __all__ = [
     "SmoothMinimumEigenvalue",
     "SpectralCriterion",
     "TraceOptimal",
-    "choose",
     "condition_number",
     "exchange",
+    "exchange_on_shortlist",
     "greedy",
     "observability",
     "trace_lower_bound",

@@ -111,14 +111,14 @@ class RankUpdates:
         root = np.linalg.solve(factor, np.eye(self.size))
         self.inverse = root.T @ root
         self.log_det = float(2 * np.log(np.diag(factor)).sum()) + self._offset
-        self.spread = self.inverse
+        self.weighted_inverse = self.inverse
         shape = (self.candidates, self.rows, self.size)
         seen = (self._flat @ self.inverse).reshape(shape)
         self.blocks = _products(seen, self._flat.reshape(shape))
         if self.trace_weight is not None:
-            self.spread = _symmetric(self.inverse @ self.trace_weight @ self.inverse)
+            self.weighted_inverse = _symmetric(self.inverse @ self.trace_weight @ self.inverse)
             self.trace = float(np.sum(self.inverse * self.trace_weight))
-            seen = (self._flat @ self.spread).reshape(shape)
+            seen = (self._flat @ self.weighted_inverse).reshape(shape)
             self.weighted_blocks = _products(seen, self._flat.reshape(shape))
 
     @property
@@ -143,12 +143,12 @@ class RankUpdates:
 
     def copy_state(self) -> tuple[np.ndarray | float, ...]:
         """What `restore` needs to come back here."""
-        state = (self.inverse, self.spread, self.log_det, self.blocks)
+        state = (self.inverse, self.weighted_inverse, self.log_det, self.blocks)
         return state if self.trace_weight is None else (*state, self.trace, self.weighted_blocks)
 
     def restore(self, state: tuple) -> None:
         """Come back to a state of `copy_state`."""
-        self.inverse, self.spread, self.log_det, self.blocks = state[:4]
+        self.inverse, self.weighted_inverse, self.log_det, self.blocks = state[:4]
         if self.trace_weight is not None:
             self.trace, self.weighted_blocks = state[4:]
 
@@ -169,7 +169,7 @@ class RankUpdates:
             return
         own = self.weighted_blocks[candidate]
         self.trace -= sign * float(np.sum(middle * own))
-        wide = self.spread @ block.T
+        wide = self.weighted_inverse @ block.T
         both = (self._flat @ np.hstack([across, wide])).reshape(self.candidates, self.rows, 2 * self.rows)
         seen, broad = both[:, :, : self.rows], both[:, :, self.rows :]
         turned = seen @ middle
@@ -178,7 +178,7 @@ class RankUpdates:
         self.weighted_blocks = self.weighted_blocks - mixed - np.swapaxes(mixed, 1, 2)
         scaled = across @ middle
         change = scaled @ (sign * wide - 0.5 * (scaled @ own)).T
-        self.spread = self.spread - change - change.T
+        self.weighted_inverse = self.weighted_inverse - change - change.T
         self.inverse = self.inverse - sign * (scaled @ across.T)
 
 

@@ -26,7 +26,7 @@ _LIGHT = 1e-3
 """Relative weight below which an eigenvector is left out."""
 
 
-def choose(
+def exchange_on_shortlist(
     sensitivity: Sensitivity, count: int, criterion: Criterion, *, progress: Progress = silent
 ) -> Selection:
     """As `exchange`, from any number of candidates; above 5000 the exchange sees 1000 at a time.
@@ -42,7 +42,7 @@ def choose(
     chosen, history = listed[found.chosen], [found.merit]
     for number in range(ROUNDS):
         progress(SELECTION_STAGE, (number + 1) / (ROUNDS + 1))
-        promise = promises(sensitivity, chosen, criterion)
+        promise = predicted_gains(sensitivity, chosen, criterion)
         promise[chosen] = np.inf
         listed = np.argpartition(-promise, short - 1)[:short]
         place = {int(candidate): k for k, candidate in enumerate(listed)}
@@ -55,7 +55,7 @@ def choose(
     return Selection(chosen, found.merit, tuple(history))
 
 
-def promises(sensitivity: Sensitivity, chosen: np.ndarray, criterion: Criterion) -> np.ndarray:
+def predicted_gains(sensitivity: Sensitivity, chosen: np.ndarray, criterion: Criterion) -> np.ndarray:
     """What each candidate (candidates,) would add to the merit of the `chosen` ones, to first order and up to a factor."""
     size = len(sensitivity.parameters)
     rows = sensitivity.jacobian[chosen].reshape(-1, size)

@@ -56,11 +56,11 @@ def pose_curve(
     if min(counts) < 1 or max(counts) > total:
         raise FlexcalError(f"counts must lie between 1 and the {total} candidates.")
     progress("how many", 0.0)
-    order = greedy(sensitivity, max(counts), TraceOptimal(design.tool_weight, "c")).chosen
-    chosen = [tool_error(design.base, design.tool_weight, order[:k]) for k in counts]
+    order = greedy(sensitivity, max(counts), TraceOptimal(design.tool_error_weight, "c")).chosen
+    chosen = [tool_error(design.base, design.tool_error_weight, order[:k]) for k in counts]
     random = []
     for k in counts:
         sets = (rng.choice(total, k, replace=False) for _ in range(random_sets))
-        random.append(np.median([tool_error(design.base, design.tool_weight, drawn) for drawn in sets]))
+        random.append(np.median([tool_error(design.base, design.tool_error_weight, drawn) for drawn in sets]))
         progress("how many", len(random) / len(counts))
     return PoseCurve(np.array(counts), np.array(chosen), np.array(random))

@@ -29,15 +29,15 @@ WORKING_POSES = 300
 class PoseCandidates:
     """Poses that can be measured as `setup` says.
 
-    `base` holds the rows of all poses of the `pool`; `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool
-    error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see.
+    `base` holds the rows of all poses of the `pool`; `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the
+    tool error over the working poses. `hidden` are the numbers of a given pool's poses that the instrument does not see.
     """
 
     model: RobotModel
     setup: MeasuringSetup
     pool: PosePool
     base: BaseSensitivity
-    tool_weight: np.ndarray
+    tool_error_weight: np.ndarray
     hidden: np.ndarray
 
 
@@ -76,10 +76,10 @@ def pose_candidates(
     if working is None:
         anywhere = replace(setup, acceptance=None)
         working = random_candidates(checker, WORKING_POSES, rng, anywhere)
-    return PoseCandidates(model, setup, pool, base, tool_weight(base, model, working, setup), hidden)
+    return PoseCandidates(model, setup, pool, base, tool_error_weight(base, model, working, setup), hidden)
 
 
-def tool_weight(
+def tool_error_weight(
     base: BaseSensitivity, model: RobotModel, working: np.ndarray, setup: MeasuringSetup = STANDARD
 ) -> np.ndarray:
     """W = mean over the `working` poses (W, n) of JᵀJ (rank, rank), m²: tr(W Σ) is the mean square error of the tool position."""

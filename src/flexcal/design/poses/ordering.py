@@ -44,7 +44,7 @@ def measurement_order(
     for _ in range(ROUNDS):
         new = [move for move in _moves(order) if move not in known]
         for first, second in new:
-            known[first, second] = blocked(checker, q[first], q[second], point=point)
+            known[first, second] = move_collides(checker, q[first], q[second], point=point)
             if known[first, second]:
                 cost[[first, second], [second, first]] += dear
         if not any(known[move] for move in new):
@@ -52,7 +52,7 @@ def measurement_order(
         order = shortest_path(cost, start=order)
     ways = _moves(order)
     touching = [
-        known[a, b] if (a, b) in known else blocked(checker, q[a], q[b], point=point) for a, b in ways
+        known[a, b] if (a, b) in known else move_collides(checker, q[a], q[b], point=point) for a, b in ways
     ]
     return MeasurementOrder(order, seconds[order[:-1], order[1:]], np.array(touching, dtype=bool))
 
@@ -64,7 +64,7 @@ def move_seconds(checker: CollisionChecker, q: np.ndarray) -> np.ndarray:
     return np.max(np.abs(q[:, None] - q[None]) / speed, axis=2)
 
 
-def blocked(
+def move_collides(
     checker: CollisionChecker, start: np.ndarray, end: np.ndarray, *, point: str | None = None
 ) -> bool:
     """Whether the straight move of the joints from `start` (n,) to `end` (n,) touches something, or takes the target through the floor.

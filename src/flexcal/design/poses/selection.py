@@ -15,7 +15,7 @@ from flexcal.design.optimality import (
     Selection,
     SpectralCriterion,
     TraceOptimal,
-    choose,
+    exchange_on_shortlist,
     greedy,
     observability,
     trace_lower_bound,
@@ -40,7 +40,7 @@ class PoseDesign:
     """A plan of N poses, with candidates, criterion and predicted errors.
 
     `candidates` are what there was to choose from, `selection` what was chosen by `criterion`; `base` holds the rows of all candidates;
-    `tool_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
+    `tool_error_weight` (rank, rank), m², turns a covariance into the mean square of the tool error over the working poses; `flank`
     (N, joints with backlash) is the sign of the gravity torque at `flank_joints`; `hidden` are the numbers of given poses that the
     instrument does not see.
     """
@@ -50,7 +50,7 @@ class PoseDesign:
     candidates: PosePool
     selection: Selection
     base: BaseSensitivity
-    tool_weight: np.ndarray
+    tool_error_weight: np.ndarray
     flank_joints: tuple[str, ...]
     flank: np.ndarray
     hidden: np.ndarray
@@ -68,7 +68,7 @@ class PoseDesign:
             candidates=found.pool,
             selection=selection,
             base=found.base,
-            tool_weight=found.tool_weight,
+            tool_error_weight=found.tool_error_weight,
             flank_joints=tuple(found.model.joint_names[i] for i in loose),
             flank=np.sign(gravity_torque(found.model, chosen, found.setup.payload))[:, loose],
             hidden=found.hidden,
@@ -99,12 +99,12 @@ class PoseDesign:
 
         From tracker noise alone; what deflection, backlash near its crossing or repeatability add is not in it.
         """
-        return tool_error(self.base, self.tool_weight, self.selection.chosen)
+        return tool_error(self.base, self.tool_error_weight, self.selection.chosen)
 
     @property
     def least_possible(self) -> float:
         """A tool error, m, that no choice of as many of the candidates could predict less than (see `trace_lower_bound`)."""
-        trace = TraceOptimal(self.tool_weight, "c")
+        trace = TraceOptimal(self.tool_error_weight, "c")
         return float(trace_lower_bound(self.base.sensitivity, trace, np.array([len(self.plan)]))[0] ** 0.5)
 
     @property
@@ -131,10 +131,10 @@ class PoseDesign:
         }
 
 
-def tool_error(base: BaseSensitivity, tool_weight: np.ndarray, chosen: np.ndarray) -> float:
-    """Predicted root mean square (m) of the tool error over the working poses behind `tool_weight` after measuring `chosen`."""
+def tool_error(base: BaseSensitivity, tool_error_weight: np.ndarray, chosen: np.ndarray) -> float:
+    """Predicted root mean square (m) of the tool error over the working poses behind `tool_error_weight` after measuring `chosen`."""
     factor = base.sensitivity.factor(chosen)
-    return TraceOptimal(tool_weight, "c").trace(factor.T @ factor) ** 0.5
+    return TraceOptimal(tool_error_weight, "c").trace(factor.T @ factor) ** 0.5
 
 
 def design_poses(
@@ -186,14 +186,14 @@ def choose_poses(
             f"{count} poses cannot determine {rank} geometric parameters of {found.model.name}; "
             f"choose at least {-(-rank // 3)}, better twice as many."
         )
-    wanted = criterion_named(criterion, found.tool_weight)
-    selection = choose(found.base.sensitivity, count, wanted, progress=progress)
+    wanted = criterion_named(criterion, found.tool_error_weight)
+    selection = exchange_on_shortlist(found.base.sensitivity, count, wanted, progress=progress)
     return PoseDesign.of(found, wanted, selection, rng)
 
 
 def fewest_poses(found: PoseCandidates, most: int, wanted: float) -> int:
     """How many candidates, chosen one by one, predict a tool error of at most `wanted` (m); raises `FlexcalError` where `most` do not."""
-    weight, sensitivity = found.tool_weight, found.base.sensitivity
+    weight, sensitivity = found.tool_error_weight, found.base.sensitivity
     order = greedy(sensitivity, most, TraceOptimal(weight, "c")).chosen
     least = -(-found.base.identifiability.rank // 3)
     for count in range(least, most + 1):

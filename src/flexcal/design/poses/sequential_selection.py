@@ -55,7 +55,7 @@ def next_poses(
     Raises `FlexcalError` for another criterion, for fewer candidates, and for poses measured with another target, from another station, or
     with a draw-wire.
     """
-    merit = criterion_named(criterion, found.tool_weight)
+    merit = criterion_named(criterion, found.tool_error_weight)
     if not isinstance(merit, DOptimal | TraceOptimal):
         raise FlexcalError(f"the criterion of the next poses must be c, A or D, not {criterion}.")
     before = found.base.sensitivity
@@ -66,9 +66,11 @@ def next_poses(
     selection = greedy(known, count, merit)
     done = len(np.unique(measured.pose))
     steps = range(count + 1)
-    errors = [tool_error(base, found.tool_weight, selection.chosen[:number]) for number in steps]
+    errors = [tool_error(base, found.tool_error_weight, selection.chosen[:number]) for number in steps]
     alone = replace(known, prior_information=before.prior_information)
-    least = trace_lower_bound(alone, TraceOptimal(found.tool_weight, "c"), done + np.array(steps)) ** 0.5
+    least = (
+        trace_lower_bound(alone, TraceOptimal(found.tool_error_weight, "c"), done + np.array(steps)) ** 0.5
+    )
     design = PoseDesign.of(replace(found, base=base), merit, selection, rng)
     return NextPoses(design, done, np.array(errors), np.minimum(least, errors))
 

@@ -49,11 +49,13 @@ def visible(checker: CollisionChecker, q: np.ndarray, setup: MeasuringSetup = ST
         seen = cosine >= np.cos(setup.acceptance.half_angle) * np.linalg.norm(towards, axis=1)
     if model.config.stations[setup.station or model.stations[0]].line_of_sight:
         left = np.flatnonzero(seen)
-        seen[left] = ~blocked(checker, q[left], origin, target.position[left], BEAM_RADIUS, TARGET_CLEARANCE)
+        seen[left] = ~line_of_sight_blocked(
+            checker, q[left], origin, target.position[left], BEAM_RADIUS, TARGET_CLEARANCE
+        )
     return seen
 
 
-def blocked(
+def line_of_sight_blocked(
     checker: CollisionChecker,
     q: np.ndarray,
     origin: np.ndarray,

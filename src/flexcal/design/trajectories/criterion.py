@@ -17,7 +17,7 @@ from flexcal.design.optimality import (
 )
 from flexcal.design.trajectories.regressor_columns import DRIVE, BaseRegressor
 from flexcal.errors import InputError
-from flexcal.model.robot import RobotModel, declared, uncertain_inertials
+from flexcal.model.robot import RobotModel, declared_parameter, uncertain_inertials
 
 TrajectoryCriterion = Literal["compound", "condition", "D", "E", "A", "posterior", "c"]
 _STEP = 1e-4
@@ -107,7 +107,7 @@ class MarginalD:
         return slope / max(int(self.wanted.sum()), 1)
 
 
-def torque_goal(
+def excitation_criterion(
     columns: BaseRegressor,
     criterion: TrajectoryCriterion,
     of: Sequence[str],
@@ -173,7 +173,9 @@ def declared_unknowns(columns: BaseRegressor, free: tuple[str, ...] = ()) -> Unk
 
 def _has_prior(model: RobotModel, name: str) -> bool:
     """Whether robot.yaml's prior is about it; friction and torque offsets have none, and may have no value."""
-    return name.rpartition(".")[2] not in DRIVE[1:] and bool(np.isfinite(declared(model, name).prior_std))
+    return name.rpartition(".")[2] not in DRIVE[1:] and bool(
+        np.isfinite(declared_parameter(model, name).prior_std)
+    )
 
 
 def _direction(columns: BaseRegressor, name: str) -> np.ndarray:
@@ -181,7 +183,7 @@ def _direction(columns: BaseRegressor, name: str) -> np.ndarray:
     if name in columns.found.names and name.rpartition(".")[2] in DRIVE[1:]:
         return np.eye(len(columns.found.names))[columns.found.names.index(name)]
     model: RobotModel = columns.model
-    item = declared(model, name)
+    item = declared_parameter(model, name)
     size = item.prior_std if np.isfinite(item.prior_std) else 1.0
     ends = [item.natural(item.coordinate(item.value) + sign * _STEP * size) for sign in (1, -1)]
     above, below = (replace(columns, model=model.with_values({name: end})).values for end in ends)

@@ -27,7 +27,7 @@ class BarrierValue:
     curved: Callable[[np.ndarray], np.ndarray]
 
 
-class Program(Protocol):
+class BarrierProblem(Protocol):
     """A function with limits."""
 
     def evaluate(self, x: np.ndarray, barrier: float) -> BarrierValue:
@@ -35,14 +35,14 @@ class Program(Protocol):
         ...
 
 
-def minimise(program: Program, x: np.ndarray, barriers: list[float], steps: int) -> np.ndarray:
+def minimise(program: BarrierProblem, x: np.ndarray, barriers: list[float], steps: int) -> np.ndarray:
     """From an `x` within the limits to a better one within them; at most `steps` steps with each of the falling `barriers`."""
     for barrier in barriers:
         x = _descend(program, x, barrier, steps)
     return x
 
 
-def _descend(program: Program, x: np.ndarray, barrier: float, steps: int) -> np.ndarray:
+def _descend(program: BarrierProblem, x: np.ndarray, barrier: float, steps: int) -> np.ndarray:
     at = program.evaluate(x, barrier)
     gradient = at.gradient()
     pairs: deque[tuple[np.ndarray, np.ndarray]] = deque(maxlen=_MEMORY)

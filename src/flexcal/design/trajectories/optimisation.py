@@ -13,7 +13,7 @@ from flexcal.design.trajectories.criterion import (
     ExcitationCriterion,
     TrajectoryCriterion,
     declared_unknowns,
-    torque_goal,
+    excitation_criterion,
 )
 from flexcal.design.trajectories.excitation_problem import NEAR, ExcitationProblem
 from flexcal.design.trajectories.feasible_start import (
@@ -144,7 +144,9 @@ def design_trajectories(
         start=begin,
     )
     weights = 1 / (TORQUE_ERROR * np.array([joint.effort for joint in model.joints]))
-    goal = torque_goal(columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration)
+    goal = excitation_criterion(
+        columns, criterion, of, _sizes(columns, weights, limits), INDEPENDENT_HZ * duration
+    )
     if sequence and criterion != "D":
         raise InputError("a sequence is designed by the criterion D of each stage's parameters; choose D.")
     program = ExcitationProblem(

@@ -8,7 +8,7 @@ import numpy as np
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.inverse_model import Observation
-from flexcal.dynamics.regression import rows
+from flexcal.dynamics.regression import regression_blocks
 from flexcal.dynamics.signals import Experiment, Window
 
 _LONGEST_SEGMENT = 512
@@ -62,14 +62,14 @@ def predict_torques(
     spectrum = _Spectrum(_segment(total))
     times, measured, predicted = [np.zeros(0)], [np.zeros((0, n))], [np.zeros((0, n))]
     step, before = np.nan, np.nan
-    for block in rows(observation, experiment, decimation, Window()):
+    for block in regression_blocks(observation, experiment, decimation, Window()):
         steps = np.diff(np.concatenate([[before], block.time]))
         step = step if np.isfinite(step) else float(steps[-1])
         if steps[0] > _APART * step:
             spectrum.interrupt()
         before = float(block.time[-1])
         torque = block.torque[:n].T
-        model = block.predicted(observation.members, parameters)[:n].T
+        model = block.predicted(observation.column_indices, parameters)[:n].T
         spectrum.push(np.hstack([torque, torque - model]))
         kept = block.number % stride == 0
         times.append(block.time[kept])

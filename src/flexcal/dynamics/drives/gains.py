@@ -46,7 +46,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
     fit = terms.fit(data.batches, values, noise, kept)
     gains = terms.gains
     covariance = np.zeros((len(fit.values), len(fit.values)))
-    covariance[np.ix_(kept, kept)] = fit.spread.covariance
+    covariance[np.ix_(kept, kept)] = fit.covariance.covariance
     covariance = covariance[gains, gains]
     parameters = [
         Parameter(gain_name(name), "1", float(v)) for name, v in zip(names, fit.values[gains], strict=True)
@@ -63,7 +63,7 @@ def drive_gains(data: RegressionData, payloads: Sequence[float]) -> Estimate:
         status="converged",
         message=f"instrumental variables; their weakest correlation with the columns is {fit.weakest:.3g}",
         iterations=1,
-        covariance_freedom=fit.spread.freedom,
+        covariance_freedom=fit.covariance.freedom,
     )
     told = [_without_zero(estimate.interval(name)) for name in estimate.parameters.names]
     return replace(
@@ -124,9 +124,9 @@ class _Terms:
         kept: Sequence[int],
     ) -> InstrumentalFit:
         """With the torques that `values` (width,) predict as instruments of those that were measured."""
-        members = [np.arange(self._width)] * self.data.observation.model.n
+        column_indices = [np.arange(self._width)] * self.data.observation.model.n
         batches = self._mapped(experiments, values)
-        return instrumental_fit(batches, members, noise, np.zeros(self._width), kept)
+        return instrumental_fit(batches, column_indices, noise, np.zeros(self._width), kept)
 
     def least_squares(self, noise: Sequence[float], kept: Sequence[int]) -> np.ndarray:
         """(width,) to begin with."""
@@ -163,9 +163,9 @@ class _Terms:
 
     def _map(self, joint: int, mass: float, values: np.ndarray) -> np.ndarray:
         """(m + 1, 2 width + 1): from a joint's [W, Y] in one experiment to instruments, columns and right-hand side."""
-        members = self.data.observation.members[joint]
-        place = {number: row for row, number in enumerate(members)}
-        columns = np.zeros((len(members) + 1, self._width + 1))
+        column_indices = self.data.observation.column_indices[joint]
+        place = {number: row for row, number in enumerate(column_indices)}
+        columns = np.zeros((len(column_indices) + 1, self._width + 1))
         loaded = self._rest if mass > 0 else []
         for column, number in enumerate((*self._base, *loaded)):
             if number in place:

@@ -10,7 +10,7 @@ from flexcal.dynamics.estimators import noise_levels, weighted_system
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import RegressionData
 from flexcal.estimation import Estimate
-from flexcal.model.robot import declared, uncertain_inertials
+from flexcal.model.robot import declared_parameter, uncertain_inertials
 
 _STEP = 1e-4
 """Of the central differences, in estimation coordinates."""
@@ -50,7 +50,7 @@ def _deviations(observation: Observation) -> np.ndarray:
     """Columns (p, d) of one standard deviation each of what CAD may have wrong of the links, in all parameters of the observation."""
     model, columns = observation.model, []
     for name in uncertain_inertials(model, range(model.n)):
-        item = declared(model, name)
+        item = declared_parameter(model, name)
         at = item.coordinate(model.value(name))
         ends = [
             replace(observation, model=model.with_values({name: item.natural(at + step)})).values()

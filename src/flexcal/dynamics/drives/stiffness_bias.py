@@ -31,6 +31,6 @@ def stiffness_attenuation(data: RegressionData, estimate: Estimate) -> dict[str,
         others = [i for i in seen if i != own]
         basis = np.linalg.qr(matrix[:, others] / norms[others])[0]
         left = matrix[:, own] - basis @ (basis.T @ matrix[:, own])
-        rows = sum(s.triangle.rows for s in data.subsystems if own in s.members)
+        rows = sum(s.triangle.rows for s in data.subsystems if own in s.column_indices)
         found[name] = rows / float(estimate.values[name] ** 2 * (left @ left))
     return found

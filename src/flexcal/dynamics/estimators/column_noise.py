@@ -8,7 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexcal.dynamics.estimators.recorded_rows import RecordedRows
-from flexcal.dynamics.regression import Batch, ExperimentSystem, RegressionData, Rows, reduced, rows
+from flexcal.dynamics.regression import (
+    Batch,
+    ExperimentSystem,
+    RegressionBlock,
+    RegressionData,
+    reduced,
+    regression_blocks,
+)
 from flexcal.dynamics.signals import Experiment, JointLog, Motion, filtered_motion, log_blocks
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import FRICTION_PARAMETERS, RobotModel, unit_of
@@ -37,7 +44,9 @@ def regressor_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> Reg
     exact = np.array([name.rpartition(".")[2].startswith(_EXACT) for name in observation.names])
     systems = []
     for experiment, other, window in zip(recorded.experiments, noisy, recorded.windows, strict=True):
-        passes = (rows(observation, each, recorded.decimation, window) for each in (experiment, other))
+        passes = (
+            regression_blocks(observation, each, recorded.decimation, window) for each in (experiment, other)
+        )
         held = [np.zeros((0, width)) for width in observation.widths]
         count = 0
         for block, spoilt in zip(*passes, strict=True):
@@ -46,14 +55,16 @@ def regressor_errors(recorded: RecordedRows, noisy: Sequence[Experiment]) -> Reg
             parts = _difference(block.where(keep), spoilt.where(keep))
             held = [reduced([h, part.T]) for h, part in zip(held, parts, strict=True)]
         whole = []
-        for table, spread, members in zip(held, observation.spread, observation.members, strict=True):
-            whole.append(np.column_stack([table[:, :-1] @ spread, table[:, -1]]))
-            whole[-1][:, :-1][:, exact[members]] = 0.0
+        for table, projection, column_indices in zip(
+            held, observation.projection, observation.column_indices, strict=True
+        ):
+            whole.append(np.column_stack([table[:, :-1] @ projection, table[:, -1]]))
+            whole[-1][:, :-1][:, exact[column_indices]] = 0.0
         systems.append(ExperimentSystem((Batch(0, count, tuple(whole)),), count, 0.0, 0))
     return RegressionData.of(observation, recorded.base, systems)
 
 
-def _difference(block: Rows, spoilt: Rows) -> Iterable[np.ndarray]:
+def _difference(block: RegressionBlock, spoilt: RegressionBlock) -> Iterable[np.ndarray]:
     for own, other in zip(block.reduced, spoilt.reduced, strict=True):
         yield np.vstack([other[:-1] - own[:-1], np.zeros_like(own[-1:])])
 

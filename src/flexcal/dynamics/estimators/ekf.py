@@ -183,7 +183,9 @@ def _prior(data: RegressionData, unknowns: Unknowns) -> tuple[np.ndarray, np.nda
     for s in data.subsystems:
         sizes = np.linalg.norm(s.triangle.matrix, axis=0)
         bound = np.linalg.norm(s.triangle.right) / np.where(sizes > 0, sizes, np.inf)
-        alone[s.members] = np.where(sizes > 0, np.minimum(alone[s.members], bound), alone[s.members])
+        alone[s.column_indices] = np.where(
+            sizes > 0, np.minimum(alone[s.column_indices], bound), alone[s.column_indices]
+        )
     alone = np.where(np.isfinite(alone), alone, 0.0)
     std = np.where(values != 0, np.abs(values), _SHARE * alone)
     keys = [name.rpartition(".")[2] for name in data.names]

@@ -27,7 +27,7 @@ def feasible_least_squares(data: RegressionData) -> Estimate:
     system = weighted_system(data, noise_levels(data))
     names = list(data.names)
     cones = feasible_set(data.observation, system)
-    bound = {number for cone in cones for number in cone.members}
+    bound = {number for cone in cones for number in cone.column_indices}
     kept = [number for number, seen in enumerate(linear.identifiable) if seen]
     free = [
         entry

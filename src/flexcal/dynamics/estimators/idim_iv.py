@@ -28,9 +28,9 @@ def instrumental_variables(data: RegressionData, recorded: RecordedRows) -> Esti
 
     def step(robot: np.ndarray) -> Estimate:
         batches = [system.batches for system in recorded.instrumented(robot)]
-        fit = instrumental_fit(batches, data.observation.members, noise, start, kept)
+        fit = instrumental_fit(batches, data.observation.column_indices, noise, start, kept)
         covariance = np.zeros_like(linear.covariance)
-        covariance[np.ix_(kept, kept)] = fit.spread.covariance
+        covariance[np.ix_(kept, kept)] = fit.covariance.covariance
         return replace(
             linear,
             parameters=Parameters(
@@ -41,7 +41,7 @@ def instrumental_variables(data: RegressionData, recorded: RecordedRows) -> Esti
             cost=fit.cost,
             chi2=fit.cost,
             message=f"instrumental variables; their weakest correlation with the recorded motion is {fit.weakest:.3g}",
-            covariance_freedom=fit.spread.freedom,
+            covariance_freedom=fit.covariance.freedom,
         )
 
     return simulated_iteration(data, step, "IDIM-IV")

@@ -19,27 +19,28 @@ class InstrumentalFit:
     """`values` (p,) of all parameters; the covariance of the kept ones; the weighted sum of squares; the weakest correlation."""
 
     values: np.ndarray
-    spread: BatchCovariance
+    covariance: BatchCovariance
     cost: float
     weakest: float
 
 
 def instrumental_fit(
     experiments: Sequence[Sequence[Batch]],
-    members: Sequence[np.ndarray],
+    column_indices: Sequence[np.ndarray],
     noise: Sequence[float],
     start: np.ndarray,
     kept: Sequence[int],
 ) -> InstrumentalFit:
-    """Of batches whose factors are [Z, W, Y], where every joint has its `members` twice and Y, divided by the `noise` of its subsystem.
+    """Instrumental-variable estimate from batches whose factors are [Z, W, Y].
 
-    R of [Z, W, Y] stands for the products: R_ZW χ = R_ZY, whose condition is not squared. Parameters that are not `kept` stay at
-    `start` (p,). Raises `FlexcalError` where an instrument does not correlate.
+    Every joint has its `column_indices` twice (instruments, regressor) and Y, divided by the `noise` of its subsystem. R of [Z, W, Y]
+    stands for the products: R_ZW χ = R_ZY, whose condition is not squared. Parameters that are not `kept` stay at `start` (p,). Raises
+    `FlexcalError` where an instrument does not correlate.
     """
-    size, joints = len(kept), len(members)
+    size, joints = len(kept), len(column_indices)
     stack, equations = [], 0
     for number, batches in enumerate(experiments):
-        for joint, own in enumerate(members):
+        for joint, own in enumerate(column_indices):
             rows = np.vstack([batch.factors[joint] for batch in batches])
             stack.append(triangular(rows @ (_columns(own, kept, start) / noise[number * joints + joint])))
         equations += joints * sum(batch.rows for batch in batches)
@@ -59,23 +60,26 @@ def instrumental_fit(
     found[kept] += root @ right[:size, 0] / scale[-1]
     whiten = scale[:size, None] * np.linalg.inv(instruments[:size])
     cost = float(np.sum((whole[:, size:] @ np.append(start[kept] - found[kept], 1.0)) ** 2))
-    spread = score_covariance(
+    covariance = score_covariance(
         experiments,
         noise,
-        [np.vstack([parameter_rows(whiten, kept, own), np.zeros((len(own) + 1, size))]) for own in members],
-        [np.concatenate([np.zeros(len(own)), -found[own], [1.0]]) for own in members],
+        [
+            np.vstack([parameter_rows(whiten, kept, own), np.zeros((len(own) + 1, size))])
+            for own in column_indices
+        ],
+        [np.concatenate([np.zeros(len(own)), -found[own], [1.0]]) for own in column_indices],
         root,
         cost / (equations - size),
     )
-    return InstrumentalFit(found, spread, cost, weakest)
+    return InstrumentalFit(found, covariance, cost, weakest)
 
 
-def _columns(members: np.ndarray, kept: Sequence[int], start: np.ndarray) -> np.ndarray:
+def _columns(column_indices: np.ndarray, kept: Sequence[int], start: np.ndarray) -> np.ndarray:
     """(2 m + 1, 2 k + 1): from a joint's [Z, W, Y] to the kept columns of Z, those of W, and Y less what `start` explains."""
-    m, size = len(members), len(kept)
-    chosen = parameter_rows(np.eye(size), kept, members)
+    m, size = len(column_indices), len(kept)
+    chosen = parameter_rows(np.eye(size), kept, column_indices)
     found = np.zeros((2 * m + 1, 2 * size + 1))
     found[:m, :size] = found[m : 2 * m, size : 2 * size] = chosen
-    found[m : 2 * m, -1] = -start[members]
+    found[m : 2 * m, -1] = -start[column_indices]
     found[-1, -1] = 1.0
     return found

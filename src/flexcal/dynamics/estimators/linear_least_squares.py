@@ -105,7 +105,7 @@ def weighted_system(data: RegressionData, noise: Sequence[float]) -> TriangularF
         TriangularFactor(s.triangle.factor / sigma, s.triangle.rows)
         for s, sigma in zip(data.subsystems, noise, strict=True)
     ]
-    return stacked(weighted, [s.members for s in data.subsystems], len(data.names))
+    return stacked(weighted, [s.column_indices for s in data.subsystems], len(data.names))
 
 
 def _dropped(

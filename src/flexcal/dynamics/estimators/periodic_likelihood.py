@@ -132,8 +132,8 @@ def _coefficients(observation: Observation, motion: Motion, memory: Memory, fact
     """Those of [W, Y] for one period (2 K + 1, n, p + 1)."""
     systems = [_rows(system.T, factor) for system in observation.systems(motion, memory)]
     found = np.zeros((len(systems[0]), observation.model.n, len(observation.names) + 1))
-    for joint, (system, members) in enumerate(zip(systems, observation.members, strict=True)):
-        found[:, joint, members] = system[:, :-1]
+    for joint, (system, column_indices) in enumerate(zip(systems, observation.column_indices, strict=True)):
+        found[:, joint, column_indices] = system[:, :-1]
         found[:, joint, -1] = system[:, -1]
     return found
 
@@ -206,7 +206,7 @@ def _missed(observation: Observation, motion: Motion, parameters: np.ndarray, me
         part = motion.part(start, min(start + _BLOCK, len(motion)))
         systems = observation.systems(part, memory)
         found.append(
-            [s[-1] - parameters[m] @ s[:-1] for s, m in zip(systems, observation.members, strict=True)]
+            [s[-1] - parameters[m] @ s[:-1] for s, m in zip(systems, observation.column_indices, strict=True)]
         )
     return np.concatenate(found, axis=1).T
 

@@ -46,13 +46,13 @@ def feasible_set(observation: Equations, system: TriangularFactor) -> tuple[Cone
 def _links(model: RobotModel) -> Iterator[Cone]:
     std = max(model.prior.mass, _TIGHTEST)
     for i, link in enumerate(model.inertias):
-        members = np.arange(len(LINK_PARAMETERS) * i, len(LINK_PARAMETERS) * (i + 1))
+        column_indices = np.arange(len(LINK_PARAMETERS) * i, len(LINK_PARAMETERS) * (i + 1))
         if link.mass > 0:
-            yield Cone(members, PSEUDO_INERTIA, pseudo_inertia(extended(link)), _LINK_FLOOR, 2.0 * std)
-            yield _scalar(members[0], link.mass, 1.0 - _MASS_BOUND * std, math.inf)
-            yield _scalar(members[0], link.mass, -1.0 - _MASS_BOUND * std, math.inf, sign=-1.0)
+            yield Cone(column_indices, PSEUDO_INERTIA, pseudo_inertia(extended(link)), _LINK_FLOOR, 2.0 * std)
+            yield _scalar(column_indices[0], link.mass, 1.0 - _MASS_BOUND * std, math.inf)
+            yield _scalar(column_indices[0], link.mass, -1.0 - _MASS_BOUND * std, math.inf, sign=-1.0)
         else:
-            yield Cone(members, PSEUDO_INERTIA, pseudo_inertia(_guessed(model, i)), _LINK_FLOOR, 2.0)
+            yield Cone(column_indices, PSEUDO_INERTIA, pseudo_inertia(_guessed(model, i)), _LINK_FLOOR, 2.0)
 
 
 def extended(link: Inertia) -> Inertia:
@@ -91,14 +91,17 @@ def _drives(observation: Equations, system: TriangularFactor) -> Iterator[Cone]:
         for joints, shared in _groups(model, [f"{joint}.{key}" in seen for joint in model.joint_names]):
             own = [f"{joint}.{key}" for joint in joints]
             known = [reference(name) for name in own]
-            members, basis = [names.index(name) for name in own], [np.diag(row) for row in np.eye(len(own))]
+            column_indices, basis = (
+                [names.index(name) for name in own],
+                [np.diag(row) for row in np.eye(len(own))],
+            )
             for motor, joint, ratio in shared:
                 if f"{motor}.{key}_at_{joint}" in seen:
-                    members.append(names.index(f"{motor}.{key}_at_{joint}"))
+                    column_indices.append(names.index(f"{motor}.{key}_at_{joint}"))
                     places = np.eye(len(own))[[joints.index(motor), joints.index(joint)]]
                     basis.append(ratio * (np.outer(*places) + np.outer(*places[::-1])))
             size, std = np.diag([size for size, _ in known]), max(std for _, std in known)
-            yield Cone(np.array(members), np.array(basis), size, _DRIVE_FLOOR, std)
+            yield Cone(np.array(column_indices), np.array(basis), size, _DRIVE_FLOOR, std)
     for name in names:
         key = _kind(name)
         positive = key in ("coulomb", "stiffness", "damping") or key.startswith("coulomb_at_")

@@ -34,7 +34,9 @@ class PowerModel(ScalarEquations):
     def reduced(self, motion: Motion, memory: Memory | None = None) -> np.ndarray:
         systems = self.observation.systems(motion, memory)
         power = np.zeros((len(self.names) + 1, len(motion)))
-        for speed, members, system in zip(motion.dq.T, self.observation.members, systems, strict=True):
-            power[members] += speed * system[:-1]
+        for speed, column_indices, system in zip(
+            motion.dq.T, self.observation.column_indices, systems, strict=True
+        ):
+            power[column_indices] += speed * system[:-1]
             power[-1] += speed * system[-1]
         return power

@@ -11,19 +11,19 @@ from flexcal.data.recordings import Decimation
 from flexcal.dynamics.inverse_model import BaseParameters, Equations, Observation
 from flexcal.dynamics.regression import (
     ExperimentSystem,
+    RegressionBlock,
     RegressionData,
-    Rows,
     batch_length,
     batched,
     batches_each,
     experiment_system,
-    rows,
+    regression_blocks,
 )
 from flexcal.dynamics.signals import Experiment, Window
 from flexcal.dynamics.simulation import SimulatedExperiment
 from flexcal.errors import FlexcalError
 
-_Join = Callable[[Rows, Rows], Rows]
+_Join = Callable[[RegressionBlock, RegressionBlock], RegressionBlock]
 """Of the same rows as recorded and as simulated."""
 
 
@@ -47,9 +47,11 @@ class RecordedRows:
         for experiment, window in zip(self.experiments, self.windows, strict=True):
             count = experiment.samples // self.decimation.factor + 1
             missed = np.full((len(self.observation.labels), count), np.nan)
-            for block in rows(self.observation, experiment, self.decimation, window):
+            for block in regression_blocks(self.observation, experiment, self.decimation, window):
                 part = block.where(~block.still) if self.mask_standstill else block
-                missed[:, part.number] = part.torque - part.predicted(self.observation.members, parameters)
+                missed[:, part.number] = part.torque - part.predicted(
+                    self.observation.column_indices, parameters
+                )
             found.append(missed)
         return found
 
@@ -113,10 +115,12 @@ class RecordedRows:
         window: Window,
         parameters: np.ndarray,
         join: _Join,
-    ) -> Iterator[Rows]:
+    ) -> Iterator[RegressionBlock]:
         """Rows that are joined of the measured and the simulated ones, where the simulation is reliable."""
         simulated = SimulatedExperiment(self.observation, parameters, experiment, self.decimation)
-        pairs = (rows(self.observation, e, self.decimation, window) for e in (experiment, simulated))
+        pairs = (
+            regression_blocks(self.observation, e, self.decimation, window) for e in (experiment, simulated)
+        )
         empty = True
         for measured, model in zip(*pairs, strict=True):
             joined = join(measured, model).where(simulated.reliable(measured.time))
@@ -130,11 +134,11 @@ class RecordedRows:
             )
 
 
-def _beside(measured: Rows, simulated: Rows) -> Rows:
+def _beside(measured: RegressionBlock, simulated: RegressionBlock) -> RegressionBlock:
     """The measured rows, with the simulated columns before theirs."""
     pairs = zip(measured.reduced, simulated.reduced, strict=True)
     return replace(
         measured,
         reduced=[np.vstack([instruments[:-1], own]) for own, instruments in pairs],
-        spread=tuple(np.kron(np.eye(2), own) for own in measured.spread),
+        projection=tuple(np.kron(np.eye(2), own) for own in measured.projection),
     )

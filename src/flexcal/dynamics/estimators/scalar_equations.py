@@ -42,11 +42,11 @@ class ScalarEquations(ABC):
         return range(0)
 
     @cached_property
-    def members(self) -> tuple[np.ndarray, ...]:
+    def column_indices(self) -> tuple[np.ndarray, ...]:
         return (np.arange(len(self.names)),)
 
     @cached_property
-    def spread(self) -> tuple[np.ndarray, ...]:
+    def projection(self) -> tuple[np.ndarray, ...]:
         return (np.eye(len(self.names)),)
 
     @cached_property

@@ -56,15 +56,15 @@ def _fitted(data: RegressionData, noise: list[float]) -> np.ndarray:
 
 def _first(data: RegressionData, s: Subsystem) -> float:
     """Noise (N m) to begin with of a subsystem that nobody drives: a share of what CAD says that its links ask, else of the torques."""
-    links = s.members < len(LINK_PARAMETERS) * data.observation.model.n
-    asked = s.triangle.matrix[:, links] @ data.observation.values()[s.members[links]]
+    links = s.column_indices < len(LINK_PARAMETERS) * data.observation.model.n
+    asked = s.triangle.matrix[:, links] @ data.observation.values()[s.column_indices[links]]
     sizes = [np.linalg.norm(o.triangle.right) / np.sqrt(o.triangle.rows) for o in data.subsystems]
     return _FIRST * (float(np.linalg.norm(asked)) / np.sqrt(s.triangle.rows) or float(max(sizes))) or 1.0
 
 
 def _left(s: Subsystem, parameters: np.ndarray) -> float:
     """Root mean square (N m) of what a fit leaves of a subsystem that nobody drives, at least 1e-12 of what its links ask."""
-    own = parameters[s.members]
+    own = parameters[s.column_indices]
     terms = s.triangle.matrix * own
     least = 1e-12 * float(np.abs(terms).max())
     return max(s.triangle.residual(own), least) / np.sqrt(s.triangle.rows) or 1.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexcal.dynamics.friction.scale import Scale
+from flexcal.dynamics.friction.scale import ExcitationScale
 from flexcal.dynamics.friction.stepwise import Candidate
 from flexcal.dynamics.friction.terms import LIBRARY_TERMS, AsymmetricCoulomb
 from flexcal.dynamics.inverse_model import (
@@ -28,7 +28,7 @@ LIBRARY = tuple(_LIBRARY)
 FRICTION_TERMS = (*_PLAIN, *LIBRARY)
 
 
-def candidate_shapes(name: str, scale: Scale) -> tuple[Candidate, ...]:
+def candidate_shapes(name: str, scale: ExcitationScale) -> tuple[Candidate, ...]:
     """The term `name` of the library in the shapes to try."""
     return tuple(Candidate(name, shape, term) for shape, term in _LIBRARY[name].shapes(scale))
 

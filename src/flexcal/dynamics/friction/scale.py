@@ -13,7 +13,7 @@ from flexcal.dynamics.regression import ExperimentSystem
 
 
 @dataclass(frozen=True, eq=False)
-class Scale:
+class ExcitationScale:
     """What shapes of terms are measured by.
 
     `speed` and `stroke` (n,) are those of the motor axes: the root mean square of ṡ, and its square over that of s̈; `duration` (s) is
@@ -28,7 +28,7 @@ class Scale:
     @classmethod
     def of(
         cls, systems: Sequence[ExperimentSystem], observation: Observation, inertials: np.ndarray
-    ) -> Scale:
+    ) -> ExcitationScale:
         """Of the equations of an observation with the classic terms, nothing else is needed."""
         axes = motor_axes(observation.model)
         speed, push = (
@@ -43,9 +43,9 @@ class Scale:
 def _size(systems: Sequence[ExperimentSystem], observation: Observation, axis: MotorAxis, kind: str) -> float:
     """Root mean square of ṡ or s̈ of an axis: what its column of that `kind` and those of its coupling sum to at its own joint."""
     own = f"{axis.name}.{kind}"
-    members = observation.members[axis.joint]
+    column_indices = observation.column_indices[axis.joint]
     chosen = [own, *(name for name in observation.names if name.startswith(f"{own}_at_"))]
-    columns = np.searchsorted(members, [observation.names.index(name) for name in chosen])
+    columns = np.searchsorted(column_indices, [observation.names.index(name) for name in chosen])
     square = sum(
         np.sum(batch.factors[axis.joint][:, columns].sum(axis=1) ** 2) for s in systems for batch in s.batches
     )

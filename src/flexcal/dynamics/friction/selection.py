@@ -10,7 +10,7 @@ import numpy as np
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.estimators import weighted_least_squares
 from flexcal.dynamics.friction.catalogue import LIBRARY, candidate_shapes, standard_terms
-from flexcal.dynamics.friction.scale import Scale
+from flexcal.dynamics.friction.scale import ExcitationScale
 from flexcal.dynamics.friction.significance import CandidateFit
 from flexcal.dynamics.friction.stepwise import (
     Candidate,
@@ -73,14 +73,14 @@ _CLASSIC = ("viscous", "coulomb", "torque_offset")
 class FrictionSelection:
     """All `terms` of the drives, the `names` of the friction terms among them, the trials of the selection.
 
-    `spread` is that between the chosen terms and others that predict as well, None without such.
+    `uncertainty` is that between the chosen terms and others that predict as well, None without such.
     """
 
     terms: tuple[DriveTerm, ...]
     names: tuple[str, ...]
     chosen: tuple[Candidate, ...]
     trials: tuple[SelectionStep, ...]
-    spread: ModelUncertainty | None = None
+    uncertainty: ModelUncertainty | None = None
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -112,7 +112,7 @@ def select_friction(
     base = BaseParameters.of(Observation(model, plain)).found
     fixed = [wide.names.index(name) for name in base.kept_names]
     reach = -(-2 * decimation.support // decimation.factor)
-    blocks = folds(systems, wide.members, len(wide.names), fixed, reach)
+    blocks = folds(systems, wide.column_indices, len(wide.names), fixed, reach)
     groups = {candidate: candidate_columns(wide, candidate) for candidate in candidates}
     fit = CandidateFit(wide, systems, fixed)
     choice = (
@@ -138,9 +138,11 @@ def _spread(
     return ModelUncertainty.of([fit.estimate([n for label in labels for n in of[label]]) for labels in sets])
 
 
-def _scale(model: RobotModel, equations: Callable[[Observation], Sequence[ExperimentSystem]]) -> Scale:
+def _scale(
+    model: RobotModel, equations: Callable[[Observation], Sequence[ExperimentSystem]]
+) -> ExcitationScale:
     classic = Observation(model, CLASSIC)
     systems = equations(classic)
     data = RegressionData.of(classic, BaseParameters.of(classic), systems)
     found = weighted_least_squares(data).parameters.coordinates()
-    return Scale.of(systems, classic, found[: len(LINK_PARAMETERS) * model.n])
+    return ExcitationScale.of(systems, classic, found[: len(LINK_PARAMETERS) * model.n])

@@ -8,7 +8,7 @@ from typing import ClassVar, Protocol, Self
 
 import numpy as np
 
-from flexcal.dynamics.friction.scale import Scale
+from flexcal.dynamics.friction.scale import ExcitationScale
 from flexcal.dynamics.inverse_model import Column, Memory, MotorAxis, motor_axes
 from flexcal.dynamics.signals import Motion
 from flexcal.model.robot import RobotModel, unknown_parallel
@@ -27,7 +27,7 @@ class FrictionTerm(Protocol):
     key: ClassVar[str]
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         """Its shapes to try, each with what it is called; an empty name where there is but one."""
         ...
 
@@ -42,7 +42,7 @@ class _PerMotor:
     key: ClassVar[str]
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         yield "", cls()
 
     def torque(self, model: RobotModel, motion: Motion, axis: MotorAxis, memory: Memory) -> np.ndarray:
@@ -84,7 +84,7 @@ class Stribeck(_PerMotor):
     key: ClassVar[str] = "stribeck"
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         for share in _SHARES_OF_SPEED:
             yield f"{share:g} of the speed", cls(tuple(share * scale.speed))
 
@@ -104,7 +104,7 @@ class Presliding(_PerMotor):
     key: ClassVar[str] = "presliding"
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         for share in _SHARES_OF_STROKE:
             yield f"{share:g} of the stroke", cls(tuple(share * scale.stroke))
 
@@ -124,7 +124,7 @@ class _Warming(_PerMotor):
     time: float
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         for time in (share * scale.duration for share in _SHARES_OF_DURATION):
             yield f"{time:.3g} s", cls(time)
 
@@ -164,7 +164,7 @@ class Cables:
     key: ClassVar[str] = "cable_stiffness"
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         yield "", cls()
 
     def columns(self, model: RobotModel, motion: Motion, memory: Memory) -> Iterator[Column]:
@@ -186,7 +186,7 @@ class _PerLoad:
     key: ClassVar[str]
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         yield "", cls(scale.inertials)
 
     def share(self, speed: np.ndarray, axis: MotorAxis) -> np.ndarray:
@@ -218,7 +218,7 @@ class LoadStribeck(_PerLoad):
     key: ClassVar[str] = "load_stribeck"
 
     @classmethod
-    def shapes(cls, scale: Scale) -> Iterator[tuple[str, Self]]:
+    def shapes(cls, scale: ExcitationScale) -> Iterator[tuple[str, Self]]:
         for share in _SHARES_OF_SPEED_LOADED:
             yield f"{share:g} of the speed", cls(scale.inertials, tuple(share * scale.speed))
 

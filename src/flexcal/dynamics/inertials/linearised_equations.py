@@ -11,7 +11,14 @@ from flexcal.dynamics.inverse_model import CLASSIC
 from flexcal.dynamics.signals import Motion, PeriodicMotion, real_rows
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Parameter, Parameters
-from flexcal.model.robot import GEOMETRY, PARALLEL, SPRINGS, RobotModel, declared, uncertain_inertials
+from flexcal.model.robot import (
+    GEOMETRY,
+    PARALLEL,
+    SPRINGS,
+    RobotModel,
+    declared_parameter,
+    uncertain_inertials,
+)
 from flexcal.model.vibration import periodic_torque
 
 SAMPLES_PER_LINE = 4
@@ -40,7 +47,7 @@ def unknowns(model: RobotModel) -> tuple[Parameters, tuple[str, ...]]:
     beside = [f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components)]
     beside += [f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY]
     start = model.with_values({name: 0.0 for name in own if np.isnan(model.value(name))})
-    items = [declared(start, name) for name in (*own, *beside)]
+    items = [declared_parameter(start, name) for name in (*own, *beside)]
     items += [Parameter(_reversal(joint), "1", 0.0, prior_std=1.0) for joint in model.joint_names]
     return Parameters(items), tuple(own)
 

@@ -53,8 +53,8 @@ class BaseParameters:
         arm = replace(arm, tilts=(next(small), next(small)))
         columns = observation.columns(Motion(np.arange(samples), q, dq, ddq, np.zeros_like(q), arm))
         matrix = np.zeros((len(columns) * samples, len(names)))
-        for k, (block, members) in enumerate(zip(columns, observation.members, strict=True)):
-            matrix[k * samples : (k + 1) * samples, members] = block.T
+        for k, (block, column_indices) in enumerate(zip(columns, observation.column_indices, strict=True)):
+            matrix[k * samples : (k + 1) * samples, column_indices] = block.T
         prefer = [f"{bearing.name(model)}.stiffness" for bearing in observation.bearings]
         prefer += [f"{joint.link}.{key}" for joint in model.joints for key in _KEPT_FIRST]
         prefer += [name for name in names if name not in set(prefer)]

@@ -15,32 +15,32 @@ from flexcal.model.robot import RobotModel
 
 @dataclass(frozen=True)
 class DriveBacklash:
-    """Backlash in a drive: no torque while q - θ is nearer to `centre` than `half_gap`, both in rad."""
+    """Backlash in a drive: no torque while q - θ is nearer to `centre` than `half_width`, both in rad."""
 
     centre: float
-    half_gap: float
+    half_width: float
 
 
 @dataclass(frozen=True)
 class DriveSpring:
-    """The drive of the elastic `joint` (its number), with `play` where backlash is looked for.
+    """The drive of the elastic `joint` (its number), with `backlash` where backlash is looked for.
 
     The equation of the motor alone, which follows those of all joints, gains - `<joint>.drive.stiffness` (q - θ),
-    - `.drive.damping` (q̇ - θ̇) and + `.drive.torque_offset`, τ_k0; with play also + `.drive.gap_torque` sign(q - θ - centre), the
+    - `.drive.damping` (q̇ - θ̇) and + `.drive.torque_offset`, τ_k0; with backlash also + `.drive.gap_torque` sign(q - θ - centre), the
     stiffness times half the gap, and none of them within the gap. Arm and motor together gain what turns and rubs on the arm side of
     the drive (Eq. 2.23a): `.arm_inertia` q̈, `.arm_viscous` q̇ and `.arm_coulomb` sign q̇. Thanks to them nothing that the arm's model
     misses, as bearing tilts, reaches the motor's inertia and friction, and through them the stiffness.
     """
 
     joint: int
-    play: DriveBacklash | None = None
+    backlash: DriveBacklash | None = None
 
     def with_backlash(self, model: RobotModel, values: Mapping[str, float]) -> DriveSpring:
-        """With the play that `values` by name amount to."""
+        """With the backlash that `values` by name amount to."""
         name = f"{model.joint_names[self.joint]}.drive"
         stiffness = values[f"{name}.stiffness"]
-        half_gap = max(0.0, values.get(f"{name}.gap_torque", 0.0) / stiffness)
-        return replace(self, play=DriveBacklash(values[f"{name}.torque_offset"] / stiffness, half_gap))
+        half_width = max(0.0, values.get(f"{name}.gap_torque", 0.0) / stiffness)
+        return replace(self, backlash=DriveBacklash(values[f"{name}.torque_offset"] / stiffness, half_width))
 
     def columns(self, model: RobotModel, motion: Motion, motor: int) -> Iterator[Column]:
         """The columns, where `motor` is the number of the motor's equation; raises `FlexcalError` for a motion without arm side."""
@@ -52,13 +52,13 @@ class DriveSpring:
         yield Column(f"{name}.arm_inertia", self.joint, arm.ddq[at])
         yield Column(f"{name}.arm_viscous", self.joint, arm.dq[at])
         yield Column(f"{name}.arm_coulomb", self.joint, np.sign(arm.dq[at]))
-        stretch = twist if self.play is None else twist - self.play.centre
-        gap = 0.0 if self.play is None else self.play.half_gap
-        touches = (np.abs(stretch) >= gap).astype(float)
+        stretch = twist if self.backlash is None else twist - self.backlash.centre
+        half_width = 0.0 if self.backlash is None else self.backlash.half_width
+        touches = (np.abs(stretch) >= half_width).astype(float)
         yield Column(f"{name}.drive.stiffness", motor, -touches * twist)
         yield Column(f"{name}.drive.damping", motor, -touches * rate)
         yield Column(f"{name}.drive.torque_offset", motor, touches)
-        if self.play is not None:  # last, so that recordings of one flank tell the offset and not the gap
+        if self.backlash is not None:  # last, so that recordings of one flank tell the offset and not the gap
             yield Column(f"{name}.drive.gap_torque", motor, touches * np.sign(stretch))
 
 

@@ -36,13 +36,13 @@ class Equations(Protocol):
         ...
 
     @cached_property
-    def members(self) -> tuple[np.ndarray, ...]:
+    def column_indices(self) -> tuple[np.ndarray, ...]:
         """For every equation the numbers of the parameters that stand in it, ascending."""
         ...
 
     @cached_property
-    def spread(self) -> tuple[np.ndarray, ...]:
-        """For every equation (reduced, members): its columns from its reduced ones, W = W_reduced · spread."""
+    def projection(self) -> tuple[np.ndarray, ...]:
+        """For every equation (reduced, columns): its columns from its reduced ones, W = W_reduced · projection."""
         ...
 
     @cached_property

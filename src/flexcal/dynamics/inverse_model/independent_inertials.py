@@ -19,14 +19,14 @@ _SAMPLES_PER_COLUMN = 3
 
 @dataclass(frozen=True, eq=False)
 class InertialColumns:
-    """Of one joint: it feels the inertials `felt` (f,), of which `kept` (k,) are enough: W = W_kept · `spread` (k, f).
+    """Of one joint: it feels the inertials `felt` (f,), of which `kept` (k,) are enough: W = W_kept · `projection` (k, f).
 
     That holds at every state, to the 1e-9 of the largest column that rank is counted by.
     """
 
     felt: np.ndarray
     kept: np.ndarray
-    spread: np.ndarray
+    projection: np.ndarray
 
 
 @lru_cache(maxsize=4)

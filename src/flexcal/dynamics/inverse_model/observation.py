@@ -30,7 +30,7 @@ class Observation:
     that of the links about the tilt's axis, whose right-hand side is zero.
 
     Of the columns of a joint that the links bring, some always are combinations of others, whatever the motion is. `reduced` leaves them
-    out, and `spread` (one an equation) says how the others give them back: W = W_reduced · spread.
+    out, and `projection` (one an equation) says how the others give them back: W = W_reduced · projection.
     """
 
     model: RobotModel
@@ -67,21 +67,21 @@ class Observation:
         return [*range(self.model.n), *(spring.joint for spring in self.springs)]
 
     @cached_property
-    def members(self) -> tuple[np.ndarray, ...]:
+    def column_indices(self) -> tuple[np.ndarray, ...]:
         """For every equation the numbers of the columns that it can feel, ascending."""
         return tuple(
             np.concatenate([links.felt, own]) for links, own in zip(self._links, self._drives, strict=True)
         )
 
     @cached_property
-    def spread(self) -> tuple[np.ndarray, ...]:
-        """For every equation (reduced, members): its columns from its reduced ones."""
+    def projection(self) -> tuple[np.ndarray, ...]:
+        """For every equation (reduced, columns): its columns from its reduced ones."""
         found = []
         for links, own in zip(self._links, self._drives, strict=True):
-            kept, felt = links.spread.shape
-            spread = np.eye(kept + len(own), felt + len(own), k=felt - kept)
-            spread[:kept, :felt] = links.spread
-            found.append(spread)
+            kept, felt = links.projection.shape
+            projection = np.eye(kept + len(own), felt + len(own), k=felt - kept)
+            projection[:kept, :felt] = links.projection
+            found.append(projection)
         return tuple(found)
 
     @cached_property
@@ -121,7 +121,7 @@ class Observation:
     @cached_property
     def widths(self) -> list[int]:
         """For every equation the number of its reduced columns, and one for its torque."""
-        return [len(spread) + 1 for spread in self.spread]
+        return [len(spread) + 1 for spread in self.projection]
 
     @cached_property
     def _places(self) -> tuple[np.ndarray, np.ndarray]:
@@ -171,9 +171,11 @@ class Observation:
         return found
 
     def systems(self, motion: Motion, memory: Memory | None = None) -> list[np.ndarray]:
-        """For every equation all its columns and, last, its torque (members + 1, N), where `reduced` leaves some out."""
+        """For every equation all its columns and, last, its torque (columns + 1, N), where `reduced` leaves some out."""
         parts = np.split(self.reduced(motion, memory), np.cumsum(self.widths)[:-1])
-        return [np.vstack([s.T @ part[:-1], part[-1]]) for s, part in zip(self.spread, parts, strict=True)]
+        return [
+            np.vstack([s.T @ part[:-1], part[-1]]) for s, part in zip(self.projection, parts, strict=True)
+        ]
 
     def follow(self, motion: Motion, memory: Memory) -> None:
         """Bring `memory` up to the end of a motion whose columns are not needed."""
@@ -206,17 +208,17 @@ class Observation:
         return q, dq, ddq
 
     def columns(self, motion: Motion) -> list[np.ndarray]:
-        """For every equation all its columns (members, N) at every sample of the motion, none left out."""
+        """For every equation all its columns (columns, N) at every sample of the motion, none left out."""
         if self._tilted is not None:
             return [system[:-1] for system in self.systems(motion)]
         links = torque_regressor(self.model, *self._link_states(motion))
-        found = [np.zeros((len(members), len(motion))) for members in self.members]
+        found = [np.zeros((len(own), len(motion))) for own in self.column_indices]
         for joint, own in enumerate(self._links[: self.model.n]):
             found[joint][: len(own.felt)] = links[:, joint, own.felt].T
         number = {name: i for i, name in enumerate(self.names)}
         for column in self._drive_columns(motion, {}):
-            members = self.members[column.joint]
-            found[column.joint][np.searchsorted(members, number[column.name])] = column.values
+            own = self.column_indices[column.joint]
+            found[column.joint][np.searchsorted(own, number[column.name])] = column.values
         return found
 
     def values(self) -> np.ndarray:

@@ -1,5 +1,5 @@
 from .equations import PayloadEquations
-from .flexibility_correction import FlexibilityCorrection, error_sources
+from .flexibility_correction import FlexibilityCorrection, uncertain_parameters
 from .identification import BODY, PayloadFit, identify_payload
 from .robot_prior import RobotPrior
 
@@ -9,6 +9,6 @@ __all__ = [
     "PayloadEquations",
     "PayloadFit",
     "RobotPrior",
-    "error_sources",
     "identify_payload",
+    "uncertain_parameters",
 ]

@@ -92,22 +92,22 @@ class PayloadEquations:
         """χ (p,) of all columns of `data` with which W χ are the torques that `unknowns` (u,) predict, with the payload or without."""
         missed = np.append(-unknowns, 1.0)
         found = np.zeros(len(self.data.names))
-        for joint, members in enumerate(self.data.observation.members):
-            found[members] = -(self._map(joint, loaded) @ missed)[:-1]
+        for joint, column_indices in enumerate(self.data.observation.column_indices):
+            found[column_indices] = -(self._map(joint, loaded) @ missed)[:-1]
         return found
 
     def _map(self, joint: int, loaded: bool) -> np.ndarray:
         """(m + 1, unknowns + 1): from a joint's [W, Y] to its equations."""
-        names, members = self.data.names, self.data.observation.members[joint]
+        names, column_indices = self.data.names, self.data.observation.column_indices[joint]
         base = {number: row for row, number in enumerate(self.data.base.found.kept)}
-        result = np.zeros((len(members) + 1, len(self.names) + 1))
+        result = np.zeros((len(column_indices) + 1, len(self.names) + 1))
         first = self.prior.free.shape[1]
         known = slice(first, first + self.prior.base_root.shape[1])
         changes = {name: known.stop + number for number, name in enumerate(self._rubbing)}
         errors = dict(zip(map(error_column, self.prior.sources), self.prior.source_root, strict=True))
         moved, link = payload_to_link_frame(self.held), len(LINK_PARAMETERS) * self.held.joint
         result[-1, -1] = 1.0
-        for row, number in zip(result, members, strict=False):
+        for row, number in zip(result, column_indices, strict=False):
             name = names[number]
             if name == YIELD:
                 row[-1] = -1.0

@@ -34,13 +34,18 @@ _STEP = 1e-2
 _SMALL = 1e-3
 
 
-def error_sources(model: RobotModel) -> tuple[str, ...]:
+def uncertain_parameters(model: RobotModel) -> tuple[str, ...]:
     """Geometric errors of the joints, and of an elastic robot stiffnesses, gaps and what weighs on them: masses and centres of mass of
     links."""
     springs = (f"{e.name}.{SPRINGS[c]}.stiffness" for e in model.elastic for c in sorted(e.components))
     weights = uncertain_inertials(model, range(model.n)) if model.elastic else ()
-    gaps = (f"{model.joint_names[i]}.backlash" for i in model.backlash_joints) if model.elastic else ()
-    return (*springs, *gaps, *weights, *(f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY))
+    backlashes = (f"{model.joint_names[i]}.backlash" for i in model.backlash_joints) if model.elastic else ()
+    return (
+        *springs,
+        *backlashes,
+        *weights,
+        *(f"{joint}.{key}" for joint in model.joint_names for key in GEOMETRY),
+    )
 
 
 def error_column(source: str) -> str:

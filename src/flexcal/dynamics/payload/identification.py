@@ -157,7 +157,7 @@ def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarra
     chosen = np.zeros((len(names) + 1, len(kept)))
     chosen[kept] = root
     joints = equations.data.observation.model.n
-    spread = score_covariance(
+    batch_scatter = score_covariance(
         equations.batches,
         noise,
         [chosen] * joints,
@@ -167,7 +167,7 @@ def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarra
     )
     known = prior[:, kept] @ root
     covariance = np.zeros((len(names), len(names)))
-    covariance[np.ix_(kept, kept)] = spread.covariance + root @ known.T @ known @ root.T
+    covariance[np.ix_(kept, kept)] = batch_scatter.covariance + root @ known.T @ known @ root.T
     missing = tuple(entry for entry in seen.dropped if entry.name in names[own])
     unseen = np.zeros((len(LINK_PARAMETERS), len(missing)))
     first = own.start
@@ -181,7 +181,7 @@ def _solve(equations: PayloadEquations, noise: Sequence[float], start: np.ndarra
         covariance[own, own],
         values,
         chosen[:-1],
-        spread.freedom,
+        batch_scatter.freedom,
         missing,
         unseen,
         chosen[:-1][own],

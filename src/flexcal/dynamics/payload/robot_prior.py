@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.dynamics.inverse_model import BaseParameters, Observation
 from flexcal.estimation import Estimate, Parameters
 from flexcal.model.parts import LINK_PARAMETERS
-from flexcal.model.robot import PARALLEL, declared
+from flexcal.model.robot import PARALLEL, declared_parameter
 
 FRICTION = ("viscous", "coulomb", "torque_offset")
 _STEP = 1e-4
@@ -55,7 +55,10 @@ class RobotPrior:
         ]
         dynamics = [name for name in owned if model.posterior.determines(name)] if found is not None else []
         others = [name for name in sources if name not in dynamics]
-        items = (*model.posterior.parameters.subset(dynamics), *(declared(model, name) for name in others))
+        items = (
+            *model.posterior.parameters.subset(dynamics),
+            *(declared_parameter(model, name) for name in others),
+        )
         covariance = model.posterior.prior(Parameters(items))[1]
         root = _root(covariance)
         base_root = _jacobian(observation, base, owned, dynamics) @ root[: len(dynamics)]

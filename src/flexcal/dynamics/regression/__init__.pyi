@@ -1,6 +1,6 @@
-from .assembly import RegressionData, Subsystem, batches_each, observe
+from .assembly import RegressionData, Subsystem, assemble_regression, batches_each
 from .batches import Batch, ExperimentSystem, batch_length, batched, experiment_system, reduced
-from .blocks import Rows, rows
+from .blocks import RegressionBlock, regression_blocks
 from .covariance import (
     BatchCovariance,
     batch_covariance,
@@ -22,11 +22,12 @@ __all__ = [
     "CutoffChoice",
     "ExperimentSystem",
     "Fold",
+    "RegressionBlock",
     "RegressionData",
-    "Rows",
     "Scores",
     "Subsystem",
     "TriangularFactor",
+    "assemble_regression",
     "batch_covariance",
     "batch_length",
     "batched",
@@ -37,13 +38,12 @@ __all__ = [
     "fold_numbers",
     "folds",
     "mixed_covariance",
-    "observe",
     "offset_scores",
     "parameter_rows",
     "pieces",
     "prediction_errors",
     "reduced",
-    "rows",
+    "regression_blocks",
     "score_covariance",
     "solutions",
     "stacked",

@@ -23,14 +23,14 @@ _ALL_BATCHES = 512
 
 @dataclass(frozen=True, eq=False)
 class Subsystem:
-    """One of an observation's equations in one experiment; `members` are the numbers of its columns among all.
+    """One of an observation's equations in one experiment; `column_indices` are the numbers of its columns among all.
 
     `undriven` tells that its right-hand side is zero, as of a bearing.
     """
 
     equation: int
     experiment: int
-    members: np.ndarray
+    column_indices: np.ndarray
     triangle: TriangularFactor
     undriven: bool = False
 
@@ -63,7 +63,9 @@ class RegressionData:
         """Names of the drives' columns that these equations leave at zero, or at rounding beside the largest of their kind."""
         size = np.zeros(len(self.names))
         for s in self.subsystems:
-            size[s.members] = np.hypot(size[s.members], np.linalg.norm(s.triangle.matrix, axis=0))
+            size[s.column_indices] = np.hypot(
+                size[s.column_indices], np.linalg.norm(s.triangle.matrix, axis=0)
+            )
         links = len(LINK_PARAMETERS) * self.observation.model.n
         kinds = [name.rpartition(".")[2] for name in self.names]
         largest: dict[str, float] = {}
@@ -79,13 +81,13 @@ class RegressionData:
         """
         sizes = np.zeros(len(self.names))
         for s in self.subsystems:
-            sizes[s.members] += np.sum(s.triangle.matrix**2, axis=0)
+            sizes[s.column_indices] += np.sum(s.triangle.matrix**2, axis=0)
         scale = 1.0 / np.sqrt(np.where(sizes > 0, sizes, 1.0))
         kept = set(self.base.found.kept)
         found = []
         for s in self.subsystems:
-            columns = np.array([i for i, number in enumerate(s.members) if number in kept])
-            found.append(s.triangle.part(columns).noise(scale[s.members[columns]]))
+            columns = np.array([i for i, number in enumerate(s.column_indices) if number in kept])
+            found.append(s.triangle.part(columns).noise(scale[s.column_indices[columns]]))
         return found
 
     def errors(self, parameters: np.ndarray) -> tuple[float, np.ndarray]:
@@ -96,12 +98,12 @@ class RegressionData:
         missed, size = np.zeros((2, len(self.observation.labels)))
         driven = np.ones(len(missed), dtype=bool)
         for s in self.subsystems:
-            missed[s.equation] += s.triangle.residual(parameters[s.members]) ** 2
+            missed[s.equation] += s.triangle.residual(parameters[s.column_indices]) ** 2
             asked = s.triangle.right
             if s.undriven:
                 driven[s.equation] = False
-                links = s.members < len(LINK_PARAMETERS) * self.observation.model.n
-                asked = s.triangle.matrix[:, links] @ parameters[s.members[links]]
+                links = s.column_indices < len(LINK_PARAMETERS) * self.observation.model.n
+                asked = s.triangle.matrix[:, links] @ parameters[s.column_indices[links]]
             size[s.equation] += np.sum(asked**2)
         return math.sqrt(missed[driven].sum() / size[driven].sum()), np.sqrt(
             missed / np.where(size > 0, size, 1.0)
@@ -113,15 +115,17 @@ class RegressionData:
     ) -> RegressionData:
         """The systems of several experiments together."""
         subsystems = [
-            Subsystem(equation, number, members, _merged(system, equation), equation in observation.undriven)
+            Subsystem(
+                equation, number, column_indices, _merged(system, equation), equation in observation.undriven
+            )
             for number, system in enumerate(systems)
-            for equation, members in enumerate(observation.members)
+            for equation, column_indices in enumerate(observation.column_indices)
         ]
         masked = sum(system.masked for system in systems)
         return cls(observation, base, tuple(subsystems), masked, tuple(system.batches for system in systems))
 
 
-def observe(
+def assemble_regression(
     observation: Equations,
     base: BaseParameters,
     experiments: Sequence[Experiment],

@@ -22,7 +22,7 @@ _TAKEN = 1e-4
 """Share of a contrast between batches below which the fit has taken it: nothing is left there to tell noise by."""
 
 
-def remembered(experiments: Sequence[Scores], offsets: np.ndarray) -> tuple[np.ndarray, float]:
+def autoregressive_covariance(experiments: Sequence[Scores], offsets: np.ndarray) -> tuple[np.ndarray, float]:
     """Covariance (k, k) of the scores summed, and the longest time constant of a joint's noise, as a number of batches.
 
     A column of `offsets` (k, joints) times a score is that of a joint's torque offset: the sum of its residuals in the batch. Its size over

@@ -10,11 +10,11 @@ import numpy as np
 
 from flexcal.data.recordings import Decimation
 from flexcal.dynamics.inverse_model import Equations
-from flexcal.dynamics.regression.blocks import Rows, rows
+from flexcal.dynamics.regression.blocks import RegressionBlock, regression_blocks
 from flexcal.dynamics.regression.triangular_factor import triangular
 from flexcal.dynamics.signals import Experiment, Window
 from flexcal.errors import FlexcalError
-from flexcal.kernels import append
+from flexcal.kernels import update
 
 BATCHES = 128
 """Largest number of batches of an experiment, sufficient for the autocorrelation of its errors at any length."""
@@ -61,7 +61,7 @@ def experiment_system(
     `weights` (equations, rows) are those of every equation's rows by their numbers; without, all count alike.
     Raises `FlexcalError` where no row is left, or a column comes out as not finite.
     """
-    blocks = rows(observation, experiment, decimation, window)
+    blocks = regression_blocks(observation, experiment, decimation, window)
     if weights is not None:
         blocks = (block.weighted(weights[:, block.number]) for block in blocks)
     length = batch_length(experiment, decimation, batches)
@@ -74,7 +74,9 @@ def batch_length(experiment: Experiment, decimation: Decimation, batches: int) -
     return -(-total // batches)
 
 
-def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: bool) -> ExperimentSystem:
+def batched(
+    blocks: Iterable[RegressionBlock], name: str, length: int, *, mask_standstill: bool
+) -> ExperimentSystem:
     """The rows of the experiment `name` in batches of `length`; raises `FlexcalError` as `experiment_system` does."""
     found: list[Batch] = []
     masked = 0
@@ -91,7 +93,7 @@ def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: 
             number = int(part.number[0]) // length
             if current is None or current.number != number:
                 found += [] if current is None else [current.batch()]
-                current = _Growing(number, part.spread)
+                current = _Growing(number, part.projection)
             current.add(part)
     found += [] if current is None else [current.batch()]
     if not all(np.isfinite(factor).all() for batch in found for factor in batch.factors):
@@ -107,22 +109,22 @@ def batched(blocks: Iterable[Rows], name: str, length: int, *, mask_standstill: 
 class _Growing:
     """A batch to which rows come; it holds none of them."""
 
-    def __init__(self, number: int, spread: tuple[np.ndarray, ...]) -> None:
+    def __init__(self, number: int, projection: tuple[np.ndarray, ...]) -> None:
         self.number = number
         self._rows = 0
-        self._spread = spread
-        self._factors = [np.zeros((len(own) + 1, len(own) + 1)) for own in spread]
+        self._projection = projection
+        self._factors = [np.zeros((len(own) + 1, len(own) + 1)) for own in projection]
 
-    def add(self, part: Rows) -> None:
+    def add(self, part: RegressionBlock) -> None:
         """Spends the rows: what they are in is overwritten."""
         self._rows += len(part)
         for factor, system in zip(self._factors, part.reduced, strict=True):
-            append(factor, np.ascontiguousarray(system))
+            update(factor, np.ascontiguousarray(system))
 
     def batch(self) -> Batch:
         whole = [
-            np.column_stack([factor[:, :-1] @ spread, factor[:, -1]])
-            for factor, spread in zip(self._factors, self._spread, strict=True)
+            np.column_stack([factor[:, :-1] @ projection, factor[:, -1]])
+            for factor, projection in zip(self._factors, self._projection, strict=True)
         ]
         return Batch(self.number, self._rows, tuple(whole))
 
@@ -133,7 +135,7 @@ def reduced(systems: list[np.ndarray]) -> np.ndarray:
     return stack if len(stack) <= stack.shape[1] else triangular(stack)
 
 
-def _split(block: Rows, length: int) -> list[Rows]:
+def _split(block: RegressionBlock, length: int) -> list[RegressionBlock]:
     """By batch."""
     numbers = block.number // length
     if len(numbers) == 0 or numbers[0] == numbers[-1]:

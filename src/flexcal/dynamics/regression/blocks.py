@@ -17,10 +17,10 @@ _BLOCK = 1000
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class RegressionBlock:
     """M equations of every kind (of each joint, and of motors alone) that follow each other.
 
-    `reduced` has for every kind the reduced columns of W and, last, Y transposed (·, M), and `spread` what gives W back, as an
+    `reduced` has for every kind the reduced columns of W and, last, Y transposed (·, M), and `projection` what gives W back, as an
     `Observation` has them. `number` (M,) counts the rows of the experiment, whatever is left out; `time` (M,) is s, and `still` (M,)
     tells where the robot stands still within a row: no joint is faster than a hundredth of its top speed.
     """
@@ -29,42 +29,44 @@ class Rows:
     time: np.ndarray
     still: np.ndarray
     reduced: list[np.ndarray]
-    spread: tuple[np.ndarray, ...]
+    projection: tuple[np.ndarray, ...]
 
     def __len__(self) -> int:
         return len(self.number)
 
     @property
     def columns(self) -> list[np.ndarray]:
-        """For every kind W transposed (members, M)."""
-        return [spread.T @ own[:-1] for spread, own in zip(self.spread, self.reduced, strict=True)]
+        """For every kind W transposed (columns, M)."""
+        return [
+            projection.T @ own[:-1] for projection, own in zip(self.projection, self.reduced, strict=True)
+        ]
 
     @property
     def torque(self) -> np.ndarray:
         """Y of all kinds (·, M)."""
         return np.array([own[-1] for own in self.reduced])
 
-    def predicted(self, members: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
-        """W χ of all kinds (·, M) for `parameters` (p,), of which `members` are the numbers of each kind's own."""
-        each = zip(members, self.spread, self.reduced, strict=True)
-        return np.array([(spread @ parameters[felt]) @ own[:-1] for felt, spread, own in each])
+    def predicted(self, column_indices: Sequence[np.ndarray], parameters: np.ndarray) -> np.ndarray:
+        """W χ of all kinds (·, M) for `parameters` (p,), of which `column_indices` are the numbers of each kind's own."""
+        equations = zip(column_indices, self.projection, self.reduced, strict=True)
+        return np.array([(projection @ parameters[felt]) @ own[:-1] for felt, projection, own in equations])
 
-    def where(self, keep: np.ndarray) -> Rows:
+    def where(self, keep: np.ndarray) -> RegressionBlock:
         """The rows that `keep` (M,) marks."""
         if keep.all():
             return self
         reduced = [own[:, keep] for own in self.reduced]
-        return Rows(self.number[keep], self.time[keep], self.still[keep], reduced, self.spread)
+        return RegressionBlock(self.number[keep], self.time[keep], self.still[keep], reduced, self.projection)
 
-    def weighted(self, weights: np.ndarray) -> Rows:
+    def weighted(self, weights: np.ndarray) -> RegressionBlock:
         """The rows of every kind times the root of their `weights` (·, M)."""
         reduced = [own * root for own, root in zip(self.reduced, np.sqrt(weights), strict=True)]
-        return Rows(self.number, self.time, self.still, reduced, self.spread)
+        return RegressionBlock(self.number, self.time, self.still, reduced, self.projection)
 
 
-def rows(
+def regression_blocks(
     observation: Equations, experiment: Experiment, decimation: Decimation, window: Window
-) -> Iterator[Rows]:
+) -> Iterator[RegressionBlock]:
     """The rows inside `window`: torques and every column of W through the same decimation, friction evaluated before it.
 
     No row reaches across a gap of the experiment. Memory does not grow with the recording. A pass with the same arguments gives the same
@@ -93,7 +95,7 @@ def _stretch_rows(
     window: Window,
     memory: Memory,
     first: int,
-) -> Iterator[Rows]:
+) -> Iterator[RegressionBlock]:
     """The rows of motions without gaps, from the number `first` on; friction remembers what was before."""
     ends = np.cumsum(observation.widths)
     stream = DecimationStream(decimation)
@@ -111,7 +113,7 @@ def _stretch_rows(
         centres.push(start, piece.time, still)
         reduced = stream.push(observation.reduced(piece, memory))
         number, time, still = centres.pop(reduced.shape[1])
-        found = Rows(number, time, still, np.split(reduced, ends[:-1]), observation.spread)
+        found = RegressionBlock(number, time, still, np.split(reduced, ends[:-1]), observation.projection)
         inside = (time >= window.start) & (time < window.end)
         if inside.any():
             yield found.where(inside)

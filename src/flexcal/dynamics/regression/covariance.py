@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.dynamics.inverse_model import Equations, Observation
 from flexcal.dynamics.regression.assembly import RegressionData
-from flexcal.dynamics.regression.autoregressive_noise import remembered
+from flexcal.dynamics.regression.autoregressive_noise import autoregressive_covariance
 from flexcal.dynamics.regression.batches import Batch
 from flexcal.dynamics.regression.scores import Scores
 
@@ -44,9 +44,9 @@ def batch_covariance(
     `parameters` (p,) are the estimate; `kept` the numbers of the estimated ones among them; `root` (k, k) has root · rootᵀ = (WᵀW)⁻¹ of the
     system weighted by `noise` (one a subsystem), whose mean squared error is `variance`.
     """
-    members = data.observation.members
-    seen = [np.vstack([parameter_rows(root, kept, own), np.zeros(len(kept))]) for own in members]
-    missed = [np.append(-parameters[own], 1.0) for own in members]
+    column_indices = data.observation.column_indices
+    seen = [np.vstack([parameter_rows(root, kept, own), np.zeros(len(kept))]) for own in column_indices]
+    missed = [np.append(-parameters[own], 1.0) for own in column_indices]
     offsets = offset_scores(data.observation, kept, root)
     return score_covariance(data.batches, noise, seen, missed, root, variance, offsets)
 
@@ -59,10 +59,10 @@ def offset_scores(observation: Equations, kept: Sequence[int], root: np.ndarray)
     return np.linalg.solve(root, np.eye(len(kept))[:, offsets]) if offsets else None
 
 
-def parameter_rows(matrix: np.ndarray, kept: Sequence[int], members: np.ndarray) -> np.ndarray:
-    """The rows (m, k) of a matrix (k, k) that belong to `members`, of which `kept` have one; zero for the others."""
-    found = np.zeros((len(members), matrix.shape[1]))
-    _, at, rows = np.intersect1d(members, kept, return_indices=True)
+def parameter_rows(matrix: np.ndarray, kept: Sequence[int], column_indices: np.ndarray) -> np.ndarray:
+    """The rows (m, k) of a matrix (k, k) that belong to `column_indices`, of which `kept` have one; zero for the others."""
+    found = np.zeros((len(column_indices), matrix.shape[1]))
+    _, at, rows = np.intersect1d(column_indices, kept, return_indices=True)
     found[at] = matrix[rows]
     return found
 
@@ -79,13 +79,13 @@ def score_covariance(
     """root · M · rootᵀ with M the covariance of the scores Qᵀρ as the batches show it (Newey & West 1987).
 
     A joint's columns (width) of a batch times `seen` (width, k) give its part of Q, with QᵀQ = 1 over all joints and batches, and times
-    `missed` (width,) the errors ρ, both divided by the subsystem's `noise`. M sums the outer squares of the scores of
-    all windows of ℓ batches that follow each other, which is Bartlett's kernel, over joints together. ℓ is the bandwidth of Andrews (1991)
-    for the first autocorrelation of the scores, all parameters pooled; what that kernel leaves out where they are autoregressive is given
-    back. The scores of a window are freed of what the fit took from its residuals, so that independent errors give root · rootᵀ σ² without
-    bias (Bell & McCaffrey 2002). So many parameters from so few batches leave correlations uncertain: they are drawn towards those of
-    root · rootᵀ, as k + ν : k with ν the degrees of freedom, 1.5 B / ℓ. Where the noise of a joint has a time constant above half a window
-    and six batches, standard deviations are at least those of `remembered`, correlations are its own, and ν is at most the number of
+    `missed` (width,) the errors ρ, both divided by the subsystem's `noise`. M sums the outer squares of the scores of all windows of ℓ
+    batches that follow each other, which is Bartlett's kernel, over joints together. ℓ is the bandwidth of Andrews (1991) for the first
+    autocorrelation of the scores, all parameters pooled; what that kernel leaves out where they are autoregressive is given back. The
+    scores of a window are freed of what the fit took from its residuals, so that independent errors give root · rootᵀ σ² without bias (Bell
+    & McCaffrey 2002). So many parameters from so few batches leave correlations uncertain: they are drawn towards those of root · rootᵀ, as
+    k + ν : k with ν the degrees of freedom, 1.5 B / ℓ. Where the noise of a joint has a time constant above half a window and six batches,
+    standard deviations are at least those of `autoregressive_covariance`, correlations are its own, and ν is at most the number of
     independent samples of such noise, one every two time constants; a column of `offsets` (k, ·) times a score is that of a joint's torque
     offset.
     """
@@ -119,7 +119,7 @@ def covariance_of_scores(
     spread = root @ middle @ root.T
     std = np.sqrt(np.diag(spread))
     if offsets is not None:
-        slow, memory = remembered(experiments, offsets)
+        slow, memory = autoregressive_covariance(experiments, offsets)
         if memory > max(_SHORT, _WITHIN * window):
             freedom = max(1.0, min(freedom, 0.5 * batches / memory))
             spread = root @ (given + slow) @ root.T

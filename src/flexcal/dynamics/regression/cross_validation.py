@@ -31,14 +31,14 @@ class Fold:
 
 def folds(
     systems: Sequence[ExperimentSystem],
-    members: Sequence[np.ndarray],
+    column_indices: Sequence[np.ndarray],
     columns: int,
     weigh_by: Sequence[int],
     purge_rows: int,
 ) -> list[Fold]:
     """Blocks of about as many rows that follow each other; `purge_rows` to either side of a block train nothing when it is the test.
 
-    `members` are the numbers of every joint's columns among all `columns`. The noise of a joint is what its columns among `weigh_by`
+    `column_indices` are the numbers of every joint's columns among all `columns`. The noise of a joint is what its columns among `weigh_by`
     leave of its torques outside the block. Raises `FlexcalError` where no block leaves others to learn from.
     """
     pieces = _pieces(systems, purge_rows)
@@ -48,7 +48,7 @@ def folds(
         test = [p for p in pieces if p.fold == fold]
         if train:
             own, other = [], []
-            for joint, numbers in enumerate(members):
+            for joint, numbers in enumerate(column_indices):
                 inside = reduced([p.factors[joint] for p in test])
                 outside = reduced([p.factors[joint] for p in train])
                 sigma = _noise(outside, sum(p.rows for p in train), np.isin(numbers, weigh_by))

@@ -242,8 +242,10 @@ class _Tables:
         names, kept = self._observation.names, self._kept
         table = np.zeros((self._model.n, len(motion), len(kept) + 1))
         columns = self._observation.columns(motion)
-        for joint, (own, members) in enumerate(zip(columns, self._observation.members, strict=True)):
-            place = {number: row for row, number in enumerate(members)}
+        for joint, (own, column_indices) in enumerate(
+            zip(columns, self._observation.column_indices, strict=True)
+        ):
+            place = {number: row for row, number in enumerate(column_indices)}
             coulomb = f"{self._model.joint_names[joint]}.coulomb"
             for column, number in enumerate(kept):
                 if number in place:

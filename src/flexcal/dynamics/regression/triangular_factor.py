@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexcal.kernels import append
+from flexcal.kernels import update
 
 _TOLERANCE = 1e-9
 """A singular value of comparable columns below this is taken as zero."""
@@ -77,19 +77,19 @@ class TriangularFactor:
 
 
 def stacked(
-    triangles: Iterable[TriangularFactor], members: Iterable[np.ndarray], columns: int
+    triangles: Iterable[TriangularFactor], column_indices: Iterable[np.ndarray], columns: int
 ) -> TriangularFactor:
-    """One system of all `columns` from triangles that know only their `members` of them."""
+    """One system of all `columns` from triangles that know only their `column_indices` of them."""
     total = TriangularFactor.empty(columns)
-    for triangle, numbers in zip(triangles, members, strict=True):
+    for triangle, numbers in zip(triangles, column_indices, strict=True):
         total = total + TriangularFactor(widened(triangle.factor, numbers, columns), triangle.rows)
     return total
 
 
-def widened(system: np.ndarray, members: np.ndarray, columns: int) -> np.ndarray:
-    """[W, Y] (·, columns + 1) of all `columns` from a system (·, k + 1) that knows only its `members` of them."""
+def widened(system: np.ndarray, column_indices: np.ndarray, columns: int) -> np.ndarray:
+    """[W, Y] (·, columns + 1) of all `columns` from a system (·, k + 1) that knows only its `column_indices` of them."""
     wide = np.zeros((len(system), columns + 1))
-    wide[:, members] = system[:, :-1]
+    wide[:, column_indices] = system[:, :-1]
     wide[:, -1] = system[:, -1]
     return wide
 
@@ -98,5 +98,5 @@ def triangular(matrix: np.ndarray) -> np.ndarray:
     """R (k, k) of the QR of a matrix (·, k), by Householder reflections; the last rows are zero, to rounding, where it has fewer."""
     columns = np.array(matrix.T, dtype=float, order="C")
     factor = np.zeros((len(columns), len(columns)))
-    append(factor, columns)
+    update(factor, columns)
     return factor

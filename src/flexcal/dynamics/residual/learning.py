@@ -97,7 +97,7 @@ def _without_blocks(
     """Parameters (1 + blocks, p): the estimate's, and as they would be without each of the blocks of those numbers."""
     observation, base = recorded.observation, recorded.base
     kept = list(base.found.kept)
-    found = folds(systems, observation.members, len(observation.names), kept, _reach(recorded))
+    found = folds(systems, observation.column_indices, len(observation.names), kept, _reach(recorded))
     all_rows = weighted_least_squares(RegressionData.of(observation, base, systems)).parameters.coordinates()
     moved = [own - all_rows for own in solutions(found, kept, observation.values())]
     values = estimate.parameters.coordinates()

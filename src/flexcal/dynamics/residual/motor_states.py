@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.dynamics.estimators import RecordedRows
 from flexcal.dynamics.inverse_model import Column, Memory, motor_axes, motor_shares
-from flexcal.dynamics.regression import rows
+from flexcal.dynamics.regression import regression_blocks
 from flexcal.dynamics.signals import Motion
 from flexcal.model.robot import RobotModel
 
@@ -51,7 +51,7 @@ def motor_states(recorded: RecordedRows, parameters: np.ndarray) -> Iterator[Mot
     values = np.hstack([parameters, beyond])
     to_motors = np.linalg.inv(motor_shares(observation.model))
     for experiment, (log, window) in enumerate(zip(recorded.experiments, recorded.windows, strict=True)):
-        for block in rows(wide, log, recorded.decimation, window):
+        for block in regression_blocks(wide, log, recorded.decimation, window):
             kept = block.where(~block.still) if recorded.mask_standstill else block
             states = np.array(
                 [own[-3:-1] for own in kept.reduced]
@@ -62,7 +62,7 @@ def motor_states(recorded: RecordedRows, parameters: np.ndarray) -> Iterator[Mot
                 states[:, 0].T,
                 states[:, 1].T,
                 kept.torque.T @ to_motors,
-                np.stack([kept.predicted(wide.members, own).T @ to_motors for own in values], axis=1),
+                np.stack([kept.predicted(wide.column_indices, own).T @ to_motors for own in values], axis=1),
             )
 
 

@@ -26,14 +26,14 @@ _SMALL = 1 / 8
 
 @dataclass(frozen=True, eq=False)
 class GravityTorqueCheck:
-    """Sums over samples `weight_squares` (n,) and `torque_squares` (n,) of the squares, (N m)², and `of_both` (n,) of the products.
+    """Sums over samples `weight_squares` (n,) and `torque_squares` (n,) of the squares, (N m)², and `cross_products` (n,) of the products.
 
     The weight is that of the links, and of what a log says that they hold; zero at joints with a declared spring, which may balance it.
     """
 
     weight_squares: np.ndarray
     torque_squares: np.ndarray
-    of_both: np.ndarray
+    cross_products: np.ndarray
 
     @classmethod
     def empty(cls, joints: int) -> GravityTorqueCheck:
@@ -56,7 +56,7 @@ class GravityTorqueCheck:
         return GravityTorqueCheck(
             self.weight_squares + other.weight_squares,
             self.torque_squares + other.torque_squares,
-            self.of_both + other.of_both,
+            self.cross_products + other.cross_products,
         )
 
     @property
@@ -68,14 +68,16 @@ class GravityTorqueCheck:
     def share(self) -> float:
         """Of its weight that the torques of the heaviest joint follow; 1 where nothing weighs."""
         k = self.heaviest
-        return float(abs(self.of_both[k]) / self.weight_squares[k]) if self.weight_squares[k] > 0 else 1.0
+        return (
+            float(abs(self.cross_products[k]) / self.weight_squares[k]) if self.weight_squares[k] > 0 else 1.0
+        )
 
     @property
     def reversed(self) -> int | None:
         """The first joint of some weight whose torques do not hold it but pull it down; None where there is none."""
         heavy = self.weight_squares > _HEAVY**2 * self.weight_squares.max()
         told = self.torque_squares < _LIVELY**2 * self.weight_squares
-        against = self.of_both < _AGAINST * np.sqrt(self.weight_squares * self.torque_squares)
+        against = self.cross_products < _AGAINST * np.sqrt(self.weight_squares * self.torque_squares)
         return next((int(k) for k in np.flatnonzero(heavy & told & against)), None)
 
     @property

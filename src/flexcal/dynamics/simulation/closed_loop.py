@@ -17,7 +17,7 @@ _LOST = 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class Target:
+class LoopReference:
     """What the loop is to do at an instant: path, its derivatives, and the torque that acts beside the feedback, each (n,).
 
     That is what acts from outside and, with a declared controller, the torque given beforehand.
@@ -29,12 +29,12 @@ class Target:
     push: np.ndarray
     torque: np.ndarray
 
-    def until(self, later: Target, share: float) -> Target:
+    def until(self, later: LoopReference, share: float) -> LoopReference:
         """On the way to a later one."""
         span, left = later.time - self.time, 1.0 - share
         push = left * self.push + share * later.push
         bend = 0.5 * span**2 * share * left * push
-        return Target(
+        return LoopReference(
             self.time + share * span,
             left * self.path + share * later.path - bend,
             left * self.speed + share * later.speed,
@@ -59,9 +59,9 @@ class ClosedLoop:
         self._parts = max(1, math.ceil(step * fastest / _STEP - 1e-9))
         self._step = step / self._parts
         self._q = self._dq = self._ddq = np.zeros(0)
-        self._last: Target | None = None
+        self._last: LoopReference | None = None
 
-    def reach(self, target: Target) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def reach(self, target: LoopReference) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """q, q̇ and q̈ (n,) at the time of a target, `step` after that of the last one.
 
         Raises `FlexcalError` where the mass matrix is not positive definite or the robot leaves the path.
@@ -81,7 +81,7 @@ class ClosedLoop:
             )
         return q, dq, self._ddq
 
-    def _advance(self, target: Target) -> None:
+    def _advance(self, target: LoopReference) -> None:
         mass, h = self._robot.mass_matrix(self._q), self._step
         error, slip = target.path - self._q, target.speed - self._dq
         if self._declared is None:

@@ -12,7 +12,7 @@ import numpy as np
 from flexcal.data.recordings import Decimation, LowPass
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.signals import BESIDE, Experiment, Motion, differences, smoothed, stretches
-from flexcal.dynamics.simulation.closed_loop import ClosedLoop, Target
+from flexcal.dynamics.simulation.closed_loop import ClosedLoop, LoopReference
 from flexcal.dynamics.simulation.rigid_robot import RigidRobotSimulator
 
 _PATH = 0.1
@@ -130,7 +130,7 @@ class SimulatedExperiment:
             time, torque = beside[:, 0], beside[:, 1:]
             since = (done + np.arange(len(time))) % stride
             at = np.flatnonzero(since == 0)
-            targets = map(Target, time[at], x[at, :n], dx[at, :n], ddx[at, :n], x[at, n:])
+            targets = map(LoopReference, time[at], x[at, :n], dx[at, :n], ddx[at, :n], x[at, n:])
             reached = np.array([loop.reach(target) for target in targets]).reshape(-1, 3, n)
             states = np.concatenate([last, reached])[np.cumsum(since == 0) - 1 + len(last)]
             done, last = done + len(time), np.concatenate([last, reached])[-1:]

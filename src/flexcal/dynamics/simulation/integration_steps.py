@@ -98,8 +98,8 @@ def columns(observation: Observation, motion: Motion, memory: Memory) -> np.ndar
     """W (N, n, p) of all columns."""
     found = np.zeros((len(motion), observation.model.n, len(observation.names)))
     systems = observation.systems(motion, memory)
-    for joint, (system, members) in enumerate(zip(systems, observation.members, strict=True)):
-        found[:, joint, members] = system[:-1].T
+    for joint, (system, column_indices) in enumerate(zip(systems, observation.column_indices, strict=True)):
+        found[:, joint, column_indices] = system[:-1].T
     return found
 
 

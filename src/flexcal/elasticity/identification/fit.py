@@ -61,7 +61,7 @@ class ResponseData:
                 model,
                 self.responses,
                 inertias_known=self.inertias_known,
-                gaps=self.plan is not None,
+                backlash=self.plan is not None,
                 hardening=self.hardening,
             )
         )

@@ -60,7 +60,7 @@ class CompliantHeldJoints:
         """Some of them."""
         return CompliantHeldJoints({i: self.springs[i] for i in joints})
 
-    def asked_for(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> bool:
+    def is_supported(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> bool:
         """Whether the residual of `fit`, with all these joints rigid, holds what their compliances would add to the responses.
 
         Rao's score test by their compliances.
@@ -85,7 +85,7 @@ class CompliantHeldJoints:
             )
         return np.stack(columns, axis=1)
 
-    def needless(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> int | None:
+    def least_significant(self, model: RobotModel, data: ResponseData, fit: ResponseFit) -> int | None:
         """The joint whose spring a `fit` of all of them misses least where it is rigid, if that hardly matters; None if all are needed."""
         worth = {i: _worth(model, fit, i) for i in self.springs}
         least = min(worth, key=lambda i: worth[i])

@@ -152,7 +152,7 @@ def identify_stiffness(
     def completed(robot: RobotModel, begun: ResponseFit) -> tuple[RobotModel, ResponseFit]:
         held = CompliantHeldJoints.of(robot, responses)
         fit = None
-        if held.asked_for(robot, data, begun):
+        if held.is_supported(robot, data, begun):
             robot, fit = _with_held_joints(robot, held, data, search, rng, progress)
         return robot, final_fit(robot, data, begun) if fit is None else fit
 
@@ -200,10 +200,10 @@ def _with_held_joints(
             fit = fit_responses(wider, data, x)
         else:
             fit = _searched_fit(wider, data, search, rng, progress)
-        needless = held.needless(wider, data, fit)
-        if needless is None:
+        least_significant = held.least_significant(wider, data, fit)
+        if least_significant is None:
             return wider, fit
-        held = held.only([i for i in held.springs if i != needless])
+        held = held.only([i for i in held.springs if i != least_significant])
         values = fit.estimate.values
     return model, None
 

@@ -1,5 +1,5 @@
 from .axis_masses import AxisMasses, identify_masses, misfit
-from .fit import IdentifiedModes, about_at, identify_modes
+from .fit import IdentifiedModes, identify_modes, refined_response_at
 from .resonance_intervals import Peak, Resonance, antiresonances, peaks, resonances
 
 __all__ = [
@@ -7,11 +7,11 @@ __all__ = [
     "IdentifiedModes",
     "Peak",
     "Resonance",
-    "about_at",
     "antiresonances",
     "identify_masses",
     "identify_modes",
     "misfit",
     "peaks",
+    "refined_response_at",
     "resonances",
 ]

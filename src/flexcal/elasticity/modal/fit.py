@@ -159,14 +159,14 @@ def identify_modes(
             fit = larger
             if modes is None and (fit.model.damping > HEAVILY_DAMPED).any():
                 break
-        response = about(spectra, fit.model, _sigma(spectra, response))
+        response = refined_response(spectra, fit.model, _sigma(spectra, response))
         if len(fit.model.natural) == before:
             break
     assert fit is not None
     data = thinned(BandData(_cleaned(spectra, fit.model), _sigma(spectra, response)), _FOR_FIT)
     fit = _fitted(data, _nonlinear(fit))
     progress("modes", 1.0)
-    return IdentifiedModes(fit, about(spectra, fit.model, _sigma(spectra, response)))
+    return IdentifiedModes(fit, refined_response(spectra, fit.model, _sigma(spectra, response)))
 
 
 def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> RecordSpectra:
@@ -185,7 +185,7 @@ def _cleaned(spectra: RecordSpectra, guess: LocalResponse | ModalModel) -> Recor
     return replace(spectra, inputs=spectra.instruments, outputs=spectra.outputs - rest)
 
 
-def about(spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray) -> LocalResponse:
+def refined_response(spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray) -> LocalResponse:
     """The local response with a model and its transients as the first guess: only what they leave is smoothed over frequency.
 
     `sigma` (K, n_y): standard deviations that weight the transients' fit.
@@ -200,9 +200,9 @@ def about(spectra: RecordSpectra, model: ModalModel, sigma: np.ndarray) -> Local
     return replace(found, response=response, coherence=_coherence(spectra, found, response, diagonal))
 
 
-def about_at(spectra: RecordSpectra, model: ModalModel, response: LocalResponse) -> LocalResponse:
-    """`about` for other records of the same bins, with weights by the scatter of `response`."""
-    return about(spectra, model, _sigma(spectra, response))
+def refined_response_at(spectra: RecordSpectra, model: ModalModel, response: LocalResponse) -> LocalResponse:
+    """`refined_response` for other records of the same bins, with weights by the scatter of `response`."""
+    return refined_response(spectra, model, _sigma(spectra, response))
 
 
 def _coherence(

@@ -123,11 +123,11 @@ class ModelError:
             change = friction_response_change(
                 nominal, response.frequencies_hz, tolerances.friction * viscous, tolerances.octave
             )
-            number = list(model.poses[k].gaps.values())
+            number = list(model.poses[k].backlash.values())
             column = [list(predictions[k].columns).index(n) for n in number]
-            gap = tolerances.backlash * natural[number] * predictions[k].derivatives[..., column]
+            backlash = tolerances.backlash * natural[number] * predictions[k].derivatives[..., column]
             change = np.concatenate(
-                [change, over_frequency(gap, response.frequencies_hz, tolerances.octave)], axis=-1
+                [change, over_frequency(backlash, response.frequencies_hz, tolerances.octave)], axis=-1
             )
             none = np.empty(0, dtype=int)
             half = effects[k].by_friction.shape[-1] // 2

@@ -20,7 +20,7 @@ def viscous_name(joint: str, pose: str) -> str:
     return f"{joint}.viscous.{pose}"
 
 
-def half_gap_name(joint: str) -> str:
+def backlash_name(joint: str) -> str:
     """Name of the half gap of a drive as its frequency response shows it."""
     return f"{joint}.drive.half_gap"
 

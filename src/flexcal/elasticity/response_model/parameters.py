@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexcal.elasticity.response_model.parameter_names import (
-    half_gap_name,
+    backlash_name,
     hardening_name,
     held_inertia_name,
     pose_labels,
@@ -41,7 +41,7 @@ def stiffness_parameters(
     responses: Sequence[FrequencyResponse],
     *,
     inertias_known: bool = False,
-    gaps: bool = False,
+    backlash: bool = False,
     hardening: bool = False,
 ) -> Parameters:
     """Every parameter of stage 1 with its prior.
@@ -50,7 +50,7 @@ def stiffness_parameters(
     in every pose: friction under the reference motion acts like one that differs from pose to pose. One delay an axis has the
     prior 0 ± the sample time; a sensor on the arm has its sensitivity, delay and errors of mounting. Rotor inertias have the prior
     of robot.yaml; so have mass and centre of mass of every link that an elastic joint moves, and the payload's mass, unless
-    `inertias_known`. With `gaps`, a drive with backlash has its half gap: while it stands open, the drive appears softer. With
+    `inertias_known`. With `backlash`, a drive with backlash has its half gap: while it stands open, the drive appears softer. With
     `hardening`, every drive may be stiffer where it carries more torque. Raises `FlexcalError` where responses do not fit the robot.
     """
     check_responses(model, responses)
@@ -73,10 +73,10 @@ def stiffness_parameters(
             )
             for joint, value in zip(model.driven, loss, strict=True)
         ]
-    if gaps:
+    if backlash:
         items += [
             Parameter(
-                half_gap_name(joint.name),
+                backlash_name(joint.name),
                 "rad",
                 float(model.backlash[joint.index]),
                 lower=0.0,

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.elasticity.response_model.parameter_names import (
-    half_gap_name,
+    backlash_name,
     hardening_name,
     pose_labels,
     viscous_name,
@@ -37,20 +37,20 @@ class Prediction:
 class PoseModel:
     """One pose: lines (L,), where to linearise, and which parameter is which number of the robot.
 
-    `robot_names` maps names of the robot's own values to parameter numbers. `gaps` maps the axes with backlash to the numbers of their
-    half gaps; `gap_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening` maps
-    the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,)
-    are the numbers of the axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared.
-    `sensors` (S) on the arm have their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at
-    `mounting` (S, 5), -1 where there is none.
+    `robot_names` maps names of the robot's own values to parameter numbers. `backlash` maps the axes with backlash to the numbers of their
+    half gaps; `backlash_compliance` (phases, E) is the relative compliance that each adds along the reference motion, per rad. `hardening`
+    maps the axes whose drives harden under their `torque` to the numbers of hardening and stiffness. `delays` (E,) are the numbers of the
+    axes' delays, -1 where there is none; `payload` is the nominal payload mass in kg, None for the declared. `sensors` (S) on the arm have
+    their sensitivities and delays at `sensitivities` and `late` (S,), and their errors of mounting at `mounting` (S, 5), -1 where there is
+    none.
     """
 
     frequencies_hz: np.ndarray
     q: np.ndarray
     payload: float | None
     robot_names: dict[str, int]
-    gaps: dict[int, int]
-    gap_compliance: np.ndarray
+    backlash: dict[int, int]
+    backlash_compliance: np.ndarray
     hardening: dict[int, tuple[int, int]]
     torque: DriveTorque | None
     delays: np.ndarray
@@ -92,7 +92,7 @@ class PoseModel:
     @property
     def changing(self) -> tuple[int, ...]:
         """The axes whose drive changes its stiffness along the reference motion."""
-        return tuple(sorted({*self.gaps, *self.hardening}))
+        return tuple(sorted({*self.backlash, *self.hardening}))
 
     def stiffness_ratio(self, natural: np.ndarray) -> np.ndarray:
         """Stiffness and damping (phases, E) of every drive along the reference motion over those at no load with its gap closed."""
@@ -103,25 +103,25 @@ class PoseModel:
         stiffness at no load, by its logarithm beyond its own: gaps, hardening."""
         hardened, softer = self._hardened(natural), self._softer(natural)
         mean = np.mean(hardened.ratio / softer, axis=0)
-        by_gap = -np.mean(hardened.ratio * self.gap_compliance / softer**2, axis=0) / mean
+        by_backlash = -np.mean(hardened.ratio * self.backlash_compliance / softer**2, axis=0) / mean
         by_hardening, by_stiffness = (
             np.mean(slope / softer, axis=0) / mean for slope in (hardened.by_hardening, hardened.by_stiffness)
         )
-        slopes = [(axis, number, float(by_gap[axis])) for axis, number in self.gaps.items()]
+        slopes = [(axis, number, float(by_backlash[axis])) for axis, number in self.backlash.items()]
         for axis, (hardening, stiffness) in self.hardening.items():
             slopes.append((axis, hardening, float(by_hardening[axis])))
             slopes.append((axis, stiffness, float(by_stiffness[axis])))
         return slopes
 
     def _softer(self, natural: np.ndarray) -> np.ndarray:
-        half_gap = np.zeros(self.gap_compliance.shape[1])
-        half_gap[list(self.gaps)] = natural[list(self.gaps.values())]
-        return 1.0 + self.gap_compliance * half_gap
+        half_width = np.zeros(self.backlash_compliance.shape[1])
+        half_width[list(self.backlash)] = natural[list(self.backlash.values())]
+        return 1.0 + self.backlash_compliance * half_width
 
     def _hardened(self, natural: np.ndarray) -> HardenedStiffness:
         """All drives harden, or none."""
         if self.torque is None or not self.hardening:
-            none = np.zeros_like(self.gap_compliance)
+            none = np.zeros_like(self.backlash_compliance)
             return HardenedStiffness(none + 1.0, none, none)
         numbers = np.array([self.hardening[axis] for axis in sorted(self.hardening)])
         return self.torque.hardened(natural[numbers[:, 1]], natural[numbers[:, 0]])
@@ -152,10 +152,10 @@ class ResponseModel:
             for joint in robot.driven
             for label in labels
         }
-        gaps = {
-            axis: parameters.index(half_gap_name(joint.name))
+        backlash = {
+            axis: parameters.index(backlash_name(joint.name))
             for axis, joint in enumerate(robot.driven)
-            if half_gap_name(joint.name) in parameters
+            if backlash_name(joint.name) in parameters
         }
         hardening = {
             axis: (
@@ -187,7 +187,7 @@ class ResponseModel:
                     response.q_mean,
                     response.payload,
                     names,
-                    gaps,
+                    backlash,
                     np.zeros((1, len(robot.driven))),
                     hardening,
                     None,
@@ -211,7 +211,7 @@ class ResponseModel:
             loaded = DriveTorque.of(self.robot.with_values(known), pose.q, payload, plan)
             mean = pose.stiffness_ratio(natural).mean(axis=0)
             loaded = replace(loaded, stiffness=loaded.stiffness / mean)  # at no load
-            poses.append(replace(pose, gap_compliance=loaded.gap_compliance(), torque=loaded))
+            poses.append(replace(pose, backlash_compliance=loaded.backlash_compliance(), torque=loaded))
         return replace(self, poses=tuple(poses))
 
     def predict(self, x: np.ndarray) -> list[Prediction]:

@@ -51,7 +51,7 @@ class DriveTorque:
         size = multisine_torque(robot, system, plan.frequencies_hz, motion.excitation, motion.kp, motion.kd)
         return cls(slow, size, np.array([joint.stiffness[2] for joint in robot.driven]))
 
-    def gap_compliance(self) -> np.ndarray:
+    def backlash_compliance(self) -> np.ndarray:
         """What a gap adds to the compliance of each drive along the reference motion, relative, per rad of half gap, (phases, E).
 
         A gap ± b twists by b sgn(torque), whose equivalent gain for a Gaussian torque is 2 b times the density of the torque at zero

@@ -22,7 +22,7 @@ from flexcal.estimation import Dropped, Estimate, Misfit, Parameter, Parameters
 from flexcal.files.formats.npz_reader import ArrayForm, NpzFile, refuse_foreign
 from flexcal.files.formats.yaml_reader import YamlFile, read_yaml_file
 from flexcal.files.formats.yaml_writer import to_plain, yaml_text
-from flexcal.files.transaction import atomic_paths, current, refuse_irregular, settle
+from flexcal.files.transaction import atomic_paths, current_path, recover, refuse_irregular
 
 Block = Literal["dynamics", "stiffness", "calibration", "payload"]
 BLOCKS: tuple[Block, ...] = get_args(Block)
@@ -113,7 +113,7 @@ def read_estimates(path: str | Path, *, without: Block | None = None) -> dict[Bl
     Raises `InputError` with file and line where the YAML does not fit, and where the npz is missing, has other names
     or shapes, or belongs to another YAML.
     """
-    settle(Path(path).parent)
+    recover(Path(path).parent)
     file = read_yaml_file(path)
     stored = file.structure(StoredEstimates)
     found: dict[Block, Estimate] = {}
@@ -159,7 +159,7 @@ def write_estimates(path: str | Path, block: Block, estimate: Estimate) -> None:
 
 def require_place(path: str | Path, block: Block) -> None:
     """Raise `InputError` where `write_estimates` would not put a block into this file: so that it is known before the work begins."""
-    settle(Path(path).parent)
+    recover(Path(path).parent)
     for file in (Path(path), Path(path).with_suffix(".npz")):
         refuse_irregular(file)
     _kept(Path(path), block)
@@ -194,7 +194,7 @@ def sha256_of(path: str | Path) -> str:
             for file in sorted(file for file in path.rglob("*") if file.is_file()):
                 digest.update(f"{file.relative_to(path).as_posix()}\0{sha256_of(file)}\n".encode())
         else:
-            with current(path).open("rb") as stream:
+            with current_path(path).open("rb") as stream:
                 while content := stream.read(2**20):
                     digest.update(content)
     except OSError as problem:
@@ -224,7 +224,7 @@ def _kept(
     stored, arrays = StoredEstimates(), {}
     ours = {f"{name}.{part}" for name in BLOCKS for part in ("names", "covariance")}
     refuse_foreign(path.with_suffix(".npz"), ours)
-    if current(path).exists():
+    if current_path(path).exists():
         file = read_yaml_file(path)
         stored = file.structure(StoredEstimates)
         for name in BLOCKS:

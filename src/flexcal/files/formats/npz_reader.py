@@ -14,7 +14,7 @@ import numpy as np
 from numpy.lib.npyio import NpzFile as NpzArrays
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.units import LARGEST
 
 Kind = Literal["real", "complex", "whole", "truth", "text"]
@@ -79,7 +79,7 @@ class NpzFile:
     @contextmanager
     def _opened(self) -> Iterator[NpzArrays]:
         try:
-            stored = np.load(current(self.path), allow_pickle=False)
+            stored = np.load(current_path(self.path), allow_pickle=False)
             if not isinstance(stored, NpzArrays):
                 raise self.error("is no .npz file")
             with stored:
@@ -134,7 +134,7 @@ class NpzFile:
 
 def refuse_foreign(path: Path, ours: Set[str]) -> None:
     """Raise `InputError` where a file is there that holds something else than arrays of the names `ours`: no flexcal wrote it."""
-    if not current(path).exists():
+    if not current_path(path).exists():
         return
     try:
         foreign = NpzFile(path, "").names - ours

@@ -15,7 +15,7 @@ from flexcal.errors import InputError, unreadable
 from flexcal.files.formats.yaml_document import parse_document
 from flexcal.files.formats.yaml_writer import write_yaml
 from flexcal.files.structuring import Keys, StructureError, structure
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 
 __all__ = ["YamlFile", "read_yaml", "read_yaml_file", "write_yaml"]
 
@@ -63,7 +63,7 @@ def read_yaml_file(path: str | Path) -> YamlFile:
     """Read a YAML file as plain data, keeping the lines; raises `InputError` as `read_yaml` does."""
     path = Path(path)
     try:
-        text = current(path).read_text(encoding="utf-8-sig")
+        text = current_path(path).read_text(encoding="utf-8-sig")
     except OSError as problem:
         raise unreadable(path, problem) from problem
     except UnicodeDecodeError as problem:

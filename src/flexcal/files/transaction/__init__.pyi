@@ -1,22 +1,22 @@
 from .atomic_writing import atomic_path, atomic_paths, write_text
 from .file_kinds import refuse_irregular, refuse_stream
 from .locks import lock_file
-from .publication import Publication, current
-from .recovery import settle
+from .publication import FileTransaction, current_path
+from .recovery import recover
 from .staging_folder import Stage, age, living_owner, stages_in
 
 __all__ = [
-    "Publication",
+    "FileTransaction",
     "Stage",
     "age",
     "atomic_path",
     "atomic_paths",
-    "current",
+    "current_path",
     "living_owner",
     "lock_file",
+    "recover",
     "refuse_irregular",
     "refuse_stream",
-    "settle",
     "stages_in",
     "write_text",
 ]

@@ -7,15 +7,15 @@ from contextlib import contextmanager
 from pathlib import Path
 
 from flexcal.errors import InputError
-from flexcal.files.transaction.publication import Publication
+from flexcal.files.transaction.publication import FileTransaction
 
 
 @contextmanager
 def atomic_path(path: str | Path) -> Iterator[Path]:
     """Yield a temporary file that takes the place of `path` when the block ends, and goes when it raises.
 
-    Within the block of a `Publication` it waits for the end of that, and `current` leads to it. Raises `InputError` where the folder does
-    not exist and cannot be made, or cannot be written to, and where `path` is there and no regular file.
+    Within the block of a `FileTransaction` it waits for the end of that, and `current_path` leads to it. Raises `InputError` where the
+    folder does not exist and cannot be made, or cannot be written to, and where `path` is there and no regular file.
     """
     with atomic_paths(path) as (temporary,):
         yield temporary
@@ -24,12 +24,12 @@ def atomic_path(path: str | Path) -> Iterator[Path]:
 @contextmanager
 def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
     """`atomic_path` for files that belong together: they take their places together."""
-    running = Publication.running()
+    running = FileTransaction.running()
     if running is not None:
         with _written(running, [Path(path) for path in paths]) as temporaries:
             yield temporaries
         return
-    alone = Publication()  # no other thread's files wait for these
+    alone = FileTransaction()  # no other thread's files wait for these
     try:
         with _written(alone, [Path(path) for path in paths]) as temporaries:
             yield temporaries
@@ -39,7 +39,7 @@ def atomic_paths(*paths: str | Path) -> Iterator[tuple[Path, ...]]:
 
 
 @contextmanager
-def _written(publication: Publication, places: list[Path]) -> Iterator[tuple[Path, ...]]:
+def _written(publication: FileTransaction, places: list[Path]) -> Iterator[tuple[Path, ...]]:
     temporaries: list[Path] = []
     try:
         for place in places:
@@ -62,7 +62,7 @@ def write_text(path: str | Path, text: str) -> None:
         temporary.write_bytes(text.encode("utf-8", "backslashreplace"))
 
 
-def _temporary(publication: Publication, path: Path) -> Path:
+def _temporary(publication: FileTransaction, path: Path) -> Path:
     try:
         return publication.temporary(path)
     except OSError as problem:

@@ -14,7 +14,7 @@ from flexcal.errors import InputError
 from flexcal.files.transaction.file_kinds import refuse_irregular, refuse_stream
 from flexcal.files.transaction.journal import Change, Journal, Seen, seen, sync_folder
 from flexcal.files.transaction.locks import locked
-from flexcal.files.transaction.recovery import settle
+from flexcal.files.transaction.recovery import recover
 from flexcal.files.transaction.staging_folder import Stage
 
 _POSTPONED = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
@@ -40,15 +40,15 @@ def deferred_signals() -> Iterator[None]:
             signal.raise_signal(came[0])
 
 
-_open: list[Publication] = []
+_open: list[FileTransaction] = []
 """The one whose block is being carried out, last; of the whole process, as files are."""
 
 
-class Publication:
+class FileTransaction:
     """Files written within its block wait in stages, hidden folders beside their places, and take these together when the block ends.
 
     When it raises, nothing has changed. When the process is killed, the places hold the files of before or, once the journal is on the
-    disk, the next flexcal that opens the folder puts all of the new ones there. `current` leads to a file that waits.
+    disk, the next flexcal that opens the folder puts all of the new ones there. `current_path` leads to a file that waits.
     """
 
     def __init__(self) -> None:
@@ -59,7 +59,7 @@ class Publication:
         self._removed: dict[Path, Seen] = {}
         self._done = False
 
-    def __enter__(self) -> Publication:
+    def __enter__(self) -> FileTransaction:
         _open.append(self)
         return self
 
@@ -74,7 +74,7 @@ class Publication:
             self.discard()
 
     @staticmethod
-    def running() -> Publication | None:
+    def running() -> FileTransaction | None:
         """The one whose block is being carried out."""
         return _open[-1] if _open else None
 
@@ -86,11 +86,11 @@ class Publication:
     def stage(self, folder: Path, verb: str = "", names: Sequence[str] = ()) -> Stage:
         """The stage in a folder, which is made where it is not there; for a `verb` that writes these names (glob patterns).
 
-        Raises `OSError` where the folder cannot be made or written to, and `InputError` as `settle` does.
+        Raises `OSError` where the folder cannot be made or written to, and `InputError` as `recover` does.
         """
         folder = Path(os.path.realpath(folder))
         if folder not in self._stages:
-            settle(folder)
+            recover(folder)
             with deferred_signals():
                 self._made += [path for path in (folder, *folder.parents) if not path.exists()]
                 folder.mkdir(parents=True, exist_ok=True)
@@ -201,12 +201,12 @@ class Publication:
                     folder.rmdir()
 
 
-def current(path: str | Path) -> Path:
+def current_path(path: str | Path) -> Path:
     """Where to read `path`: the file that waits for this place in the publication being carried out, else the path itself.
 
     Raises `InputError` where this is a pipe, socket or device.
     """
-    running = Publication.running()
+    running = FileTransaction.running()
     place = (running.waiting(Path(path)) if running else None) or Path(path)
     refuse_stream(place)
     return place

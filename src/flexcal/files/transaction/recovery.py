@@ -12,7 +12,7 @@ from flexcal.files.transaction.locks import locked
 from flexcal.files.transaction.staging_folder import lock_orphan, owner_of, remove_stage, stages_in
 
 
-def settle(folder: str | Path) -> None:
+def recover(folder: str | Path) -> None:
     """Finish or discard what runs that were cut off have left in a folder, and wait where one is putting its files in place just now.
 
     A run that had its journal is finished, any other discarded, so that the files there are all of one run. Raises `InputError` where that
@@ -25,7 +25,7 @@ def settle(folder: str | Path) -> None:
     for stage in stages:
         home = primary_of(stage)
         if home is not None and home.parent != folder and home.is_dir():
-            settle(home.parent)
+            recover(home.parent)
     try:
         with locked(folder):
             for stage in stages:

@@ -6,7 +6,7 @@ from .nonparametric import LocalResponse, local_response
 from .period_detection import find_period
 from .repeatability import HalfDifference, half_difference
 from .spectra import Hold, RecordSpectra, record_spectra
-from .tone_detection import Tones, tones
+from .tone_detection import Tones, detect_tones
 
 __all__ = [
     "SHORTEST",
@@ -18,6 +18,7 @@ __all__ = [
     "LocalResponse",
     "RecordSpectra",
     "Tones",
+    "detect_tones",
     "equal_pieces",
     "excited_band",
     "feedback",
@@ -25,6 +26,5 @@ __all__ = [
     "half_difference",
     "local_response",
     "record_spectra",
-    "tones",
     "with_reference",
 ]

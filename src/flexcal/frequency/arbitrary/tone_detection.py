@@ -38,7 +38,7 @@ class Tones:
         )
 
 
-def tones(pieces: Sequence[ExcitationRecord]) -> Tones | None:
+def detect_tones(pieces: Sequence[ExcitationRecord]) -> Tones | None:
     """Of records of equal length; None where 95 % of the power are not in six lines."""
     size = len(pieces[0])
     window = np.hanning(size)[:, None]

@@ -11,7 +11,7 @@ from flexcal.data.plans import MultisinePlan
 from flexcal.data.recordings import Recording
 from flexcal.errors import FlexcalError, InputError
 from flexcal.files.formats import ArrayForm, NpzFile, write_npz
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.frequency.periodic.averages import Average, average_response, right_divide
 from flexcal.frequency.periodic.covariance import input_gain, kronecker, output_noise, total_covariance, vec
 from flexcal.frequency.periodic.pose_records import PoseRecords, by_pose
@@ -154,7 +154,7 @@ class FrequencyResponse:
     @classmethod
     def load(cls, path: str | Path) -> "FrequencyResponse":
         """Read what `save` wrote; `InputError` where the file is missing or something else."""
-        if not current(path).exists():
+        if not current_path(path).exists():
             raise InputError(f"{path} does not exist; run 'flexcal identify response' to make it.")
         file = NpzFile(Path(path), "give what 'flexcal identify response' wrote")
         if "covariance" not in file:

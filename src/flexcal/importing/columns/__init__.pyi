@@ -1,15 +1,15 @@
 from .assignment import ColumnAssignment
 from .excitation_records import ResponseRecords, read_response_records
 from .map_option import apply_map
-from .nominal_consistency import Misfit, check_nominal
-from .recognition import Guess, UnusedColumn, guess_columns, reasons_unused
+from .nominal_consistency import NominalMismatch, check_nominal
+from .recognition import RecognisedColumns, UnusedColumn, guess_columns, reasons_unused
 from .rtde_names import TOOL
 
 __all__ = [
     "TOOL",
     "ColumnAssignment",
-    "Guess",
-    "Misfit",
+    "NominalMismatch",
+    "RecognisedColumns",
     "ResponseRecords",
     "UnusedColumn",
     "apply_map",

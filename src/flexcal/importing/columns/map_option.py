@@ -10,7 +10,7 @@ from flexcal.data.tables import UNITS, standard_columns
 from flexcal.errors import InputError
 from flexcal.files.structuring import suggestion
 from flexcal.importing.columns.assignment import NUMBERED, ColumnAssignment
-from flexcal.importing.columns.recognition import Guess, UnusedColumn, place
+from flexcal.importing.columns.recognition import RecognisedColumns, UnusedColumn, place
 from flexcal.importing.tables import ForeignTable, parse_name, unit_of
 
 if TYPE_CHECKING:
@@ -22,7 +22,9 @@ _OFFSET = re.compile(r"^(.*?)\s*([-+]\s*\d+(?:\.\d*)?)$")
 _UNIT = re.compile(r"^(.*?)\s*\[([^\]]*)\]$")
 
 
-def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: RobotModel) -> Guess:
+def apply_map(
+    given: Sequence[str], guess: RecognisedColumns, foreign: ForeignTable, model: RobotModel
+) -> RecognisedColumns:
     """Recognised columns with those of --map in their place.
 
     Each entry is NAME=COLUMN, where NAME is flexcal's (q1, x, t, tau1, pose …); before the column may stand a sign or `factor*`, behind
@@ -78,7 +80,7 @@ def apply_map(given: Sequence[str], guess: Guess, foreign: ForeignTable, model: 
         for column in foreign.table.columns
         if column not in taken
     )
-    return Guess(placed, texts, left)
+    return RecognisedColumns(placed, texts, left)
 
 
 def _entries(given: Sequence[str]) -> list[str]:

@@ -41,7 +41,7 @@ _ALIKE = 1.5
 
 
 @dataclass(frozen=True)
-class Misfit:
+class NominalMismatch:
     """Residuals (rms, m) of the best-fit registered nominal robot.
 
     point: its name; declared: where it is in its frame (m); moved: where it would have to be to fit best, and `moved_rms` what that leaves.
@@ -67,7 +67,7 @@ class Misfit:
 
 def check_nominal(
     model: RobotModel, q: np.ndarray, xyz: np.ndarray, placed: ColumnAssignment, *, point: str | None = None
-) -> Misfit | None:
+) -> NominalMismatch | None:
     """Register the nominal robot at `q` (N, n) rad or m with points `xyz` (N, 3), m, of one station and target.
 
     Where that misses by more than a hundredth of the reach, joints counted the other way or from another zero, another order of the
@@ -81,7 +81,7 @@ def check_nominal(
     rms, _ = tool.miss(q, xyz, 1)
     moved_rms, shift = tool.miss(q, xyz, _ROUNDS)
     declared = model.point(point).xyz
-    found = Misfit(rms, moved_rms, declared, declared + shift, model.reach, model.point(point).name)
+    found = NominalMismatch(rms, moved_rms, declared, declared + shift, model.reach, model.point(point).name)
     if moved_rms < _ODD * model.reach:
         return found
     if len(q) >= _FEWEST_FROM_HAND and tool.miss_from_hand(q, xyz) < min(
@@ -143,8 +143,13 @@ class _Change:
 
 
 def _explained(
-    model: RobotModel, tool: _Tool, q: np.ndarray, xyz: np.ndarray, placed: ColumnAssignment, found: Misfit
-) -> Misfit:
+    model: RobotModel,
+    tool: _Tool,
+    q: np.ndarray,
+    xyz: np.ndarray,
+    placed: ColumnAssignment,
+    found: NominalMismatch,
+) -> NominalMismatch:
     """The misfit with the simplest explanation that makes good most of it, with the point where it was declared if one does so."""
     enough = min(_MADE_GOOD * found.moved_rms, _ODD * model.reach)
     simple = list(_simple_changes(model))

@@ -40,7 +40,7 @@ class UnusedColumn:
 
 
 @dataclass(frozen=True)
-class Guess:
+class RecognisedColumns:
     """Recognised columns by quantity, texts such as `target` by their name, and all other columns."""
 
     placed: Mapping[str, ColumnAssignment]
@@ -48,10 +48,10 @@ class Guess:
     left_out: tuple[UnusedColumn, ...]
 
 
-def reasons_unused(left_out: Sequence[UnusedColumn]) -> list[str]:
+def reasons_unused(unused: Sequence[UnusedColumn]) -> list[str]:
     """Columns that were left out, grouped by reason."""
     by_reason: dict[str, list[str]] = {}
-    for left in left_out:
+    for left in unused:
         by_reason.setdefault(left.why, []).append(left.column)
     return [f"{', '.join(_shortened(columns))}: {why}" for why, columns in by_reason.items()]
 
@@ -74,7 +74,7 @@ def _shortened(columns: Sequence[str]) -> list[str]:
     return listed
 
 
-def guess_columns(foreign: ForeignTable, model: RobotModel) -> Guess:
+def guess_columns(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns:
     """Recognise the columns of a foreign table; no column is two things, and what could be two is left out and named."""
     if not foreign.named:
         return _by_order(foreign, model)
@@ -126,17 +126,17 @@ def _guess(
     placed: Mapping[str, ColumnAssignment],
     texts: Mapping[str, str],
     reasons: Mapping[str, str],
-) -> Guess:
+) -> RecognisedColumns:
     taken = {column for found in placed.values() for column in found.columns} | set(texts.values())
     left = tuple(
         UnusedColumn(column, reasons.get(column, "not recognised"))
         for column in foreign.table.columns
         if column not in taken
     )
-    return Guess(placed, texts, left)
+    return RecognisedColumns(placed, texts, left)
 
 
-def _by_order(foreign: ForeignTable, model: RobotModel) -> Guess:
+def _by_order(foreign: ForeignTable, model: RobotModel) -> RecognisedColumns:
     """Without names: a whole number that counts up or none, the joints, then a point or none."""
     names, n = list(foreign.numbers), model.n
     placed: dict[str, ColumnAssignment] = {}

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexcal.calibration.verification import Refit, RefittedVerification, Verification, refitted
+from flexcal.calibration.verification import Refit, RefittedVerification, Verification, verify_refitted
 from flexcal.data.poses import PoseSet
 from flexcal.errors import FlexcalError
 from flexcal.model.robot import RobotModel
@@ -47,7 +47,7 @@ def proposed_refit(model: RobotModel, poses: PoseSet, found: Verification) -> Re
     tried: Sequence[tuple[Refit, ...]] = (("station",), ("point",), ("station", "point"))
     for what in tried:
         try:
-            again = refitted(model, poses, what)
+            again = verify_refitted(model, poses, what)
         except FlexcalError:
             continue
         # both only where they halve the error of the better single refit

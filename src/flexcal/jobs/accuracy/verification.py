@@ -24,9 +24,9 @@ from flexcal.calibration.verification import (
     arms_at,
     errors_before,
     prediction_document,
-    refitted,
     uncalibrated_model,
     verify_jointly,
+    verify_refitted,
 )
 from flexcal.data.poses import PoseSet, read_poses
 from flexcal.errors import FlexcalError
@@ -191,7 +191,7 @@ def verify_robot(
     fitted = already_fitted(calibrated, files, poses)
     known = all(is_station_identified(model, station) for station in poses.stations)
     stands = verify_jointly(model, poses) if known else None
-    anew = refitted(model, poses, refit) if refit else None
+    anew = verify_refitted(model, poses, refit) if refit else None
     found = stands if anew is None else (anew.result, anew.covariance)
     assert found is not None
     standing = model if anew is None else anew.model

@@ -39,7 +39,7 @@ def require_flexible_drives(
         )
     springs = tuple(DriveSpring(joint.index) for joint in model.driven)
     elastic = {joint.name for joint in model.driven}
-    gaps = {model.joint_names[joint] for joint in model.backlash_joints}
+    with_backlash = {model.joint_names[joint] for joint in model.backlash_joints}
     for entry in model.config.drives.coupling:
         ends = {entry.motor, entry.joint}
         if len(ends & elastic) == 1:
@@ -48,10 +48,10 @@ def require_flexible_drives(
                 f"{model.path}: {one} is elastic and coupled with {other}, which is not; declare both under `elastic:`, or leave "
                 "--flexible out."
             )
-        if ends <= elastic and ends & gaps:
+        if ends <= elastic and ends & with_backlash:
             raise InputError(
-                f"{model.path}: {min(ends & gaps)} has backlash and a coupled motor, which the flexible model lacks; remove it from "
-                "`geometry: backlash:`, or leave --flexible out."
+                f"{model.path}: {min(ends & with_backlash)} has backlash and a coupled motor, which the flexible model lacks; remove "
+                "it from `geometry: backlash:`, or leave --flexible out."
             )
     for log in logs:
         if next(log_blocks(log, model)).arm is None:

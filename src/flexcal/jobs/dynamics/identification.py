@@ -127,8 +127,8 @@ def identify_dynamics(
         rows = divided.rows(observation, base)
         estimate = with_nominal_uncertainty(train, estimator.fit(train, rows))
         essential = essential_parameters(train, estimate)
-        if selection.spread is not None:
-            estimate = selection.spread.widened(estimate)
+        if selection.uncertainty is not None:
+            estimate = selection.uncertainty.widened(estimate)
         external = None
         if model.force_sensor is not None:
             wide = replace(observation, terms=(*observation.terms, ExternalExcess()))

@@ -83,12 +83,12 @@ def dynamics_notes(data: RegressionData, estimate: Estimate, estimator: Estimato
 
 def selection_remark(friction: FrictionSelection, estimate: Estimate) -> str | None:
     """What other friction terms that predict as well do to the standard deviations; None without such."""
-    if friction.spread is None:
+    if friction.uncertainty is None:
         return None
-    growth = friction.spread.growth(estimate)
+    growth = friction.uncertainty.growth(estimate)
     name, factor = max(growth.items(), key=lambda item: item[1])
-    others = len(friction.spread.deviations) - 1
-    others = len(friction.spread.deviations) - 1
+    others = len(friction.uncertainty.deviations) - 1
+    others = len(friction.uncertainty.deviations) - 1
     sets = "1 other set of friction terms or shapes predicts"
     if others > 1:
         sets = f"{others} other sets of friction terms or shapes predict"

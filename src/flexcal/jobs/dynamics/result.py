@@ -22,7 +22,7 @@ from flexcal.files.formats import write_estimates
 from flexcal.files.transaction import write_text
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.remarks import dynamics_notes, dynamics_remarks, selection_remark
-from flexcal.jobs.logs import Treatment
+from flexcal.jobs.logs import Preprocessing
 from flexcal.jobs.pages import REPORT, report_folder
 from flexcal.jobs.result_files import (
     ESTIMATES,
@@ -61,7 +61,7 @@ class DynamicsIdentification:
     essential: EssentialParameters
     friction: FrictionSelection
     motors: tuple[str, ...]
-    treatment: Treatment
+    treatment: Preprocessing
     signals: Mapping[str, Any]
     weight_faults: tuple[str, ...]
     weight_shares: Mapping[str, GravityRatio]

@@ -14,10 +14,10 @@ from flexcal.design.frequency import (
     FrequencyPoseSelection,
     Placement,
     PlannedResponses,
+    excitation_margin,
     largest_stiffness_std,
+    optimal_amplitudes,
     payload_placements,
-    room,
-    shaped,
     stiffness_curve,
     within_preload,
 )
@@ -146,7 +146,7 @@ def plan_frequency_experiments(
         plan = leave_out_detection_lines(plan) if detection_lines else plan
         flat = planned = PlannedResponses.of(model, plan, sensors)
         if amplitude == "shaped":
-            planned = PlannedResponses.of(model, shaped(model, flat), sensors)
+            planned = PlannedResponses.of(model, optimal_amplitudes(model, flat), sensors)
     else:
         plan = plan_without_poses(model, kind, detection_lines=detection_lines, seed=seed)
         if poses is None:
@@ -155,9 +155,11 @@ def plan_frequency_experiments(
             )
             flat, planned, choice = found.flat, found.planned, found.choice
         else:
-            given = read_frequency_poses(poses, kind, model, room(model, plan.reference_amplitude))
+            given = read_frequency_poses(
+                poses, kind, model, excitation_margin(model, plan.reference_amplitude)
+            )
             flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=given)), sensors)
-            planned = PlannedResponses.of(model, shaped(model, flat), sensors)
+            planned = PlannedResponses.of(model, optimal_amplitudes(model, flat), sensors)
         planned = flat if amplitude == "flat" else planned
     if wanted is not None:
         planned = planned.reaching(wanted)

@@ -17,7 +17,7 @@ from flexcal.design.frequency import (
     Schedule,
     choose_frequency_poses,
     flat_multisine,
-    shaped,
+    optimal_amplitudes,
     within_preload,
 )
 from flexcal.design.scene import CollisionChecker
@@ -66,7 +66,7 @@ def optimise_excitation(
     progress("amplitudes", 0.0)
     flat = PlannedResponses.of(model, within_preload(model, replace(plan, poses=choice.poses)), sensors)
     progress("amplitudes", 0.3)
-    planned = PlannedResponses.of(model, shaped(model, flat), sensors)
+    planned = PlannedResponses.of(model, optimal_amplitudes(model, flat), sensors)
     progress("amplitudes", 1.0)
     return OptimisedExcitation(planned, flat, choice)
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.data.plans import MultisinePlan
 from flexcal.data.tables import check_joint_limits, open_table
-from flexcal.design.frequency import flat_multisine, room, static_amplitude_share
+from flexcal.design.frequency import excitation_margin, flat_multisine, static_amplitude_share
 from flexcal.errors import InputError
 from flexcal.model.robot import RobotModel
 from flexcal.units import DEGREE
@@ -34,7 +34,9 @@ def frequency_plan(
     reference = REFERENCE[kind]
     anywhere = np.zeros((1, model.n))
     plan = flat_multisine(model, anywhere, name=kind, payload=payload, reference=reference, seed=seed)
-    plan = replace(plan, poses=read_frequency_poses(poses_file, kind, model, room(model, reference)))
+    plan = replace(
+        plan, poses=read_frequency_poses(poses_file, kind, model, excitation_margin(model, reference))
+    )
     share = float(np.clip(static_amplitude_share(model, plan), _LEAST, 1.0))
     return replace(plan, amplitude=share * plan.amplitude)
 

@@ -1,6 +1,6 @@
 from .checks import payload_masses, require_joint_torques, require_no_wrenches, weight_faults
 from .hold_out import HoldOutLogs
-from .preprocessing import Treatment, choose_preprocessing, preprocessing_document, preprocessing_remarks
+from .preprocessing import Preprocessing, choose_preprocessing, preprocessing_document, preprocessing_remarks
 from .regression_systems import LogSegment, assemble_log_systems, read_logs
 from .scratch import scratch_folder
 from .torque_predictions import predict_log_torques
@@ -8,7 +8,7 @@ from .torque_predictions import predict_log_torques
 __all__ = [
     "HoldOutLogs",
     "LogSegment",
-    "Treatment",
+    "Preprocessing",
     "assemble_log_systems",
     "choose_preprocessing",
     "payload_masses",

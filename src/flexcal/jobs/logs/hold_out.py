@@ -14,8 +14,14 @@ from flexcal.dynamics.regression import ExperimentSystem, batches_each
 from flexcal.dynamics.signals import JointLog, Window
 from flexcal.estimation import Estimate
 from flexcal.jobs.logs.checks import require_joint_torques, require_unloaded, require_wrenches
-from flexcal.jobs.logs.preprocessing import Treatment
-from flexcal.jobs.logs.regression_systems import LogSegment, assemble_log_systems, read_logs, split, watched
+from flexcal.jobs.logs.preprocessing import Preprocessing
+from flexcal.jobs.logs.regression_systems import (
+    LogSegment,
+    assemble_log_systems,
+    read_logs,
+    split_hold_out,
+    with_progress,
+)
 from flexcal.jobs.logs.torque_predictions import predict_log_torques
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
@@ -32,7 +38,7 @@ class HoldOutLogs:
     borders: tuple[float, ...]
     fitted: tuple[LogSegment, ...]
     unseen: tuple[LogSegment, ...]
-    treatment: Treatment
+    treatment: Preprocessing
     jobs: int
     progress: Progress
 
@@ -43,7 +49,7 @@ class HoldOutLogs:
         validate: Sequence[Path],
         hold_out: float,
         model: RobotModel,
-        treatment: Treatment,
+        treatment: Preprocessing,
         scratch: Path,
         *,
         accept_weight: bool = False,
@@ -60,7 +66,7 @@ class HoldOutLogs:
         if not accept_weight:
             require_joint_torques([*seen, *others], model)
         require_wrenches([*seen, *others], model)
-        windows = [split(log, treatment, hold_out) for log in seen]
+        windows = [split_hold_out(log, treatment, hold_out) for log in seen]
         late = [LogSegment(log, w) for log, (_, w) in zip(seen, windows, strict=True) if w is not None]
         borders = [math.inf if w is None else w.start for _, w in windows]
         return cls(
@@ -104,7 +110,7 @@ class HoldOutLogs:
     def _rows(
         self, parts: Sequence[LogSegment], observation: Observation, base: BaseParameters
     ) -> RecordedRows:
-        logs = [part.log for part in watched(parts, "estimating", self.progress)]
+        logs = [part.log for part in with_progress(parts, "estimating", self.progress)]
         windows = [part.window for part in parts]
         treatment = self.treatment
         return RecordedRows(observation, base, logs, windows, treatment.decimation, treatment.mask_standstill)

@@ -26,7 +26,7 @@ _SAMPLES = 40_000
 
 
 @dataclass(frozen=True)
-class Treatment:
+class Preprocessing:
     """Low-pass of the positions, decimation, and whether standstill is masked; `proposed` names what robot.yaml lacks.
 
     `choice` is that of a cut-off by cross-validation, None where the spectrum alone tells it.
@@ -41,7 +41,7 @@ class Treatment:
 
 def choose_preprocessing(
     model: RobotModel, logs: Sequence[Path], *, flexible: bool = False, loaded: Sequence[bool] | None = None
-) -> Treatment:
+) -> Preprocessing:
     """Declared, or proposed from the fastest motion and the lowest sampling rate of `logs`.
 
     The cut-off is ten times the bandwidth (Gautier 1997), which is twice that of the velocities, unless a lower one predicts the torques of
@@ -51,7 +51,7 @@ def choose_preprocessing(
     """
     declared = model.config.dynamics
     if declared.cutoff_hz is not None and declared.decimation is not None:
-        return Treatment(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
+        return Preprocessing(declared.cutoff_hz, Decimation(declared.decimation), declared.mask_standstill)
     found = [motion_bandwidth(log_blocks(log, model)) for log in logs]
     for log, motion in zip(logs, found, strict=True):
         if motion.frequency_hz == 0:
@@ -68,7 +68,7 @@ def choose_preprocessing(
         if choice is not None:
             wanted, rows_hz = choice.cutoff_hz, min(rows_hz, _ROWS * choice.cutoff_hz)
     proposed = tuple(key for key in ("cutoff_hz", "decimation") if getattr(declared, key) is None)
-    return Treatment(
+    return Preprocessing(
         float(f"{wanted:.2g}") if declared.cutoff_hz is None else declared.cutoff_hz,
         Decimation.near(rate / rows_hz) if declared.decimation is None else Decimation(declared.decimation),
         declared.mask_standstill,
@@ -89,7 +89,7 @@ def _chosen(
     return choose_cutoff(model, list(loads.values()), proposed_hz)
 
 
-def preprocessing_document(treatment: Treatment, logs: Sequence[JointLog]) -> dict[str, Any]:
+def preprocessing_document(treatment: Preprocessing, logs: Sequence[JointLog]) -> dict[str, Any]:
     """The entry `signals` of results.json: filters, and what was done with the time stamps of each log where they are not uniform."""
     return {
         "cutoff_hz": treatment.cutoff_hz,

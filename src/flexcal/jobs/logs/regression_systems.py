@@ -13,7 +13,7 @@ import numpy as np
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.regression import ExperimentSystem, experiment_system
 from flexcal.dynamics.signals import JointLog, Window
-from flexcal.jobs.logs.preprocessing import Treatment
+from flexcal.jobs.logs.preprocessing import Preprocessing
 from flexcal.jobs.logs.worker_processes import WorkerTask, start_workers
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
@@ -31,7 +31,7 @@ class LogSegment:
 
 
 def read_logs(
-    paths: Sequence[Path], model: RobotModel, treatment: Treatment, scratch: Path, *, jobs: int
+    paths: Sequence[Path], model: RobotModel, treatment: Preprocessing, scratch: Path, *, jobs: int
 ) -> list[JointLog]:
     """The logs, filtered into files of the folder `scratch`, so many at once as there are `jobs` (processes).
 
@@ -51,7 +51,7 @@ def read_logs(
 def assemble_log_systems(
     parts: Sequence[LogSegment],
     observation: Observation,
-    treatment: Treatment,
+    treatment: Preprocessing,
     *,
     batches: int,
     jobs: int,
@@ -64,7 +64,8 @@ def assemble_log_systems(
     if jobs == 1:
         progress("reading", 0.0)
         found = [
-            _log_system(part, observation, treatment, batches) for part in watched(parts, "reading", progress)
+            _log_system(part, observation, treatment, batches)
+            for part in with_progress(parts, "reading", progress)
         ]
         progress("reading", 1.0)
         return found
@@ -81,7 +82,7 @@ def assemble_log_systems(
     return found
 
 
-def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window, Window | None]:
+def split_hold_out(log: JointLog, treatment: Preprocessing, hold_out: float) -> tuple[Window, Window | None]:
     """What of a log is fitted, and its last share `hold_out` of time, if there is one; the filters reach from neither into the other."""
     if hold_out == 0:
         return Window(), None
@@ -90,7 +91,7 @@ def split(log: JointLog, treatment: Treatment, hold_out: float) -> tuple[Window,
     return Window(end=float(np.nextafter(border - reach, -math.inf))), Window(start=border)
 
 
-def watched(parts: Sequence[LogSegment], stage: str, progress: Progress) -> list[LogSegment]:
+def with_progress(parts: Sequence[LogSegment], stage: str, progress: Progress) -> list[LogSegment]:
     """The parts, of which every pass over all of them is told to `progress` as a `stage`."""
 
     def told(number: int, until: float) -> Callable[[float], None]:
@@ -105,7 +106,7 @@ def watched(parts: Sequence[LogSegment], stage: str, progress: Progress) -> list
 
 
 def _log_system(
-    part: LogSegment, observation: Observation, treatment: Treatment, batches: int
+    part: LogSegment, observation: Observation, treatment: Preprocessing, batches: int
 ) -> ExperimentSystem:
     return experiment_system(
         observation,

@@ -9,7 +9,7 @@ import numpy as np
 from flexcal.dynamics.diagnostics import TorquePrediction, predict_torques
 from flexcal.dynamics.inverse_model import Observation
 from flexcal.dynamics.signals import JointLog
-from flexcal.jobs.logs.preprocessing import Treatment
+from flexcal.jobs.logs.preprocessing import Preprocessing
 from flexcal.progress import Progress
 
 _POINTS = 6000
@@ -22,7 +22,7 @@ def predict_log_torques(
     logs: Sequence[JointLog],
     held_out_from: Sequence[float],
     predicted: Sequence[tuple[Observation, np.ndarray]],
-    treatment: Treatment,
+    treatment: Preprocessing,
     *,
     progress: Progress,
 ) -> list[TorquePrediction]:

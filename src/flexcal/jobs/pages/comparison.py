@@ -9,7 +9,7 @@ from typing import Any
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.files.formats import read_estimates
-from flexcal.jobs.pages.report import lacking
+from flexcal.jobs.pages.report import missing_key_error
 from flexcal.jobs.result_files import (
     ESTIMATES,
     RESULTS,
@@ -61,7 +61,7 @@ def _run(folder: Path, name: str) -> Run:
     try:
         return _left(folder, name)
     except KeyError as problem:
-        raise lacking(folder, problem) from problem
+        raise missing_key_error(folder, problem) from problem
 
 
 def _left(folder: Path, name: str) -> Run:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
-from flexcal.jobs.pages.report import calibration_study, lacking
+from flexcal.jobs.pages.report import calibration_study, missing_key_error
 from flexcal.jobs.result_files import read_points, read_results
 from flexcal.report.checks import Trust
 from flexcal.report.pages import CustomerStudy, calibration_checks, verification_checks, write_customer_report
@@ -37,5 +37,5 @@ def customer_report(folder: Path, particulars: MeasurementDetails) -> Path:
             )
         write_customer_report(path, CustomerStudy(results, points, trust, input_files(origin), particulars))
     except KeyError as problem:
-        raise lacking(folder, problem) from problem
+        raise missing_key_error(folder, problem) from problem
     return path

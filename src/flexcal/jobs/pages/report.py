@@ -11,7 +11,7 @@ from flexcal.data.poses import DEFAULT_SIGMA
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.jobs.inputs import FREQUENCY_PLAN
 from flexcal.jobs.result_files import (
@@ -59,7 +59,7 @@ def report_folder(folder: Path) -> Path:
 
     Raises `InputError` where there are no results, or none that a report could show, and where a file cannot be read.
     """
-    if not current(folder / RESULTS).is_file():
+    if not current_path(folder / RESULTS).is_file():
         raise InputError(
             f"{folder} holds no {RESULTS}; give the folder that demo, an identify verb, calibrate or verify wrote with --out."
         )
@@ -95,11 +95,11 @@ def report_folder(folder: Path) -> Path:
                 f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these."
             )
     except KeyError as problem:
-        raise lacking(folder, problem) from problem
+        raise missing_key_error(folder, problem) from problem
     return path
 
 
-def lacking(folder: Path, problem: KeyError) -> InputError:
+def missing_key_error(folder: Path, problem: KeyError) -> InputError:
     """Of a results.json that lacks a key."""
     return InputError(
         f"{folder / RESULTS} lacks {problem}, as if another program or an older flexcal had written it; run the verb that writes it again."

@@ -13,7 +13,7 @@ from flexcal.dynamics.payload import FlexibilityCorrection, PayloadEquations, Pa
 from flexcal.dynamics.regression import RegressionData, batches_each
 from flexcal.dynamics.signals import JointLog, Window
 from flexcal.estimation import Estimate
-from flexcal.jobs.logs import LogSegment, Treatment, assemble_log_systems, predict_log_torques
+from flexcal.jobs.logs import LogSegment, Preprocessing, assemble_log_systems, predict_log_torques
 from flexcal.model.robot import RobotModel
 from flexcal.progress import silent
 
@@ -25,7 +25,7 @@ class PayloadLogEquations:
     logs: Sequence[JointLog]
     observations: Sequence[Observation]
     equations: PayloadEquations
-    treatment: Treatment
+    treatment: Preprocessing
 
     @classmethod
     def of(
@@ -35,7 +35,7 @@ class PayloadLogEquations:
         loaded: Sequence[bool],
         dynamics: Estimate | None,
         sources: tuple[str, ...],
-        treatment: Treatment,
+        treatment: Preprocessing,
     ) -> PayloadLogEquations:
         """With springs that yield under the payload of the `model`; raises `FlexcalError` as `FlexibilityCorrection` and
         `experiment_system` do.

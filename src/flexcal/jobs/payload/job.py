@@ -11,14 +11,14 @@ from typing import Any
 import numpy as np
 
 from flexcal.data.recordings import Decimation
-from flexcal.dynamics.payload import PayloadFit, error_sources, identify_payload
+from flexcal.dynamics.payload import PayloadFit, identify_payload, uncertain_parameters
 from flexcal.dynamics.signals import JointLog, log_blocks
 from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, provenance, read_estimates, sha256_of
 from flexcal.jobs.inputs import require_distinct_files, stored_estimates
 from flexcal.jobs.logs import (
-    Treatment,
+    Preprocessing,
     choose_preprocessing,
     preprocessing_document,
     read_logs,
@@ -38,7 +38,7 @@ from flexcal.jobs.result_files import (
     write_predictions,
     write_results,
 )
-from flexcal.model.robot import PAYLOAD_FRAME, RobotModel, holding, last_frame, torque_units, with_blocks
+from flexcal.model.robot import PAYLOAD_FRAME, RobotModel, last_frame, torque_units, with_blocks, with_payload
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, payload_checks
 
@@ -191,7 +191,7 @@ def identify_robot_payload(
             )
             model = model.with_values(rough.estimate.values)
         progress("payload", _ROUGH / (_ROUGH + 1))
-        system = PayloadLogEquations.of(model, read, carries, known, error_sources(model), treatment)
+        system = PayloadLogEquations.of(model, read, carries, known, uncertain_parameters(model), treatment)
         fit = identify_payload(system.equations)
         model = model.with_values(fit.estimate.values)
         predictions = [] if out is None else system.predictions(fit)
@@ -237,7 +237,7 @@ def _held(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
     declared = model.nominal_payload
     if declared is None:
         place = frame or last_frame(model)
-        return holding(model, place, 1.0, np.zeros(3), np.zeros((3, 3))), place
+        return with_payload(model, place, 1.0, np.zeros(3), np.zeros((3, 3))), place
     if frame not in ("", declared.frame):
         raise InputError(
             f"--frame is '{frame}', but {model.path} declares the payload in '{declared.frame}'; leave --frame out, or correct robot.yaml."
@@ -245,7 +245,7 @@ def _held(model: RobotModel, frame: str) -> tuple[RobotModel, str]:
     return model, declared.frame
 
 
-def _slow(treatment: Treatment, model: RobotModel, logs: Sequence[Path]) -> Treatment:
+def _slow(treatment: Preprocessing, model: RobotModel, logs: Sequence[Path]) -> Preprocessing:
     """With rows no closer than springs allow."""
     if not model.elastic:
         return treatment

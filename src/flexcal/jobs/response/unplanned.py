@@ -15,12 +15,12 @@ from flexcal.elasticity.modal import (
     IdentifiedModes,
     Peak,
     Resonance,
-    about_at,
     antiresonances,
     identify_masses,
     identify_modes,
     misfit,
     peaks,
+    refined_response_at,
     resonances,
 )
 from flexcal.errors import FlexcalError, InputError
@@ -33,10 +33,10 @@ from flexcal.frequency.arbitrary import (
     LocalResponse,
     RecordSpectra,
     Tones,
+    detect_tones,
     excited_band,
     half_difference,
     local_response,
-    tones,
 )
 from flexcal.importing.columns import ResponseRecords, read_response_records
 from flexcal.jobs.response.feedback import FeedbackCheck
@@ -254,7 +254,7 @@ def _identified(
 ) -> IdentifiedExcitation:
     found = measure_spectra(measured, options.hold)
     measured, period = found.measured, found.period
-    spectra = _in_band(found.whole, found.usable, options.band, files, tones(found.pieces))
+    spectra = _in_band(found.whole, found.usable, options.band, files, detect_tones(found.pieces))
     identified = identify_modes(spectra, local_response(spectra), modes=options.modes, progress=progress)
     masses = identify_masses(identified.fit, identified.response, options.masses)
     return IdentifiedExcitation(
@@ -315,7 +315,7 @@ def _halves(spectra: RecordSpectra, identified: IdentifiedModes) -> HalfDifferen
         return None
     try:
         first, second = (
-            about_at(spectra.of_records(part), identified.fit.model, identified.response)
+            refined_response_at(spectra.of_records(part), identified.fit.model, identified.response)
             for part in (slice(0, records // 2), slice(records // 2, None))
         )
     except FlexcalError:

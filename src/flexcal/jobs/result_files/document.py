@@ -10,7 +10,7 @@ from typing import Any, Literal, get_args
 from flexcal.errors import InputError, unreadable
 from flexcal.estimation import Dropped, Estimate, Identifiability
 from flexcal.files.formats import json_values
-from flexcal.files.transaction import current, settle, write_text
+from flexcal.files.transaction import current_path, recover, write_text
 
 RESULTS = "results.json"
 
@@ -57,10 +57,10 @@ def write_results(folder: Path, document: Mapping[str, Any]) -> None:
 
 def read_results(folder: Path) -> dict[str, Any]:
     """The document that a verb left in `folder`; raises `InputError` where there is none, and for one of another schema."""
-    settle(folder)
+    recover(folder)
     path = folder / RESULTS
     try:
-        document = json.loads(current(path).read_text(encoding="utf-8"))
+        document = json.loads(current_path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as problem:
         raise unreadable(path, problem, AGAIN) from problem
     if not isinstance(document, dict):

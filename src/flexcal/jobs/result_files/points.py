@@ -20,7 +20,7 @@ from flexcal.calibration.verification import (
 from flexcal.data.poses import PoseSet
 from flexcal.errors import InputError, unreadable
 from flexcal.files.formats import ArrayForm, NpzFile, write_npz
-from flexcal.files.transaction import atomic_path, current
+from flexcal.files.transaction import atomic_path, current_path
 from flexcal.jobs.result_files.document import AGAIN
 from flexcal.units import LARGEST
 
@@ -61,7 +61,9 @@ def read_points(folder: Path, *, sigma: float) -> MeasuredPoints:
     """
     path = folder / POINTS
     try:
-        table = pl.read_csv(current(path).read_bytes(), schema_overrides=dict.fromkeys(_TEXTS, pl.String))
+        table = pl.read_csv(
+            current_path(path).read_bytes(), schema_overrides=dict.fromkeys(_TEXTS, pl.String)
+        )
         joints = [name for name in table.columns if name.startswith("q") and name[1:].isdigit()]
 
         def vectors(prefix: str) -> np.ndarray:
@@ -144,7 +146,7 @@ def write_loads(folder: Path, loads: GravityLoads) -> None:
 def read_loads(folder: Path) -> GravityLoads | None:
     """What `write_loads` left, None without the file, as in folders of an older flexcal; raises `InputError` where it cannot be read."""
     path = folder / LOADS
-    if not current(path).is_file():
+    if not current_path(path).is_file():
         return None
     file = NpzFile(path, AGAIN)
     loads = ArrayForm("real", ("points", "joints"))

@@ -11,7 +11,7 @@ import polars as pl
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, OWN, RIGID, MeasuredPoints
 from flexcal.data.poses import PoseSet
 from flexcal.errors import unreadable
-from flexcal.files.transaction import atomic_path, current
+from flexcal.files.transaction import atomic_path, current_path
 from flexcal.jobs.result_files.document import AGAIN
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def write_verification(path: Path, run: TwoStageRun) -> None:
 def read_verification(path: Path) -> tuple[MeasuredPoints, MeasuredPoints]:
     """The fresh poses that `write_verification` left, as the tracker read them and in truth; raises `InputError` where it cannot."""
     try:
-        table = pl.read_csv(current(path).read_bytes())
+        table = pl.read_csv(current_path(path).read_bytes())
 
         def vectors(prefix: str) -> np.ndarray:
             return table.select([f"{prefix}{axis}" for axis in "xyz"]).cast(pl.Float64).to_numpy()

@@ -22,8 +22,8 @@ from flexcal.errors import InputError
 from flexcal.importing.columns import (
     TOOL,
     ColumnAssignment,
-    Guess,
-    Misfit,
+    NominalMismatch,
+    RecognisedColumns,
     UnusedColumn,
     apply_map,
     check_nominal,
@@ -64,7 +64,7 @@ class ImportedFile:
     placed: tuple[ColumnAssignment, ...]
     left_out: tuple[UnusedColumn, ...]
     columns: dict[str, np.ndarray]
-    misfit: Misfit | None
+    misfit: NominalMismatch | None
     remarks: tuple[str, ...]
     out: Path | None
     model: RobotModel
@@ -175,8 +175,8 @@ def import_file(
 
 
 def _kind(
-    foreign: ForeignTable, guess: Guess, model: RobotModel
-) -> tuple[Literal["poses", "log", "joints"], Guess]:
+    foreign: ForeignTable, guess: RecognisedColumns, model: RobotModel
+) -> tuple[Literal["poses", "log", "joints"], RecognisedColumns]:
     """What the file holds, and the guess with what belongs to that only, in the order of the columns to write."""
     unsure = [left for left in guess.left_out if "could both be" in left.why]
     if "q" not in guess.placed or (unsure and not {"xyz", "length", "t"} & guess.placed.keys()):
@@ -214,11 +214,11 @@ def _kind(
         for name, column in guess.texts.items()
         if name not in texts
     ]
-    return kind, Guess(placed, texts, (*guess.left_out, *left))
+    return kind, RecognisedColumns(placed, texts, (*guess.left_out, *left))
 
 
 def _converted(
-    foreign: ForeignTable, guess: Guess, model: RobotModel
+    foreign: ForeignTable, guess: RecognisedColumns, model: RobotModel
 ) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     """Columns (N,) by flexcal's names, and quantities (N, m); raises `InputError` at the first value that is missing."""
     columns: dict[str, np.ndarray] = {}
@@ -255,7 +255,7 @@ def _converted(
 
 def _check_poses(
     foreign: ForeignTable,
-    guess: Guess,
+    guess: RecognisedColumns,
     model: RobotModel,
     columns: dict[str, np.ndarray],
     values: dict[str, np.ndarray],
@@ -293,7 +293,7 @@ def _check_sigma(sigma: float, file: Path, kind: str, stated: set[str]) -> None:
         )
 
 
-def _check_time(foreign: ForeignTable, guess: Guess, t: np.ndarray) -> None:
+def _check_time(foreign: ForeignTable, guess: RecognisedColumns, t: np.ndarray) -> None:
     if (np.diff(t) <= 0).any():
         row = int(np.argmax(np.diff(t) <= 0)) + 1
         raise foreign.table.error(
@@ -302,8 +302,8 @@ def _check_time(foreign: ForeignTable, guess: Guess, t: np.ndarray) -> None:
 
 
 def _misfit(
-    guess: Guess, model: RobotModel, columns: dict[str, np.ndarray], values: dict[str, np.ndarray]
-) -> Misfit | None:
+    guess: RecognisedColumns, model: RobotModel, columns: dict[str, np.ndarray], values: dict[str, np.ndarray]
+) -> NominalMismatch | None:
     """That of the largest group of rows with one station and target."""
     if "xyz" not in values or not model.points:
         return None

@@ -10,7 +10,7 @@ import numpy as np
 
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
-from flexcal.files.transaction import current, write_text
+from flexcal.files.transaction import current_path, write_text
 from flexcal.model.robot import RobotConfig
 
 _DIGITS = 6
@@ -22,7 +22,7 @@ def write_point_position(robot: Path, name: str, xyz: np.ndarray) -> None:
 
     Raises `InputError`, and changes nothing, where the file says it in a way that cannot be replaced.
     """
-    text = current(robot).read_text(encoding="utf-8")
+    text = current_path(robot).read_text(encoding="utf-8")
     before = read_yaml_file(robot).structure(RobotConfig)
     place = tuple(round(float(value), _DIGITS) for value in xyz)
     told = ", ".join(f"{value:.{_DIGITS}f}" for value in place)

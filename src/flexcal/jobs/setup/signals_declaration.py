@@ -9,7 +9,7 @@ from typing import Any
 
 from flexcal.errors import InputError
 from flexcal.files.formats import read_yaml_file
-from flexcal.files.transaction import current, write_text
+from flexcal.files.transaction import current_path, write_text
 from flexcal.model.robot import RobotModel
 
 
@@ -33,7 +33,7 @@ def add_signals(robot: Path, signals: Mapping[str, Mapping[str, Any]]) -> None:
         if all(declared.get(quantity) == dict(entry) for quantity, entry in signals.items()):
             return
         raise InputError(f"{robot} has `signals:` already, which is not changed; replace it by: {block}")
-    text = current(robot).read_text(encoding="utf-8")
+    text = current_path(robot).read_text(encoding="utf-8")
     write_text(robot, f"{text}{'' if text.endswith(chr(10)) else chr(10)}\n{block}")
     try:
         RobotModel.from_yaml(robot, estimates=False)

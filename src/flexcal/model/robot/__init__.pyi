@@ -1,5 +1,5 @@
 from .arm_sensor import ArmSensor, mounting_names, sensitivity_name, sensor_column, sensor_delay_name
-from .attached_payload import carried_inertias, holding, last_frame, with_point_at_frame
+from .attached_payload import carried_inertias, with_payload, last_frame, with_point_at_frame
 from .config import AcceptanceConfig, DynamicsConfig, RobotConfig, SignalConfig
 from .parameter_names import (
     FRICTION_PARAMETERS,
@@ -25,7 +25,7 @@ from .prior_parameters import (
     FRICTION_TOLERANCE,
     LENGTH_TOLERANCE,
     SHARED_DISTORTION,
-    declared,
+    declared_parameter,
     elastic_inertials,
     sensor_parameters,
     springs_and_rotors,
@@ -60,9 +60,8 @@ __all__ = [
     "RobotModel",
     "SignalConfig",
     "carried_inertias",
-    "declared",
+    "declared_parameter",
     "elastic_inertials",
-    "holding",
     "last_frame",
     "mounting_names",
     "propagated_covariance_root",
@@ -79,5 +78,6 @@ __all__ = [
     "unit_of",
     "unknown_parallel",
     "with_blocks",
+    "with_payload",
     "with_point_at_frame",
 ]

@@ -22,7 +22,9 @@ def last_frame(model: RobotModel) -> str:
     return model.joints[-1].link
 
 
-def holding(model: RobotModel, frame: str, mass: float, com: np.ndarray, inertia: np.ndarray) -> RobotModel:
+def with_payload(
+    model: RobotModel, frame: str, mass: float, com: np.ndarray, inertia: np.ndarray
+) -> RobotModel:
     """`model` with a payload of `mass` (kg) in the URDF frame `frame`, as if robot.yaml declared it.
 
     `com` (3,) m and `inertia` (3, 3) kg m² about it are in that frame. Raises `InputError` for a frame that the URDF lacks or that no

@@ -99,7 +99,7 @@ def unknown_parallel(model: RobotModel, joint: str) -> tuple[str, ...]:
     return tuple(found)
 
 
-def locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
+def parameter_locations(model: RobotModel) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Every parameter name of a robot → (array attribute of `RobotModel`, index into it).
 
     Inertia entries of links (`<link>.Ixx`…, at the joint frame) and first moments (`<link>.mc_x`…) are not here: they depend on mass and

@@ -86,21 +86,21 @@ def springs_and_rotors(model: RobotModel) -> tuple[Parameter, ...]:
         width = SPRING_LOG_STD if known else FURTHER_SPRING_LOG_STD
         return Parameter(name, unit_of(name), value, lower=softest, prior_std=width, scale="log")
 
-    return (*map(spring, names), *(declared(model, name) for name in rotors))
+    return (*map(spring, names), *(declared_parameter(model, name) for name in rotors))
 
 
 def elastic_inertials(model: RobotModel, *, loaded: bool) -> list[Parameter]:
     """What robot.yaml leaves uncertain of the links that an elastic joint moves and, where `loaded`, the payload's mass."""
     elastic = {joint.index for joint in model.elastic}
     moved = [i for i in range(model.n) if not elastic.isdisjoint(model.path_to(i))]
-    items = [declared(model, name) for name in uncertain_inertials(model, moved)]
+    items = [declared_parameter(model, name) for name in uncertain_inertials(model, moved)]
     held = model.payload
     if loaded and held is not None and held.mass > 0 and uncertain_payload(model):
-        items.append(declared(model, "payload.mass"))
+        items.append(declared_parameter(model, "payload.mass"))
     return items
 
 
-def declared(model: RobotModel, name: str) -> Parameter:
+def declared_parameter(model: RobotModel, name: str) -> Parameter:
     """A parameter at the model's value, with what robot.yaml and workshop tolerances say of it as its prior.
 
     Mass, rotor inertia and stiffness are estimated as logarithms. A link's inertia about its centre of mass goes with its mass and has no

@@ -14,7 +14,7 @@ import numpy as np
 from flexcal.errors import FlexcalError
 from flexcal.estimation import Estimate
 from flexcal.files.structuring import suggestion
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.kernels import Tree
 from flexcal.model.parts import (
     Bearings,
@@ -31,7 +31,7 @@ from flexcal.model.parts import (
 )
 from flexcal.model.robot.arm_sensor import ArmSensor
 from flexcal.model.robot.config import ControllerConfig, PriorConfig, RobotConfig
-from flexcal.model.robot.parameter_names import locations
+from flexcal.model.robot.parameter_names import parameter_locations
 from flexcal.model.robot.posterior import NOTHING_ESTIMATED, Posterior
 
 _MOMENTS = {"Ixx": (0, 0), "Ixy": (0, 1), "Ixz": (0, 2), "Iyy": (1, 1), "Iyz": (1, 2), "Izz": (2, 2)}
@@ -99,7 +99,7 @@ class RobotModel:
 
         model = cls(**robot_parts(Path(path)))
         stored = model.path.parent / model.config.estimates
-        return apply_estimates(model, stored) if estimates and current(stored).exists() else model
+        return apply_estimates(model, stored) if estimates and current_path(stored).exists() else model
 
     def __getstate__(self) -> dict[str, Any]:
         """Without the kernels' view, which is built anew where the robot arrives: other processes can be handed robots."""
@@ -274,7 +274,7 @@ class RobotModel:
 
     @cached_property
     def _locations(self) -> dict[str, tuple[str, tuple[int, ...]]]:
-        return locations(self)
+        return parameter_locations(self)
 
     @cached_property
     def values(self) -> Mapping[str, float]:

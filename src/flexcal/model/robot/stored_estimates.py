@@ -14,7 +14,7 @@ from flexcal.errors import InputError
 from flexcal.estimation import Estimate
 from flexcal.files.formats import Block, read_estimates
 from flexcal.model.parts import Bearings, is_physically_consistent
-from flexcal.model.robot.attached_payload import holding
+from flexcal.model.robot.attached_payload import with_payload
 from flexcal.model.robot.parameter_names import unit_in, unit_of
 
 if TYPE_CHECKING:
@@ -99,7 +99,7 @@ def _with_payload(model: RobotModel, estimate: Estimate, path: Path) -> RobotMod
     if declared is None:
         values = estimate.values
         com = np.array([values[f"payload.com_{key}"] for key in "xyz"])
-        return holding(model, frame, values["payload.mass"], com, np.zeros((3, 3)))
+        return with_payload(model, frame, values["payload.mass"], com, np.zeros((3, 3)))
     if declared.frame != frame:
         raise InputError(
             f"{path}: the payload was identified in the frame '{frame}', but {model.path} declares it in '{declared.frame}'; run "

@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from flexcal.errors import InputError
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.model.parts import Inertia, Joint, normals_to
 from flexcal.model.urdf.checks import carried_links
 from flexcal.model.urdf.elements import read_elements
@@ -50,7 +50,7 @@ def read_urdf(path: Path, locked: Mapping[str, float]) -> Description:
     """
     import pinocchio as pin
 
-    if not current(path).is_file():
+    if not current_path(path).is_file():
         raise InputError(f"{path}: there is no such URDF file; correct `robot:` in robot.yaml.")
     robot = read_elements(path)
     links = carried_links(robot, locked)

@@ -11,7 +11,7 @@ from xml.sax.saxutils import quoteattr
 import numpy as np
 
 from flexcal.errors import InputError, unreadable
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.units import LARGEST
 
 _DEEPEST = 50
@@ -83,7 +83,7 @@ def read_elements(path: Path) -> Element:
     parser.StartElementHandler = start
     parser.EndElementHandler = lambda tag: above.pop()
     try:
-        content = current(path).read_bytes()
+        content = current_path(path).read_bytes()
     except OSError as problem:
         raise unreadable(path, problem, "check the file") from problem
     try:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from flexcal.errors import InputError
 from flexcal.files.structuring import suggestion
-from flexcal.files.transaction import current
+from flexcal.files.transaction import current_path
 from flexcal.model.urdf.checks import carried_links
 from flexcal.model.urdf.elements import Element, read_elements
 
@@ -49,7 +49,7 @@ def find_arm(path: Path, tip: str | None = None) -> Arm:
         )
     if path.is_dir():
         raise InputError(f"{path} is a folder; name the robot's URDF in it.")
-    if not current(path).is_file():
+    if not current_path(path).is_file():
         raise InputError(f"{path}: there is no such file; name the robot's URDF.")
     root = read_elements(path)
     joints = {joint.attributes.get("name", ""): joint for joint in root.all("joint")}

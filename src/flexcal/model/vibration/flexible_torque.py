@@ -85,7 +85,7 @@ def _loads(
     stiffness, damping = (
         np.array([values[axis] for axis in axes]) for values in (model.stiffness, model.damping)
     )
-    half_gap = np.array([model.backlash[joint] if component == 2 else 0.0 for joint, component in axes])
+    half_backlash = np.array([model.backlash[joint] if component == 2 else 0.0 for joint, component in axes])
     rigid = np.zeros((3, count, arm.model.nv))
     rigid[:, :, arm.joint_velocity] = motion[0] + model.geometry[:, 0], motion[1], motion[2]
     state, torque, bent = rigid, np.empty(rigid.shape[1:]), np.zeros((3, count, len(axes)))
@@ -96,5 +96,5 @@ def _loads(
             break
         bent = derivatives(-(torque[:, arm.elastic] + damping * bent[1]) / stiffness)
         state = rigid.copy()
-        state[:, :, arm.elastic] += bent if flanks is None else bent + half_gap * flanks
+        state[:, :, arm.elastic] += bent if flanks is None else bent + half_backlash * flanks
     return torque

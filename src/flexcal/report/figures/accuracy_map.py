@@ -9,7 +9,7 @@ import plotly.graph_objects as go
 
 from flexcal.calibration.accuracy import AccuracyMap
 from flexcal.report.figures.robot_arm import space_axes
-from flexcal.report.layout import ELASTIC, GRID, RIGID, canvas, panels, single
+from flexcal.report.layout import ELASTIC, GRID, RIGID, as_float32, canvas, panels
 from flexcal.units import MILLIMETRE
 
 COLOURS = [[0, GRID], [0.5, ELASTIC], [1, RIGID]]
@@ -24,19 +24,19 @@ def accuracy_space(found: AccuracyMap) -> go.Figure:
     figure = canvas(560, legend=False)
     figure.add_trace(
         go.Scatter3d(
-            x=single(at[:, 0]),
-            y=single(at[:, 1]),
-            z=single(at[:, 2]),
+            x=as_float32(at[:, 0]),
+            y=as_float32(at[:, 1]),
+            z=as_float32(at[:, 2]),
             mode="markers",
             marker={
                 "size": 3,
-                "color": single(error),
+                "color": as_float32(error),
                 "colorscale": COLOURS,
                 "cmin": 0.0,
                 "cmax": float(np.quantile(error, 0.995)),
                 "colorbar": colour_bar(),
             },
-            text=single(error),
+            text=as_float32(error),
             hovertemplate="95 % within %{text:.3f} mm<extra></extra>",
         )
     )
@@ -77,9 +77,9 @@ def accuracy_views(found: AccuracyMap) -> go.Figure:
         largest = max(largest, float(np.nanmax(mean)))
         figure.add_trace(
             go.Heatmap(
-                x=single((x_edges[1:] + x_edges[:-1]) / 2),
-                y=single((y_edges[1:] + y_edges[:-1]) / 2),
-                z=single(mean.T),
+                x=as_float32((x_edges[1:] + x_edges[:-1]) / 2),
+                y=as_float32((y_edges[1:] + y_edges[:-1]) / 2),
+                z=as_float32(mean.T),
                 coloraxis="coloraxis",
                 hoverongaps=False,
                 hovertemplate="%{x:.2f}, %{y:.2f} m: 95 % within %{z:.3f} mm<extra></extra>",

@@ -9,7 +9,17 @@ import plotly.graph_objects as go
 
 from flexcal.calibration.verification import CALIBRATED, NOMINAL, Verification
 from flexcal.report.figures.pose_errors import ErrorSeries
-from flexcal.report.layout import AXIS, ELASTIC, GRID, INK, QUIET, canvas, millimetre_axis, positive, single
+from flexcal.report.layout import (
+    AXIS,
+    ELASTIC,
+    GRID,
+    INK,
+    QUIET,
+    as_float32,
+    canvas,
+    millimetre_axis,
+    positive,
+)
 from flexcal.report.layout import NOMINAL as GREY
 from flexcal.units import MILLIMETRE
 
@@ -26,7 +36,7 @@ def error_distribution(
         figure.add_trace(
             go.Scatter(
                 x=positive(distance),
-                y=single(share),
+                y=as_float32(share),
                 mode="lines",
                 line={"color": item.colour, "width": 2.5, "shape": "hv"},
                 name=item.name,
@@ -84,7 +94,7 @@ def error_histogram(errors: Mapping[str, np.ndarray]) -> go.Figure:
         outline = np.repeat(edges, 2)[1:-1]
         figure.add_trace(
             go.Scatter(
-                x=single(outline), y=single(np.repeat(share, 2)), mode="lines", fill="tozeroy", name=label,
+                x=as_float32(outline), y=as_float32(np.repeat(share, 2)), mode="lines", fill="tozeroy", name=label,
                 line={"color": colour, "width": 1.5}, opacity=0.7,
                 hovertemplate="%{x:.3f} mm: %{y:.1f} % of points",
             )
@@ -120,7 +130,7 @@ def predicted_quantiles(verification: Verification) -> go.Figure:
     )  # fmt: skip
     figure.add_trace(
         go.Scatter(
-            x=single(expected), y=single(observed), mode="markers",
+            x=as_float32(expected), y=as_float32(observed), mode="markers",
             marker={"color": ELASTIC, "size": 6, "line": {"width": 0}},
             name="verification poses, sorted", hovertemplate="predicted %{x:.3f} mm<br>observed %{y:.3f} mm<extra></extra>",
         )

@@ -18,10 +18,10 @@ from flexcal.report.layout import (
     PAGE,
     QUIET,
     RIGID,
+    as_float32,
     canvas,
-    decades,
+    log_ticks,
     panels,
-    single,
     spring_label,
 )
 from flexcal.units import MILLIMETRE
@@ -50,10 +50,10 @@ def parameter_bars(estimate: Estimate, names: Sequence[str], axis: str) -> go.Fi
     figure = canvas(90 + 17 * len(chosen), legend=False)
     figure.add_trace(
         go.Bar(
-            x=single(value), y=chosen, orientation="h", marker={"color": ELASTIC, "opacity": 0.75},
+            x=as_float32(value), y=chosen, orientation="h", marker={"color": ELASTIC, "opacity": 0.75},
             error_x={
-                "type": "data", "symmetric": False, "array": single(ends[:, 1] - value),
-                "arrayminus": single(value - ends[:, 0]), "color": INK, "thickness": 1.2, "width": 3,
+                "type": "data", "symmetric": False, "array": as_float32(ends[:, 1] - value),
+                "arrayminus": as_float32(value - ends[:, 0]), "color": INK, "thickness": 1.2, "width": 3,
             },
             hovertemplate="%{y}: %{x:+.2f}<extra></extra>",
         )
@@ -87,12 +87,12 @@ def spring_intervals(
         base = np.array([reference[name] for name in known])
         figure.add_trace(
             go.Scatter(
-                x=single(100 * centre),
+                x=as_float32(100 * centre),
                 y=[spring_label(name) for name in known],
                 error_x={
                     "type": "data",
-                    "array": single(100 * (ends[:, 1] / base - 1 - centre)),
-                    "arrayminus": single(100 * (centre - ends[:, 0] / base + 1)),
+                    "array": as_float32(100 * (ends[:, 1] / base - 1 - centre)),
+                    "arrayminus": as_float32(100 * (centre - ends[:, 0] / base + 1)),
                     "color": ELASTIC,
                     "thickness": 2,
                     "width": 4,
@@ -152,8 +152,8 @@ def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: fl
         kept = number <= rank
         figure.add_trace(
             go.Scatter(
-                x=single(number),
-                y=single(np.maximum(sizes, _SMALLEST)),
+                x=as_float32(number),
+                y=as_float32(np.maximum(sizes, _SMALLEST)),
                 mode="markers",
                 marker={
                     "color": [ELASTIC if k else NOMINAL for k in kept],
@@ -175,7 +175,7 @@ def singular_values(values: np.ndarray, diagonal: np.ndarray, rank: int, gap: fl
             x=rank + 0.5, y=0.98, yref="paper", text=f"rank {rank}, {below}", showarrow=False,
             xanchor="right", xshift=-6, yanchor="top", font={"color": QUIET, "size": 12}, yshift=-150,
         )  # fmt: skip
-    figure.update_yaxes({"type": "log", "title": {"text": "relative to the largest"}} | decades(-18, 0, 3))
+    figure.update_yaxes({"type": "log", "title": {"text": "relative to the largest"}} | log_ticks(-18, 0, 3))
     figure.update_xaxes(title_text="number")
     return figure
 
@@ -187,7 +187,7 @@ def correlation_map(names: Sequence[str], correlation: np.ndarray) -> go.Figure:
         go.Heatmap(
             x=list(names),
             y=list(names),
-            z=single(correlation),
+            z=as_float32(correlation),
             zmin=-1,
             zmax=1,
             colorscale=[[0, RIGID], [0.5, PAGE], [1, ELASTIC]],
@@ -216,7 +216,7 @@ def term_scores(rows: Sequence[TermComparison], by: str = "folds") -> go.Figure:
     for name, (values, colour) in series.items():
         figure.add_trace(
             go.Bar(
-                x=single(np.array(values) / MILLIMETRE), y=labels, orientation="h", name=name, marker={"color": colour},
+                x=as_float32(np.array(values) / MILLIMETRE), y=labels, orientation="h", name=name, marker={"color": colour},
                 text=[f"{v / MILLIMETRE:.4f}" for v in values], textposition="auto", insidetextanchor="end", textangle=0,
                 insidetextfont={"size": 11, "color": PAGE}, outsidetextfont={"size": 11, "color": INK}, hovertemplate="%{y}: %{x:.4f} mm",
             )

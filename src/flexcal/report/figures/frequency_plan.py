@@ -12,7 +12,7 @@ from flexcal.data.plans import MultisinePlan
 from flexcal.model.kinematics import joint_origins
 from flexcal.model.robot import RobotModel
 from flexcal.report.figures.robot_arm import links_at, space_axes
-from flexcal.report.layout import AXIS, ELASTIC, NOMINAL, canvas, panels, single, spring_label
+from flexcal.report.layout import AXIS, ELASTIC, NOMINAL, as_float32, canvas, panels, spring_label
 
 
 def predicted_springs(planned: Mapping[str, float], flat: Mapping[str, float]) -> go.Figure:
@@ -23,7 +23,7 @@ def predicted_springs(planned: Mapping[str, float], flat: Mapping[str, float]) -
         for name, std, colour in (("flat", flat, NOMINAL), ("planned", planned, ELASTIC)):
             figure.add_trace(
                 go.Scatter(
-                    x=single([100 * std[n] for n in names]),
+                    x=as_float32([100 * std[n] for n in names]),
                     y=[spring_label(n) for n in names],
                     name=name,
                     legendgroup=name,
@@ -51,8 +51,8 @@ def poses_against_std(curve: np.ndarray, planned: int) -> go.Figure:
     for name, values, colour in (("at random", random, NOMINAL), ("chosen one by one", chosen, ELASTIC)):
         figure.add_trace(
             go.Scatter(
-                x=single(counts),
-                y=single(100 * values),
+                x=as_float32(counts),
+                y=as_float32(100 * values),
                 name=name,
                 mode="lines+markers",
                 line={"color": colour, "width": 2},
@@ -75,8 +75,8 @@ def amplitude_spectrum(plan: MultisinePlan, flat: MultisinePlan) -> go.Figure:
         for name, source, colour, width in (("flat", flat, NOMINAL, 1.6), ("planned", plan, ELASTIC, 2.0)):
             figure.add_trace(
                 go.Scatter(
-                    x=single(source.frequencies_hz),
-                    y=single(source.amplitude[k]),
+                    x=as_float32(source.frequencies_hz),
+                    y=as_float32(source.amplitude[k]),
                     name=name,
                     legendgroup=name,
                     showlegend=k == 0,
@@ -100,9 +100,9 @@ def planned_arm(model: RobotModel, q: np.ndarray) -> go.Figure:
     for number, corners in enumerate(arms, start=1):
         figure.add_trace(
             go.Scatter3d(
-                x=single(corners[:, 0]),
-                y=single(corners[:, 1]),
-                z=single(corners[:, 2]),
+                x=as_float32(corners[:, 0]),
+                y=as_float32(corners[:, 1]),
+                z=as_float32(corners[:, 2]),
                 mode="lines+markers",
                 name=f"pose {number}",
                 line={"width": 6, "color": ELASTIC},

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import plotly.graph_objects as go
 
-from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, decades, panels, positive, single
+from flexcal.report.layout import ELASTIC, INK, NOMINAL, RIGID, as_float32, log_ticks, panels, positive
 from flexcal.report.results import FittedResponse, MeasuredResponse
 
 FREQUENCY_TICKS = (1, 3, 10, 30, 100, 300)
@@ -32,7 +32,7 @@ def response_levels(responses: Sequence[MeasuredResponse], labels: Sequence[str]
                 for name, values, colour in curves:
                     figure.add_trace(
                         go.Scatter(
-                            x=single(response.frequencies_hz),
+                            x=as_float32(response.frequencies_hz),
                             y=positive(values[:, i, j]),
                             name=name,
                             legendgroup=name,
@@ -53,7 +53,7 @@ def response_levels(responses: Sequence[MeasuredResponse], labels: Sequence[str]
 def frequency_axes(figure: go.Figure, rows: int, columns: int) -> None:
     """Logarithmic axes for magnitudes against frequency; labels on the outer panels only, one range for all."""
     figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
-    figure.update_yaxes({"type": "log", "showticklabels": False, "matches": "y"} | decades(-9, 6))
+    figure.update_yaxes({"type": "log", "showticklabels": False, "matches": "y"} | log_ticks(-9, 6))
     figure.update_yaxes(matches=None, row=1, col=1)
     for column in range(columns):
         figure.update_xaxes(showticklabels=True, title_text="Hz", row=rows, col=column + 1)
@@ -81,7 +81,7 @@ def response_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> 
                     figure.add_trace(trace, row=i + 1, col=j + 1)
             for values, kind in pairs:
                 degrees = np.degrees(np.angle(values[:, i, i]))
-                trace = _trace(response.frequencies_hz, single(degrees), kind, label)
+                trace = _trace(response.frequencies_hz, as_float32(degrees), kind, label)
                 trace.update(showlegend=False, visible=number == 0)
                 trace.update(hovertemplate="%{x:.2f} Hz<br>%{y:.0f}°")
                 figure.add_trace(trace, row=n + 1, col=i + 1)
@@ -122,7 +122,7 @@ def sensor_fit(responses: Sequence[FittedResponse], labels: Sequence[str]) -> go
                     trace.update(hovertemplate=f"%{{x:.2f}} Hz<br>%{{y:.3g}} {units[name]} per N m")
                     figure.add_trace(trace, row=row, col=column + 1)
     figure.update_xaxes(type="log", tickvals=FREQUENCY_TICKS, showticklabels=False)
-    figure.update_yaxes({"type": "log", "showticklabels": False} | decades(-9, 6))
+    figure.update_yaxes({"type": "log", "showticklabels": False} | log_ticks(-9, 6))
     for column in range(len(joints)):
         figure.update_xaxes(showticklabels=True, title_text="Hz", row=len(names), col=column + 1)
     for row, name in enumerate(names, start=1):
@@ -142,7 +142,7 @@ def _trace(frequencies: np.ndarray, values: np.ndarray, kind: str, label: str) -
         else {"mode": "lines", "line": {"color": ELASTIC, "width": 1.8}}
     )
     return go.Scatter(
-        x=single(frequencies),
+        x=as_float32(frequencies),
         y=values,
         name="measured" if kind == "measured" else "fitted model",
         legendgroup=kind,
@@ -162,7 +162,7 @@ def bode(
 ) -> go.Figure:
     """Of one element: response (L,), its standard deviation (L,), the coherence (L,) and fitted responses (L,) by name."""
     figure = panels(3, 1, 640, ("magnitude", "phase", "coherence"), row_gap=0.08)
-    x = single(frequencies_hz)
+    x = as_float32(frequencies_hz)
     curves = [("measured", response, ELASTIC, "solid")]
     curves += [
         (name, values, colour, "dash")
@@ -187,7 +187,7 @@ def bode(
         figure.add_trace(
             go.Scatter(
                 x=x,
-                y=single(phase),
+                y=as_float32(phase),
                 name=name,
                 legendgroup=name,
                 showlegend=False,
@@ -213,7 +213,7 @@ def bode(
     figure.add_trace(
         go.Scatter(
             x=x,
-            y=single(coherence),
+            y=as_float32(coherence),
             showlegend=False,
             mode="lines",
             line={"color": ELASTIC, "width": 1.6},
@@ -225,7 +225,7 @@ def bode(
     ticks = [v * 10.0**p for p in range(-3, 4) for v in (1, 2, 5)]
     figure.update_xaxes(type="log", tickvals=ticks, ticktext=[f"{v:g}" for v in ticks])
     figure.update_xaxes(title_text="Hz", row=3, col=1)
-    figure.update_yaxes({"type": "log", "title_text": unit} | decades(-9, 9), row=1, col=1)
+    figure.update_yaxes({"type": "log", "title_text": unit} | log_ticks(-9, 9), row=1, col=1)
     figure.update_yaxes(title_text="°", tickvals=[-90, 0, 90, 180, 270], row=2, col=1)
     figure.update_yaxes(range=[0, 1.05], row=3, col=1)
     return figure

@@ -18,11 +18,11 @@ from flexcal.report.layout import (
     NOMINAL,
     QUIET,
     RIGID,
+    as_float32,
     canvas,
     millimetre_axis,
     panels,
     positive,
-    single,
 )
 from flexcal.units import MILLIMETRE
 
@@ -36,7 +36,7 @@ def calibration_errors(poses: PoseSet, before: np.ndarray, after: np.ndarray) ->
     ):
         figure.add_trace(
             go.Scatter(
-                x=single(poses.pose),
+                x=as_float32(poses.pose),
                 y=positive(np.linalg.norm(errors, axis=1) / MILLIMETRE),
                 mode="markers",
                 marker={"color": colour, "size": 7 if len(poses) <= 200 else 4, "symbol": symbol},
@@ -58,8 +58,8 @@ def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
         for sign in (1, -1):
             figure.add_trace(
                 go.Scatter(
-                    x=single(poses.pose),
-                    y=single(sign * noise[:, k]),
+                    x=as_float32(poses.pose),
+                    y=as_float32(sign * noise[:, k]),
                     line={"width": 1.2, "dash": "dot", "color": QUIET},
                     mode="lines",
                     name="± 2σ of the instrument",
@@ -72,8 +72,8 @@ def error_components(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
             )
         figure.add_trace(
             go.Bar(
-                x=single(poses.pose),
-                y=single(residuals[:, k] / MILLIMETRE),
+                x=as_float32(poses.pose),
+                y=as_float32(residuals[:, k] / MILLIMETRE),
                 marker={"color": ELASTIC, "line": {"width": 0}},
                 width=0.6,
                 name="measured minus predicted",
@@ -113,7 +113,7 @@ def verification_errors(
     for item in series:
         figure.add_trace(
             go.Scatter(
-                x=single(poses.pose),
+                x=as_float32(poses.pose),
                 y=positive(item.millimetres),
                 mode="markers",
                 marker={"color": item.colour, "size": 6 if len(poses) <= 200 else 4},
@@ -126,7 +126,7 @@ def verification_errors(
         distance = np.linalg.norm(calibrated.errors, axis=1) / MILLIMETRE
         figure.add_trace(
             go.Scatter(
-                x=single(poses.pose[unclear]),
+                x=as_float32(poses.pose[unclear]),
                 y=positive(distance[unclear]),
                 mode="markers",
                 marker={
@@ -140,12 +140,12 @@ def verification_errors(
             )
         )
     if paper is not None:
-        ends = single([poses.pose.min(), poses.pose.max()])
+        ends = as_float32([poses.pose.min(), poses.pose.max()])
         for value, share, dash in ((paper.p90, "90 %", "dot"), (paper.max, "worst", "dash")):
             if np.isfinite(value):
                 name = f"paper, {share}"
                 line = {"color": INK, "width": 1.2, "dash": dash}
-                both = single(np.full(2, value / MILLIMETRE))
+                both = as_float32(np.full(2, value / MILLIMETRE))
                 figure.add_trace(
                     go.Scatter(x=ends, y=both, mode="lines", line=line, name=name, hoverinfo="name+y")
                 )
@@ -176,7 +176,7 @@ def pose_courses(drifting: Sequence[Mapping[str, Any]]) -> go.Figure:
         for row, key in enumerate(("way_mm", "rp_mm"), start=1):
             figure.add_trace(
                 go.Scatter(
-                    x=single([(t - start) / unit for t in item["t_s"]]), y=single(item[key]), mode="lines+markers",
+                    x=as_float32([(t - start) / unit for t in item["t_s"]]), y=as_float32(item[key]), mode="lines+markers",
                     name=f"pose {item['pose']}", line=line, marker={"size": 5}, legendgroup=str(k), showlegend=row == 1,
                     hovertemplate=f"%{{x:.2f}} {word}: %{{y:.4f}} mm",
                 ), row=row, col=1,

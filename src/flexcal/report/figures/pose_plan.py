@@ -16,10 +16,10 @@ from flexcal.report.layout import (
     NOMINAL,
     QUIET,
     RIGID,
+    as_float32,
     canvas,
     millimetre_axis,
     positive,
-    single,
 )
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -42,7 +42,7 @@ def joint_positions(model: RobotModel, q: np.ndarray) -> go.Figure:
         )  # fmt: skip
         figure.add_trace(
             go.Scatter(
-                x=single(share), y=[joint.name] * len(q), mode="markers",
+                x=as_float32(share), y=[joint.name] * len(q), mode="markers",
                 marker={"color": ELASTIC, "size": 14, "symbol": "line-ns-open", "line": {"width": 1.5, "color": ELASTIC}},
                 text=[f"pose {k}: {value / unit:.1f} {name}" for k, value in enumerate(q[:, i], 1)],
                 hovertemplate="%{text}<extra></extra>",
@@ -67,7 +67,7 @@ def pose_numbers(
     for colour, (name, values) in zip(_COLOURS, errors.items(), strict=False):
         figure.add_trace(
             go.Scatter(
-                x=single(numbers), y=positive(np.asarray(values)), mode="lines+markers", name=name,
+                x=as_float32(numbers), y=positive(np.asarray(values)), mode="lines+markers", name=name,
                 line={"color": colour, "width": 2}, marker={"size": 5, "color": colour},
                 hovertemplate="%{x} poses: %{y:.4f} mm",
             )
@@ -114,7 +114,7 @@ def plan_space(
 
 def _points(places: np.ndarray, name: str, colour: str, size: float, labels: list[str]) -> go.Scatter3d:
     return go.Scatter3d(
-        x=single(places[:, 0]), y=single(places[:, 1]), z=single(places[:, 2]), mode="markers", name=name,
+        x=as_float32(places[:, 0]), y=as_float32(places[:, 1]), z=as_float32(places[:, 2]), mode="markers", name=name,
         marker={"size": size, "color": colour}, text=labels, hovertemplate="%{text}<extra></extra>",
         hoverinfo=None if labels[0] else "skip",
     )  # fmt: skip

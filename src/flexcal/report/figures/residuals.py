@@ -11,7 +11,7 @@ from flexcal.calibration.diagnostics import GravityLoads
 from flexcal.calibration.verification import CALIBRATED, RIGID
 from flexcal.data.poses import PoseSet
 from flexcal.report.figures.robot_arm import space_axes
-from flexcal.report.layout import AXIS, ELASTIC, GRID, INK, NOMINAL, canvas, panels, single
+from flexcal.report.layout import AXIS, ELASTIC, GRID, INK, NOMINAL, as_float32, canvas, panels
 from flexcal.report.layout import RIGID as RIGID_COLOUR
 from flexcal.units import DEGREE, MILLIMETRE
 
@@ -33,7 +33,7 @@ def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
         q = poses.q[:, i] / (DEGREE if revolute else MILLIMETRE)
         figure.add_trace(
             go.Scatter(
-                x=single(q), y=single(distance), mode="markers", name="error", legendgroup="a", showlegend=i == 0,
+                x=as_float32(q), y=as_float32(distance), mode="markers", name="error", legendgroup="a", showlegend=i == 0,
                 marker={"color": ELASTIC, "size": 3.5, "opacity": 0.45},
                 hovertemplate="%{x:.1f}: %{y:.3f} mm",
             ), row=row, col=column,
@@ -41,7 +41,7 @@ def residual_joints(joints: Mapping[str, str], poses: PoseSet, residuals: np.nda
         centres, means = _binned(q, distance)
         figure.add_trace(
             go.Scatter(
-                x=single(centres), y=single(means), mode="lines+markers", name="mean", legendgroup="b", showlegend=i == 0,
+                x=as_float32(centres), y=as_float32(means), mode="lines+markers", name="mean", legendgroup="b", showlegend=i == 0,
                 line={"color": INK, "width": 1.6}, marker={"size": 4}, hoverinfo="skip",
             ), row=row, col=column,
         )  # fmt: skip
@@ -92,7 +92,7 @@ def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> go.Figure
             along = loads.along[model][:, i] / MILLIMETRE
             figure.add_trace(
                 go.Scatter(
-                    x=single(torque), y=single(along), mode="markers", name=label, legendgroup=model, showlegend=k == 0,
+                    x=as_float32(torque), y=as_float32(along), mode="markers", name=label, legendgroup=model, showlegend=k == 0,
                     marker={"color": colour, "size": 3.5, "opacity": 0.5}, hovertemplate="%{x:.2f} N m: %{y:+.3f} mm",
                 ), row=row, col=column,
             )  # fmt: skip
@@ -100,7 +100,7 @@ def residual_torque(joints: Mapping[str, str], loads: GravityLoads) -> go.Figure
             ends = np.array([torque.min(), torque.max()])
             figure.add_trace(
                 go.Scatter(
-                    x=single(ends), y=single(start + slope * (ends - torque.mean())), mode="lines", legendgroup=model,
+                    x=as_float32(ends), y=as_float32(start + slope * (ends - torque.mean())), mode="lines", legendgroup=model,
                     showlegend=False, line={"color": colour, "width": 2}, hoverinfo="skip",
                 ), row=row, col=column,
             )  # fmt: skip
@@ -129,14 +129,14 @@ def residual_trend(
         components = residuals[:, k] / MILLIMETRE
         figure.add_trace(
             go.Scatter(
-                x=single(values), y=single(components), mode="markers", name=label,
+                x=as_float32(values), y=as_float32(components), mode="markers", name=label,
                 marker={"color": ELASTIC, "size": 4, "opacity": 0.6}, legendgroup="a", showlegend=k == 0,
                 hovertemplate="%{x}: %{y:+.3f} mm",
             ), row=k + 1, col=1,
         )  # fmt: skip
         figure.add_trace(
             go.Scatter(
-                x=single(np.convolve(values, kernel, mode="valid")), y=single(np.convolve(components, kernel, mode="valid")),
+                x=as_float32(np.convolve(values, kernel, mode="valid")), y=as_float32(np.convolve(components, kernel, mode="valid")),
                 mode="lines", name=f"mean of {window} neighbours",
                 line={"color": INK, "width": 1.6}, legendgroup="b", showlegend=k == 0, hoverinfo="skip",
             ), row=k + 1, col=1,
@@ -154,13 +154,13 @@ def residual_workspace(poses: PoseSet, residuals: np.ndarray) -> go.Figure:
     distance = np.linalg.norm(residuals, axis=1) / MILLIMETRE
     figure.add_trace(
         go.Scatter3d(
-            x=single(poses.position[:, 0]),
-            y=single(poses.position[:, 1]),
-            z=single(poses.position[:, 2]),
+            x=as_float32(poses.position[:, 0]),
+            y=as_float32(poses.position[:, 1]),
+            z=as_float32(poses.position[:, 2]),
             mode="markers",
             marker={
                 "size": 5 if len(poses) <= 300 else 3.5,
-                "color": single(distance),
+                "color": as_float32(distance),
                 "cmin": 0,
                 "cmax": float(np.quantile(distance, 0.99)) if len(distance) else 1.0,
                 "colorscale": [[0, GRID], [0.5, ELASTIC], [1, RIGID_COLOUR]],
@@ -194,7 +194,7 @@ def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:
             error = residuals[:, component] / MILLIMETRE
             figure.add_trace(
                 go.Scatter(
-                    x=single(position[:, axis]), y=single(error), mode="markers", name="error", legendgroup="error",
+                    x=as_float32(position[:, axis]), y=as_float32(error), mode="markers", name="error", legendgroup="error",
                     showlegend=first, marker={"color": ELASTIC, "size": 3.5, "opacity": 0.4},
                     hovertemplate=f"{along} %{{x:.3f}} m: %{{y:+.3f}} mm in {name}",
                 ), row=row, col=column,
@@ -202,7 +202,7 @@ def error_field(position: np.ndarray, residuals: np.ndarray) -> go.Figure:
             centres, means = _means(position[:, axis], error)
             figure.add_trace(
                 go.Scatter(
-                    x=single(centres), y=single(means), mode="lines+markers", name="mean", legendgroup="mean",
+                    x=as_float32(centres), y=as_float32(means), mode="lines+markers", name="mean", legendgroup="mean",
                     showlegend=first, line={"color": INK, "width": 1.6}, marker={"size": 4}, hoverinfo="skip",
                 ), row=row, col=column,
             )  # fmt: skip

@@ -11,7 +11,7 @@ import plotly.graph_objects as go
 from flexcal.calibration.verification import CALIBRATED, ArmPoses
 from flexcal.model.kinematics import LinkSurface
 from flexcal.model.robot import RobotModel
-from flexcal.report.layout import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID, canvas, single
+from flexcal.report.layout import ELASTIC, GRID, LINKS, NOMINAL, QUIET, RIGID, as_float32, canvas
 from flexcal.units import MILLIMETRE
 
 _FAINT = 0.25
@@ -31,11 +31,13 @@ def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, f
     figure = canvas(620)
     figure.add_trace(polyline(arms.corners, "arm at other poses", NOMINAL, 2.5, opacity=0.45))
     for number, vertices in enumerate(arms.surface):
-        figure.add_trace(solid(vertices, arms.triangles, 1.0 if number == 0 else _FAINT, legend=number == 0))
+        figure.add_trace(
+            link_mesh(vertices, arms.triangles, 1.0 if number == 0 else _FAINT, legend=number == 0)
+        )
     tips = arms.tip
     figure.add_trace(
         go.Scatter3d(
-            x=single(tips[:, 0]), y=single(tips[:, 1]), z=single(tips[:, 2]),
+            x=as_float32(tips[:, 0]), y=as_float32(tips[:, 1]), z=as_float32(tips[:, 2]),
             mode="markers", marker={"size": 2.5, "color": NOMINAL}, name="measured point",
             text=[f"pose {k}" for k in arms.pose], hovertemplate="%{text}<extra></extra>",
         )
@@ -50,8 +52,8 @@ def arm_poses(arms: ArmPoses, labels: Mapping[str, str], factors: Mapping[str, f
         sizes = np.linalg.norm(vectors, axis=1) / MILLIMETRE
         figure.add_trace(
             go.Cone(
-                x=single(ends[:, 0]), y=single(ends[:, 1]), z=single(ends[:, 2]),
-                u=single(drawn[:, 0]), v=single(drawn[:, 1]), w=single(drawn[:, 2]),
+                x=as_float32(ends[:, 0]), y=as_float32(ends[:, 1]), z=as_float32(ends[:, 2]),
+                u=as_float32(drawn[:, 0]), v=as_float32(drawn[:, 1]), w=as_float32(drawn[:, 2]),
                 anchor="tip", sizemode="raw", sizeref=_HEAD, showscale=False, colorscale=[[0, colour], [1, colour]],
                 lighting={"ambient": 0.9, "diffuse": 0.3},
                 text=[f"pose {k}: {size:.3f} mm" for k, size in zip(arms.pose, sizes, strict=True)],
@@ -85,9 +87,9 @@ def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity:
     """Several lines (lines, corners, 3) as one trace, parted by gaps."""
     parted = np.concatenate([corners, np.full((len(corners), 1, 3), np.nan)], axis=1).reshape(-1, 3)
     return go.Scatter3d(
-        x=single(parted[:, 0]),
-        y=single(parted[:, 1]),
-        z=single(parted[:, 2]),
+        x=as_float32(parted[:, 0]),
+        y=as_float32(parted[:, 1]),
+        z=as_float32(parted[:, 2]),
         mode="lines",
         name=name,
         line={"color": colour, "width": width},
@@ -96,11 +98,11 @@ def polyline(corners: np.ndarray, name: str, colour: str, width: float, opacity:
     )
 
 
-def solid(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend: bool) -> go.Mesh3d:
+def link_mesh(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend: bool) -> go.Mesh3d:
     """The links of the arm (V, 3), (F, 3) as one shaded trace."""
     numbers = triangles.astype(np.int32)
     return go.Mesh3d(
-        x=single(vertices[:, 0]), y=single(vertices[:, 1]), z=single(vertices[:, 2]),
+        x=as_float32(vertices[:, 0]), y=as_float32(vertices[:, 1]), z=as_float32(vertices[:, 2]),
         i=numbers[:, 0], j=numbers[:, 1], k=numbers[:, 2],
         color=LINKS, opacity=opacity, flatshading=True, name="links", showlegend=legend, hoverinfo="skip",
         lightposition={"x": 1000, "y": 2000, "z": 4000},
@@ -111,4 +113,4 @@ def solid(vertices: np.ndarray, triangles: np.ndarray, opacity: float, *, legend
 def links_at(model: RobotModel, q: np.ndarray) -> list[go.Mesh3d]:
     """The links of a robot at joint positions `q` (P, n), one shaded trace a pose."""
     surface = LinkSurface.of(model)
-    return [solid(vertices, surface.triangles, 1.0, legend=True) for vertices in surface.at(model, q)]
+    return [link_mesh(vertices, surface.triangles, 1.0, legend=True) for vertices in surface.at(model, q)]

@@ -8,7 +8,7 @@ import numpy as np
 import plotly.graph_objects as go
 
 from flexcal.dynamics.diagnostics import TorquePrediction
-from flexcal.report.layout import ELASTIC, NOMINAL, RIGID, decades, panels, positive, single
+from flexcal.report.layout import ELASTIC, NOMINAL, RIGID, as_float32, log_ticks, panels, positive
 
 _APART = 1.5
 """Steps from one row to the next, at least, across a gap."""
@@ -36,8 +36,8 @@ def torque_traces(units: Mapping[str, str], logs: Mapping[str, TorquePrediction]
             for joint, unit in enumerate(units.values()):
                 figure.add_trace(
                     go.Scatter(
-                        x=single(time),
-                        y=single(values[:, joint]),
+                        x=as_float32(time),
+                        y=as_float32(values[:, joint]),
                         name=kind,
                         legendgroup=kind,
                         showlegend=joint == 0,
@@ -97,7 +97,7 @@ def torque_spectra(units: Mapping[str, str], logs: Mapping[str, TorquePrediction
             for joint, unit in enumerate(units.values()):
                 figure.add_trace(
                     go.Scatter(
-                        x=single(log.frequencies_hz),
+                        x=as_float32(log.frequencies_hz),
                         y=positive(np.sqrt(density[:, joint])),
                         name=kind,
                         legendgroup=kind,
@@ -112,7 +112,7 @@ def torque_spectra(units: Mapping[str, str], logs: Mapping[str, TorquePrediction
                     col=joint % _COLUMNS + 1,
                 )
     figure.update_xaxes(title_text="Hz", nticks=6)
-    figure.update_yaxes({"type": "log"} | decades(-9, 6))
+    figure.update_yaxes({"type": "log"} | log_ticks(-9, 6))
     title = ", ".join(f"{unit}/√Hz" for unit in dict.fromkeys(units.values()))
     figure.update_yaxes(title_text=title, row=(rows + 1) // 2, col=1)
     return figure

@@ -14,11 +14,11 @@ from flexcal.report.layout import (
     INK,
     NOMINAL,
     RIGID,
+    as_float32,
     canvas,
-    decades,
+    log_ticks,
     panels,
     positive,
-    single,
 )
 
 _DASHES = ("solid", "dot", "dash", "dashdot")
@@ -39,8 +39,8 @@ def limit_shares(
             for joint, name in enumerate(joints):
                 figure.add_trace(
                     go.Scatter(
-                        x=single(time),
-                        y=single(100 * shares[quantity][:, joint]),
+                        x=as_float32(time),
+                        y=as_float32(100 * shares[quantity][:, joint]),
                         name=name,
                         legendgroup=name,
                         showlegend=row == 1,
@@ -80,7 +80,7 @@ def prior_gains(names: Sequence[str], after: np.ndarray) -> go.Figure:
         )
     )
     low = int(np.floor(np.log10(max(float(after.min(initial=1.0)), 1e-9))))
-    figure.update_xaxes(decades(low, 0))
+    figure.update_xaxes(log_ticks(low, 0))
     figure.update_xaxes(type="log", range=[low, 0.1], title_text="standard deviation, relative to before")
     return figure
 
@@ -105,7 +105,7 @@ def swept_paths(chains: Mapping[str, np.ndarray], links: Mapping[str, go.Mesh3d]
             (parted, "the arm on its path", NOMINAL, 3.0),
             (path, "path of the point", ELASTIC, 4.0),
         ):
-            x, y, z = (single(points[:, axis]) for axis in range(3))
+            x, y, z = (as_float32(points[:, axis]) for axis in range(3))
             line = {"color": colour, "width": width}
             figure.add_trace(go.Scatter3d(x=x, y=y, z=z, mode="lines", name=name, line=line, **shown))
     figure.update_layout(scene=space_axes(), margin={"l": 0, "r": 0, "t": 40, "b": 0})

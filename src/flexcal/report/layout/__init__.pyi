@@ -16,7 +16,7 @@ from .blocks import (
     tally,
     worst,
 )
-from .figure_style import canvas, decades, millimetre_axis, panels, positive, single
+from .figure_style import as_float32, canvas, log_ticks, millimetre_axis, panels, positive
 from .notation import (
     NOTHING,
     document_millimetres,
@@ -60,9 +60,10 @@ __all__ = [
     "Table",
     "Text",
     "Verdict",
+    "as_float32",
     "canvas",
-    "decades",
     "document_millimetres",
+    "log_ticks",
     "millimetre_axis",
     "millimetres",
     "p_value",
@@ -73,7 +74,6 @@ __all__ = [
     "scaled",
     "sentences",
     "significant",
-    "single",
     "spring_label",
     "statistics_cells",
     "tally",

@@ -61,8 +61,8 @@ class Verdict:
     headline: str
     sentence: str
     facts: tuple[Fact, ...]
-    rungs: tuple[ErrorRange, ...]
-    rungs_caption: str
+    error_ranges: tuple[ErrorRange, ...]
+    error_ranges_caption: str
     checks: tuple[Check, ...]
 
     @property

@@ -13,9 +13,9 @@ from flexcal.units import MILLIMETRE
 
 @dataclass(frozen=True)
 class Step:
-    """A rung with its places on the scale, in percent of the width; None where a number is not known."""
+    """An error range with its places on the scale, in percent of the width; None where a number is not known."""
 
-    rung: ErrorRange
+    error_range: ErrorRange
     start: float
     width: float
     mean: float | None
@@ -32,9 +32,11 @@ class ErrorAxis:
     ticks: tuple[tuple[float, str], ...]
 
 
-def ladder(rungs: Sequence[ErrorRange]) -> ErrorAxis:
-    """Place rungs on a log scale from the decade below the smallest to that above the largest."""
-    values = [v / MILLIMETRE for r in rungs for v in (r.mean, r.p90, r.maximum) if math.isfinite(v) and v > 0]
+def place_ranges(ranges: Sequence[ErrorRange]) -> ErrorAxis:
+    """Place error ranges on a log scale from the decade below the smallest to that above the largest."""
+    values = [
+        v / MILLIMETRE for r in ranges for v in (r.mean, r.p90, r.maximum) if math.isfinite(v) and v > 0
+    ]
     if not values:
         return ErrorAxis((), ())
     low = _tick_below(min(values))
@@ -47,13 +49,17 @@ def ladder(rungs: Sequence[ErrorRange]) -> ErrorAxis:
         return 100 * math.log(size / low) / math.log(high / low)
 
     steps = []
-    for rung in rungs:
-        mean, p90, maximum = place(rung.mean), place(rung.p90), place(rung.maximum)
+    for error_range in ranges:
+        mean, p90, maximum = place(error_range.mean), place(error_range.p90), place(error_range.maximum)
         known = [p for p in (mean, p90, maximum) if p is not None]
         if not known:
             continue
-        texts = (millimetres(rung.mean), millimetres(rung.p90), millimetres(rung.maximum))
-        steps.append(Step(rung, min(known), max(known) - min(known), mean, p90, maximum, texts))
+        texts = (
+            millimetres(error_range.mean),
+            millimetres(error_range.p90),
+            millimetres(error_range.maximum),
+        )
+        steps.append(Step(error_range, min(known), max(known) - min(known), mean, p90, maximum, texts))
     ticks = [m * 10.0**e for e in range(-4, 4) for m in (1, 2, 5)]
     sparse = [t for t in ticks if low * 0.999 <= t <= high * 1.001]
     if len(sparse) > 7:

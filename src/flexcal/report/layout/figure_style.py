@@ -41,7 +41,7 @@ def panels(
     return figure
 
 
-def single(values: np.ndarray | Sequence[float]) -> np.ndarray:
+def as_float32(values: np.ndarray | Sequence[float]) -> np.ndarray:
     """Float32, which the page stores in base64; what it cannot hold is a gap."""
     whole = np.asarray(values, dtype=float)
     return np.where(np.abs(whole) <= np.finfo(np.float32).max, whole, np.nan).astype(np.float32)
@@ -50,10 +50,10 @@ def single(values: np.ndarray | Sequence[float]) -> np.ndarray:
 def positive(values: np.ndarray) -> np.ndarray:
     """Float32 with everything that a log axis cannot show as a gap."""
     values = np.asarray(values, dtype=float)
-    return single(np.where(values > 0, values, np.nan))
+    return as_float32(np.where(values > 0, values, np.nan))
 
 
-def decades(low: int, high: int, step: int = 1) -> dict[str, list]:
+def log_ticks(low: int, high: int, step: int = 1) -> dict[str, list]:
     """Tick values and labels 10ᵏ for a logarithmic axis, in plain characters that keep their size."""
     powers = range(low, high + 1, step)
     raised = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")

@@ -29,6 +29,6 @@ PAGE, INK, QUIET, GRID, AXIS = (LIGHT[k] for k in ("page", "ink", "quiet", "grid
 ELASTIC, RIGID, NOMINAL, LINKS = (LIGHT[k] for k in ("elastic", "rigid", "nominal", "links"))
 
 
-def dark_of() -> dict[str, str]:
+def dark_colours() -> dict[str, str]:
     """Light colour → dark colour, for the page's script."""
     return {LIGHT[name]: DARK[name] for name in LIGHT}

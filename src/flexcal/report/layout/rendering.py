@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any
 from flexcal.files.formats import json_values
 from flexcal.files.transaction import write_text
 from flexcal.report.layout.blocks import FigureBlock, Page
-from flexcal.report.layout.error_axis import ladder
-from flexcal.report.layout.palette import DARK, LIGHT, dark_of
+from flexcal.report.layout.error_axis import place_ranges
+from flexcal.report.layout.palette import DARK, LIGHT, dark_colours
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -37,7 +37,7 @@ def page_html(page: Page) -> str:
         .get_template("report.html.j2")
         .render(
             page=page,
-            ladder=ladder(page.verdict.rungs),
+            error_axis=place_ranges(page.verdict.error_ranges),
             marks=_MARKS,
             words=_WORDS,
             light=LIGHT,
@@ -45,7 +45,7 @@ def page_html(page: Page) -> str:
             style=(folder / "report.css").read_text("utf-8"),
             script="\n".join((folder / name).read_text("utf-8") for name in _SCRIPTS),
             specifications={block.id: figure_json(block) for block in page.figures},
-            dark_colours=script_json(dark_of()),
+            dark_colours=script_json(dark_colours()),
             document=script_json(json_values(page.document)),
             plotly=get_plotlyjs() if used else "",
         )

@@ -44,13 +44,13 @@ from flexcal.report.sections import (
     arm_figure,
     budget_table,
     error_figures,
+    error_range,
     headline_facts,
     identifiability_blocks,
     parameter_figures,
     parameter_table,
     provenance_section,
     residuals_section,
-    rung,
     terms_section,
     uncalibrated_ranges,
     uncalibrated_rows,
@@ -124,17 +124,17 @@ def calibration_verdict(study: CalibrationStudy) -> Verdict:
     before, after = study.points.before, study.points.statistics(CALIBRATED)
     checks = calibration_checks(study.results, study.estimate, study.points)
     trust = Trust(checks)
-    rungs = uncalibrated_ranges(study.points)
+    ranges = uncalibrated_ranges(study.points)
     if RIGID in study.points.errors:
-        rungs.append(rung("rigid geometry", study.points.statistics(RIGID), "rigid"))
-    rungs.append(rung("calibrated", after, "elastic"))
+        ranges.append(error_range("rigid geometry", study.points.statistics(RIGID), "rigid"))
+    ranges.append(error_range("calibrated", after, "elastic"))
     return Verdict(
         trust.status,
         HEADLINES[trust.status],
         f"{_was(before)}At the same {after.poses} points the calibrated model has a P90 of {millimetres(after.p90)} mm and a "
         f"maximum of {millimetres(after.max)} mm{_better(before, after)}.",
         headline_facts(before, after, trust, "points of the fit"),
-        tuple(rungs),
+        tuple(ranges),
         f"Error of the robot at the {after.poses} measured points",
         checks,
     )

@@ -31,7 +31,7 @@ from flexcal.report.layout import (
 )
 from flexcal.report.layout import Block as PageBlock
 from flexcal.report.results import LEVEL, Comparison, Run
-from flexcal.report.sections import rung
+from flexcal.report.sections import error_range
 from flexcal.units import MILLIMETRE
 
 _FEW = 20
@@ -101,13 +101,13 @@ def comparison_verdict(found: Comparison) -> Verdict:
             status,
         ),
     )
-    rungs = []
+    ranges = []
     for run in (first, second):
         if run.before is not None:
-            rungs.append(rung(f"{run.name}, before", run.before, "nominal"))
-        rungs.append(rung(run.name, run.after, "rigid" if run is first else "elastic"))
+            ranges.append(error_range(f"{run.name}, before", run.before, "nominal"))
+        ranges.append(error_range(run.name, run.after, "rigid" if run is first else "elastic"))
     where = "fresh points" if first.fresh and second.fresh else "points"
-    return Verdict(status, headline, sentence, facts, tuple(rungs), f"Error of the robot at {where}", checks)
+    return Verdict(status, headline, sentence, facts, tuple(ranges), f"Error of the robot at {where}", checks)
 
 
 def _checks(found: Comparison) -> tuple[Check, ...]:

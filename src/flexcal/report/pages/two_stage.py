@@ -33,12 +33,12 @@ from flexcal.report.sections import (
     common_origin,
     comparison_section,
     coverage,
+    error_range,
     geometry_section,
     headline_facts,
     link_inertials_section,
     provenance_section,
     residuals_section,
-    rung,
     stiffness_section,
     uncalibrated_ranges,
     verification_section,
@@ -141,14 +141,14 @@ def truth_checks(study: TwoStageStudy) -> tuple[Check, ...]:
 
 def _rungs(study: TwoStageStudy) -> tuple[ErrorRange, ...]:
     paper = study.paper
-    rungs = uncalibrated_ranges(study.fresh)
-    rungs += [rung(f"rigid, {fit.poses} poses", fit.errors, "rigid") for fit in study.rigid]
+    ranges = uncalibrated_ranges(study.fresh)
+    ranges += [error_range(f"rigid, {fit.poses} poses", fit.errors, "rigid") for fit in study.rigid]
     if paper is not None and paper.rigid is not None:
-        rungs.append(rung("paper: rigid, hardware", paper.rigid, "published"))
+        ranges.append(error_range("paper: rigid, hardware", paper.rigid, "published"))
     words = f"elastic, {len(study.points.poses)} poses"
-    rungs.append(rung(words, study.fresh.statistics(CALIBRATED), "elastic"))
+    ranges.append(error_range(words, study.fresh.statistics(CALIBRATED), "elastic"))
     if paper is not None and paper.elastic is not None:
-        rungs.append(rung("paper: elastic, hardware", paper.elastic, "published"))
+        ranges.append(error_range("paper: elastic, hardware", paper.elastic, "published"))
     if study.floor is not None:
-        rungs.append(rung("floor: all known", study.floor, "floor"))
-    return tuple(rungs)
+        ranges.append(error_range("floor: all known", study.floor, "floor"))
+    return tuple(ranges)

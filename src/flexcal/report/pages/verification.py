@@ -39,10 +39,10 @@ from flexcal.report.layout import (
 from flexcal.report.sections import (
     BEFORE_NOTE,
     arm_figure,
+    error_range,
     headline_facts,
     provenance_section,
     residual_blocks,
-    rung,
     uncalibrated_ranges,
     uncalibrated_rows,
 )
@@ -108,7 +108,7 @@ def _verdict(study: VerificationStudy) -> Verdict:
         f"At {after.poses} {noun} errors of the calibrated model have a P90 of {millimetres(after.p90)} mm and a maximum of "
         f"{millimetres(after.max)} mm. The instrument's noise is included.{_refitted(study.results)}",
         headline_facts(before, after, trust, "points"),
-        (*uncalibrated_ranges(study.points), rung("calibrated", after, "elastic")),
+        (*uncalibrated_ranges(study.points), error_range("calibrated", after, "elastic")),
         f"Error of the robot at {after.poses} {noun}, against the instrument",
         checks,
     )

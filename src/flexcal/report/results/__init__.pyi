@@ -2,7 +2,7 @@ from .fitted_response import FittedResponse, fitted_responses
 from .identifiability import IdentifiableParameters
 from .measured_response import MeasuredResponse, relative_to_diagonal, uncertainty_sentence
 from .particulars import NOT_GIVEN, MeasurementDetails
-from .published_values import TX90L_PAPER, Publication
+from .published_values import TX90L_PAPER, PublishedValues
 from .run_significance import LEVEL, ParameterChanges, parameter_changes
 from .runs import Comparison, Run
 from .two_stage_study import TwoStageStudy
@@ -17,7 +17,7 @@ __all__ = [
     "MeasuredResponse",
     "MeasurementDetails",
     "ParameterChanges",
-    "Publication",
+    "PublishedValues",
     "Run",
     "TwoStageStudy",
     "fitted_responses",

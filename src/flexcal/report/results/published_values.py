@@ -13,7 +13,7 @@ _NAN = float("nan")
 
 
 @dataclass(frozen=True, eq=False)
-class Publication:
+class PublishedValues:
     """Published results of one robot; nan and missing entries are what the publication does not say.
 
     `springs` are stiffnesses and dampings by parameter name (SI); `calibration` is on the poses that were fitted, `elastic` and `rigid`
@@ -47,7 +47,7 @@ def _springs() -> dict[str, float]:
     return values
 
 
-TX90L_PAPER = Publication(
+TX90L_PAPER = PublishedValues(
     citation=(
         "M. Neubauer, H. Gattringer, A. Müller, A. Steinhauser, W. Höbarth: A two-stage calibration method for industrial robots "
         "with joint and drive flexibilities, Mechanical Sciences, 2015"

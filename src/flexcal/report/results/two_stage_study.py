@@ -14,7 +14,7 @@ from flexcal.estimation import Estimate
 from flexcal.files.formats import Block
 from flexcal.report.results.fitted_response import FittedResponse
 from flexcal.report.results.identifiability import IdentifiableParameters
-from flexcal.report.results.published_values import Publication
+from flexcal.report.results.published_values import PublishedValues
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class TwoStageStudy:
     arms: ArmPoses
     fresh: MeasuredPoints
     exact: MeasuredPoints
-    paper: Publication | None = None
+    paper: PublishedValues | None = None
 
     @property
     def truth(self) -> Mapping[str, float]:

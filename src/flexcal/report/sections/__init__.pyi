@@ -1,5 +1,5 @@
 from .base_parameters import base_parameters_section
-from .first_screen import headline_facts, rung
+from .first_screen import error_range, headline_facts
 from .friction import friction_section
 from .geometry import arm_figure, error_figures, geometry_section
 from .headline_numbers import comparison_section
@@ -29,6 +29,7 @@ __all__ = [
     "comparison_section",
     "coverage",
     "error_figures",
+    "error_range",
     "friction_section",
     "geometry_section",
     "hardening_sentence",
@@ -45,7 +46,6 @@ __all__ = [
     "residual_blocks",
     "residuals_section",
     "response_blocks",
-    "rung",
     "signals_table",
     "spring_table",
     "stiffness_section",

@@ -20,10 +20,10 @@ def headline_facts(
     return (was, now, trust.fact())
 
 
-def rung(
+def error_range(
     label: str, s: ErrorStatistics, kind: Literal["nominal", "rigid", "elastic", "floor", "published"]
 ) -> ErrorRange:
-    """A rung of the scale from error statistics."""
+    """An error range of the scale from error statistics."""
     return ErrorRange(label, s.mean, s.p90, s.max, kind)
 
 

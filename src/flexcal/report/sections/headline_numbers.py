@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from flexcal.calibration.verification import CALIBRATED, RIGID
 from flexcal.report.layout import NOTHING, Block, Section, Table, Text, statistics_cells
-from flexcal.report.results import Publication, TwoStageStudy
+from flexcal.report.results import PublishedValues, TwoStageStudy
 
 
 def comparison_section(study: TwoStageStudy) -> Section:
@@ -51,6 +51,6 @@ def comparison_section(study: TwoStageStudy) -> Section:
     )
 
 
-def _number(paper: Publication | None, key: str) -> str:
+def _number(paper: PublishedValues | None, key: str) -> str:
     value = getattr(paper, key) if paper is not None else None
     return NOTHING if value is None else str(value)

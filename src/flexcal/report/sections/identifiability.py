@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from flexcal.estimation import Dropped
 from flexcal.report.figures import singular_values
 from flexcal.report.layout import Block, FigureBlock, Table, Text
-from flexcal.report.results import IdentifiableParameters, Publication
+from flexcal.report.results import IdentifiableParameters, PublishedValues
 
 _MOST = 4
 
@@ -15,7 +15,7 @@ _NOTHING = 1e-9
 """Amounts (SI) below this are rounding errors of a column that is zero."""
 
 
-def identifiability_blocks(found: IdentifiableParameters, paper: Publication | None) -> tuple[Block, ...]:
+def identifiability_blocks(found: IdentifiableParameters, paper: PublishedValues | None) -> tuple[Block, ...]:
     """The gap, the dropped parameters and the weakest directions that were kept."""
     dropped = found.parameters - found.rank
     words = (

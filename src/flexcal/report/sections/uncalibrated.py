@@ -7,7 +7,7 @@ from typing import Any
 
 from flexcal.calibration.verification import DECLARED, NOMINAL, OWN, MeasuredPoints
 from flexcal.report.layout import ErrorRange, Table, document_millimetres, statistics_cells
-from flexcal.report.sections.first_screen import rung
+from flexcal.report.sections.first_screen import error_range
 
 BEFORE = {
     DECLARED: "before, as declared",
@@ -51,10 +51,10 @@ def uncalibrated_table(before: Mapping[str, Mapping[str, Any] | None]) -> Table:
 
 
 def uncalibrated_ranges(points: MeasuredPoints) -> list[ErrorRange]:
-    """A rung for the best-fit registered robot, and one for the robot's own error, as far as they are known."""
+    """The error range of the best-fit registered robot, and that of the robot's own error, as far as they are known."""
     labels = {NOMINAL: "best-fit registered", OWN: "the robot's own"}
     return [
-        rung(f"before, {label}", points.statistics(model), "nominal")
+        error_range(f"before, {label}", points.statistics(model), "nominal")
         for model, label in labels.items()
         if model in points.errors
     ]
