@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any
 
 from tyro.conf import Positional, arg
 
@@ -21,22 +21,14 @@ from flexcal.cli.arguments.shared_options import (
 )
 from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_option
 from flexcal.cli.terminal.console import Console
+from flexcal.dynamics.estimators import ESTIMATORS, EstimatorName
 from flexcal.errors import InputError
 
 if TYPE_CHECKING:
     from flexcal.jobs.dynamics import DynamicsIdentification
 
 _SPRINGS = (".drive.stiffness", ".drive.damping", ".bearing_x.", ".bearing_y.")
-_ESTIMATORS = """wls: weighted least squares, every joint and log by its own noise.
-ols: ordinary least squares.
-sdp: as wls, with physically consistent inertials.
-irls: as wls, robust to outliers in single rows (Huber).
-iv: instrumental variables, without the bias of noisy velocities (simulates the robot under the `controller:` of robot.yaml).
-didim: direct and inverse dynamic identification models, from torques alone (simulates it too).
-energy, power: energy or power of all joints, one equation per row.
-tls: total least squares, with the noise of the positions.
-ml: maximum likelihood, with noise from four or more periods of one motion.
-ekf: extended Kalman filter."""
+_ESTIMATORS = "\n".join(f"{name}: {estimator.summary}." for name, estimator in ESTIMATORS.items())
 _LEARNING = (
     "Learn the residual torque of each motor as a function of its position, speed and torque (needs scikit-learn). "
     "Written to learned_residual.npz beside the estimates where it reduces the cross-validation error; "
@@ -63,7 +55,7 @@ class IdentifyDynamics:
     validate: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
     """Logs outside the fit whose torques are predicted."""
     estimator: Annotated[
-        Literal["wls", "ols", "sdp", "irls", "iv", "didim", "energy", "power", "tls", "ml", "ekf"],
+        EstimatorName,
         arg(help=_ESTIMATORS),
     ] = "wls"
     flexible: bool = False

@@ -1,31 +1,24 @@
-"""Estimators of dynamic parameters as objects with one signature."""
+"""Estimators of dynamic parameters as objects with one signature.
+
+Each imports what it computes with when it fits: the command line reads their names and summaries at every start.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import ClassVar, Literal, Protocol
+from typing import TYPE_CHECKING, ClassVar, Literal, Protocol
 
-from flexcal.dynamics.estimators.column_noise import perturbed_logs, regressor_errors
-from flexcal.dynamics.estimators.didim import direct_and_inverse
-from flexcal.dynamics.estimators.ekf import kalman_filter
-from flexcal.dynamics.estimators.energy_model import energy_least_squares
-from flexcal.dynamics.estimators.feasible import feasible_least_squares
-from flexcal.dynamics.estimators.idim_iv import instrumental_variables
-from flexcal.dynamics.estimators.irls import huber_least_squares
-from flexcal.dynamics.estimators.ols import ordinary_least_squares
-from flexcal.dynamics.estimators.periodic_likelihood import maximum_likelihood
-from flexcal.dynamics.estimators.power_model import power_least_squares
-from flexcal.dynamics.estimators.recorded_rows import RecordedRows
-from flexcal.dynamics.estimators.tls import total_least_squares
-from flexcal.dynamics.estimators.wls import weighted_least_squares
-from flexcal.dynamics.regression import RegressionData
-from flexcal.estimation import Estimate
+if TYPE_CHECKING:
+    from flexcal.dynamics.estimators.recorded_rows import RecordedRows
+    from flexcal.dynamics.regression import RegressionData
+    from flexcal.estimation import Estimate
 
 
 class Estimator(Protocol):
-    """What `identify_dynamics` takes as estimator: a `name` for files and messages, and `fit`."""
+    """What `identify_dynamics` takes as estimator: a `name` for files and messages, a `summary` for the help page, and `fit`."""
 
     name: ClassVar[EstimatorName]
+    summary: ClassVar[str]
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """The base parameters, with the covariance that the estimator claims.
@@ -55,9 +48,12 @@ class OLS:
     """Ordinary least squares: all equations weigh the same."""
 
     name: ClassVar[EstimatorName] = "ols"
+    summary: ClassVar[str] = "ordinary least squares"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.ols import ordinary_least_squares
+
         return ordinary_least_squares(equations)
 
 
@@ -66,9 +62,12 @@ class WLS:
     """Weighted least squares: every joint by the variance of its residuals, which may be correlated in time."""
 
     name: ClassVar[EstimatorName] = "wls"
+    summary: ClassVar[str] = "weighted least squares, every joint and log by its own noise"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.wls import weighted_least_squares
+
         return weighted_least_squares(equations)
 
 
@@ -78,9 +77,12 @@ class SDP:
     Cortesão 2014)."""
 
     name: ClassVar[EstimatorName] = "sdp"
+    summary: ClassVar[str] = "as wls, with physically consistent inertials"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.feasible import feasible_least_squares
+
         return feasible_least_squares(equations)
 
 
@@ -89,9 +91,12 @@ class IRLS:
     """Iteratively reweighted least squares with the Huber loss, for logs with outliers."""
 
     name: ClassVar[EstimatorName] = "irls"
+    summary: ClassVar[str] = "as wls, robust to outliers in single rows (Huber)"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.irls import huber_least_squares
+
         return huber_least_squares(equations, rows)
 
 
@@ -100,9 +105,13 @@ class TLS:
     """Total least squares: the noise of positions in the regressor is estimated and taken into account (Van Huffel and Vandewalle 1991)."""
 
     name: ClassVar[EstimatorName] = "tls"
+    summary: ClassVar[str] = "total least squares, with the noise of the positions"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.column_noise import perturbed_logs, regressor_errors
+        from flexcal.dynamics.estimators.tls import total_least_squares
+
         return total_least_squares(equations, regressor_errors(rows, perturbed_logs(rows)))
 
 
@@ -111,9 +120,14 @@ class IV:
     """Instrumental variables from the simulated closed loop (Janot, Vandanjon and Gautier 2014)."""
 
     name: ClassVar[EstimatorName] = "iv"
+    summary: ClassVar[str] = (
+        "instrumental variables, without the bias of noisy velocities (simulates the robot under the `controller:` of robot.yaml)"
+    )
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.idim_iv import instrumental_variables
+
         return instrumental_variables(equations, rows)
 
 
@@ -122,9 +136,14 @@ class DIDIM:
     """Direct and inverse dynamic identification model: from torques alone, by simulation (Gautier, Janot and Vandanjon 2013)."""
 
     name: ClassVar[EstimatorName] = "didim"
+    summary: ClassVar[str] = (
+        "direct and inverse dynamic identification models, from torques alone (simulates it too)"
+    )
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.didim import direct_and_inverse
+
         return direct_and_inverse(equations, rows)
 
 
@@ -133,9 +152,12 @@ class EnergyModel:
     """Least squares of the energy balance of the whole robot: without accelerations (Gautier and Khalil 1988)."""
 
     name: ClassVar[EstimatorName] = "energy"
+    summary: ClassVar[str] = "energy of all joints, one equation per row"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.energy_model import energy_least_squares
+
         return energy_least_squares(rows)
 
 
@@ -144,9 +166,12 @@ class PowerModel:
     """Least squares of the power balance of the whole robot, one equation a sample (Gautier 1997)."""
 
     name: ClassVar[EstimatorName] = "power"
+    summary: ClassVar[str] = "power of all joints, one equation per row"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.power_model import power_least_squares
+
         return power_least_squares(rows)
 
 
@@ -155,9 +180,12 @@ class ML:
     """Maximum likelihood for periodic excitation, in the frequency domain (Swevers, Ganseman, Tükel, De Schutter and Van Brussel 1997)."""
 
     name: ClassVar[EstimatorName] = "ml"
+    summary: ClassVar[str] = "maximum likelihood, with noise from four or more periods of one motion"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.periodic_likelihood import maximum_likelihood
+
         return maximum_likelihood(equations, rows)
 
 
@@ -166,9 +194,12 @@ class EKF:
     """Extended Kalman filter and smoother: states and parameters together (Gautier and Poignet 2001)."""
 
     name: ClassVar[EstimatorName] = "ekf"
+    summary: ClassVar[str] = "extended Kalman filter"
 
     def fit(self, equations: RegressionData, rows: RecordedRows) -> Estimate:
         """As `Estimator.fit`."""
+        from flexcal.dynamics.estimators.ekf import kalman_filter
+
         return kalman_filter(equations, rows)
 
 
