@@ -8,20 +8,19 @@ from pathlib import Path
 import polars as pl
 import pytest
 
+from flexcal.design.poses import CriterionName
 from flexcal.dynamics.estimators import EstimatorName
 from flexcal.jobs.dynamics import identify_robot_dynamics
-from flexcal.jobs.experiments import plan_calibration_poses
+from flexcal.jobs.experiments import PoseRequest, plan_calibration_poses
 
 
 @pytest.mark.parametrize("criterion", ["c", "E"])
-def test_design_of_poses(examples: Path, tmp_path: Path, criterion: str) -> None:
+def test_design_of_poses(examples: Path, tmp_path: Path, criterion: CriterionName) -> None:
     told: dict[str, list[float]] = {}
     plan_calibration_poses(
         examples / "tx90l" / "robot.yaml",
         tmp_path / "plan.yaml",
-        20,
-        criterion=criterion,
-        candidates=200,
+        PoseRequest(20, criterion, candidates=200),
         progress=lambda stage, share: told.setdefault(stage, []).append(share),
     )
     assert list(told) == ["candidates", "choosing", "how many"]

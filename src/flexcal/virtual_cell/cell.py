@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from flexcal.virtual_cell.config import CellConfig
 from flexcal.virtual_cell.frequency_experiment import recordings
 from flexcal.virtual_cell.pose_measurement import in_instrument, measured_poses, true_poses
 from flexcal.virtual_cell.trajectory_experiment import trajectory_recordings
+from flexcal.virtual_cell.true_parameters import draw_truth, read_truth_of
 
 _TRACKER = 2**32  # keeps the tracker's random numbers apart from those of the recordings
 
@@ -41,6 +43,18 @@ class VirtualCell:
         self.seed = seed
         self.controller_model = truth if controller_model is None else controller_model
         self.threads = threads or os.cpu_count() or 1
+
+    @classmethod
+    def drawn(
+        cls, nominal: RobotModel, config: CellConfig, seed: int, truth: Path | None = None
+    ) -> tuple[VirtualCell, dict[str, float]]:
+        """A cell whose robot differs from the `nominal` one, in which the controller believes; and the true values by name.
+
+        They are drawn from `seed`, or those of the file `truth`; raises `InputError` as `read_truth_of` does.
+        """
+        rng = np.random.default_rng([seed, 0])
+        values = draw_truth(nominal, config.spread, rng) if truth is None else read_truth_of(truth, nominal)
+        return cls(nominal.with_values(values), config, seed, controller_model=nominal), values
 
     def record(self, plan: MultisinePlan | TrajectoryPlan) -> Iterator[Recording]:
         """Run a frequency experiment: recordings by pose, realisation, orthogonal experiment, sign (+1, then −1); or trajectories.

@@ -113,20 +113,19 @@ class DesignPoses:
         )
 
     def _planned(self, console: Console, plan: Callable[..., Planned]) -> Planned:
+        from flexcal.jobs.experiments import PoseRequest
+
+        request = PoseRequest(
+            self.count,
+            criterion=self.criterion,
+            candidates=self.candidates if self.pool is None else self.pool,
+            working=self.working,
+            wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
+            payload=self.payload,
+            seed=self.seed,
+        )
         with console.progress() as progress:
-            return plan(
-                self.robot,
-                self.out,
-                self.count,
-                criterion=self.criterion,
-                candidates=self.candidates if self.pool is None else self.pool,
-                working=self.working,
-                wanted=None if self.wanted is None else self.wanted * MILLIMETRE,
-                payload=self.payload,
-                seed=self.seed,
-                command=command_line(),
-                progress=progress,
-            )
+            return plan(self.robot, self.out, request, command=command_line(), progress=progress)
 
     def _choose(self, console: Console) -> None:
         from flexcal.jobs.experiments import plan_calibration_poses

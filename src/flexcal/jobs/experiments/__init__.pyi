@@ -1,4 +1,4 @@
-from .candidate_poses import box_corners, working_file, working_volume
+from .candidate_poses import PoseRequest, box_corners, working_file, working_volume
 from .frequency_design import plan_frequency_experiments
 from .measurement import measure
 from .next_poses import plan_next_poses
@@ -9,6 +9,7 @@ from .trajectories import TrajectoryRequest, exciting_plan, plan_trajectories
 
 __all__ = [
     "PlanName",
+    "PoseRequest",
     "TrajectoryRequest",
     "box_corners",
     "exciting_plan",

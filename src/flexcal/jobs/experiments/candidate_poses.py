@@ -9,7 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from flexcal.data.poses import PosePool, read_pose_pool, read_working
-from flexcal.design.poses import PoseCandidates, WorkingVolume, pose_candidates, working_box, working_points
+from flexcal.design.poses import (
+    CriterionName,
+    PoseCandidates,
+    WorkingVolume,
+    pose_candidates,
+    working_box,
+    working_points,
+)
 from flexcal.design.scene import CollisionChecker, MeasuringSetup
 from flexcal.errors import InputError, naming
 from flexcal.model.kinematics import point_kinematics
@@ -18,6 +25,24 @@ from flexcal.progress import Progress
 
 MOST_GIVEN = 20_000
 """Poses of a file that are considered; more are drawn from."""
+
+
+@dataclass(frozen=True)
+class PoseRequest:
+    """Which poses `plan_calibration_poses` and `plan_next_poses` choose, at most `count`.
+
+    `candidates`: so many random poses to choose from, or a file of poses. `working`: where the tool error counts, as in `working_volume`.
+    `wanted`: the predicted tool error, m, at which no more poses are taken, None for no such end. `payload` in kg, None for the file's,
+    else the declared one.
+    """
+
+    count: int
+    criterion: CriterionName = "c"
+    candidates: int | Path = 4000
+    working: str | None = None
+    wanted: float | None = None
+    payload: float | None = None
+    seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,20 +60,13 @@ class CandidatePoses:
     def of(
         cls,
         model: RobotModel,
-        candidates: int | Path,
-        working: str | None,
-        payload: float | None,
-        least: int,
+        request: PoseRequest,
         rng: np.random.Generator,
-        seed: int,
         progress: Progress,
     ) -> CandidatePoses:
-        """So many random `candidates`, or those of a file, at least `least`; `working` as in `working_volume`, `payload` in kg.
-
-        Raises `FlexcalError` as `pose_candidates`, `read_pose_pool` and `working_volume` do.
-        """
-        checker = CollisionChecker(model)
-        place = working_volume(checker, working, seed)
+        """As many as are to be chosen or more; raises `FlexcalError` as `pose_candidates`, `read_pose_pool`, `working_volume` do."""
+        checker, candidates = CollisionChecker(model), request.candidates
+        place = working_volume(checker, request.working, request.seed)
         given = (
             read_pose_pool(candidates, model).drawn(MOST_GIVEN)
             if isinstance(candidates, Path)
@@ -59,14 +77,14 @@ class CandidatePoses:
                 model,
                 rng=rng,
                 candidates=given,
-                least=least,
-                setup=MeasuringSetup.declared(model, payload),
+                least=request.count,
+                setup=MeasuringSetup.declared(model, request.payload),
                 working=None if place is None else place.q,
                 checker=checker,
                 progress=progress,
             )
         files = [candidates] if isinstance(candidates, Path) else []
-        if (file := working_file(working)) is not None:
+        if (file := working_file(request.working)) is not None:
             files.append(file)
         return cls(checker, found, given if isinstance(given, PosePool) else None, place, tuple(files))
 

@@ -7,8 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from flexcal.data.experiments import PLAN, Cell, FolderCell, labels, write_measured_poses, write_recordings
 from flexcal.data.plans import MultisinePlan, PosePlan
 from flexcal.data.recordings import Recording
@@ -19,7 +17,7 @@ from flexcal.jobs.inputs import read_plan_for_robot
 from flexcal.jobs.result_files import header, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth, read_truth_of, write_truth
+from flexcal.virtual_cell import CellConfig, VirtualCell, write_truth
 
 VIRTUAL = "virtual"
 
@@ -81,7 +79,10 @@ def measure(
     drawn: dict[str, float] = {}
     source: Cell
     if cell == VIRTUAL:
-        source, drawn = _virtual(model, config, seed, truth)
+        beside = model.path.parent / "cell.yaml"
+        file = beside if config is None and beside.is_file() else config
+        settings = CellConfig() if file is None else read_yaml(file, CellConfig)
+        source, drawn = VirtualCell.drawn(model, settings, seed, truth)
     else:
         source = FolderCell(cell, model)
     if isinstance(plan, PosePlan):
@@ -97,21 +98,6 @@ def measure(
         write_truth(out / "truth.yaml", drawn)
     write_results(out, result.document())
     return result
-
-
-def _virtual(
-    model: RobotModel, config: Path | None, seed: int, truth: Path | None
-) -> tuple[VirtualCell, dict[str, float]]:
-    """The cell and its hidden truth."""
-    beside = model.path.parent / "cell.yaml"
-    file = beside if config is None and beside.is_file() else config
-    settings = CellConfig() if file is None else read_yaml(file, CellConfig)
-    drawn = (
-        draw_truth(model, settings.spread, np.random.default_rng([seed, 0]))
-        if truth is None
-        else read_truth_of(truth, model)
-    )
-    return VirtualCell(model.with_values(drawn), settings, seed, controller_model=model), drawn
 
 
 def _measure_poses(source: Cell, plan: PosePlan, out: Path, progress: Progress) -> int:

@@ -11,8 +11,8 @@ import numpy as np
 
 from flexcal.data.plans import PosePlan
 from flexcal.data.poses import PosePool, read_poses
-from flexcal.design.poses import CriterionName, NextPoses, WorkingVolume, next_poses
-from flexcal.jobs.experiments.candidate_poses import CandidatePoses
+from flexcal.design.poses import NextPoses, WorkingVolume, next_poses
+from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
 from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_pose_plan
 from flexcal.jobs.inputs import robot_provenance
 from flexcal.model.robot import RobotModel
@@ -66,37 +66,33 @@ class NextPosesPlan:
 def plan_next_poses(
     robot: Path,
     out: Path,
-    count: int,
+    request: PoseRequest,
     *,
     measured: Sequence[Path],
-    criterion: CriterionName = "c",
-    candidates: int | Path = 4000,
-    working: str | None = None,
-    wanted: float | None = None,
-    payload: float | None = None,
-    seed: int = 0,
     command: str = "",
     progress: Progress = silent,
 ) -> NextPosesPlan:
-    """Write to `out` the next poses, at most `count`, after the files of `measured` ones; nothing where these are enough.
+    """Write to `out` the next poses, after the files of `measured` ones; nothing where these are enough.
 
-    They end where the predicted tool error is `wanted` (m), or without it where more poses only average. The other arguments are those of
-    `plan_calibration_poses`. Raises `FlexcalError` as `next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
+    They end where the predicted tool error is the wanted one, or without it where more poses only average. Raises `FlexcalError` as
+    `next_poses`, `read_poses`, `read_pose_pool` and `working_volume` do.
     """
-    model = RobotModel.from_yaml(robot)
+    model, count, wanted = RobotModel.from_yaml(robot), request.count, request.wanted
     known = read_poses(measured, model, require_motion=False)
-    rng = np.random.default_rng([seed, 7])
-    choice = CandidatePoses.of(model, candidates, working, payload, count, rng, seed, progress)
-    after = next_poses(choice.found, known, count, rng=rng, criterion=criterion)
+    rng = np.random.default_rng([request.seed, 7])
+    choice = CandidatePoses.of(model, request, rng, progress)
+    after = next_poses(choice.found, known, count, rng=rng, criterion=request.criterion)
     stop = after.enough(wanted)
     origin = robot_provenance(model, (*measured, *choice.files))
     if stop == 0:
         return NextPosesPlan(
-            None, None, after, stop, wanted, seed, choice.working, choice.pool, origin, command
+            None, None, after, stop, wanted, request.seed, choice.working, choice.pool, origin, command
         )
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
     after = replace(after, design=design)
-    result = NextPosesPlan(plan, out, after, stop, wanted, seed, choice.working, choice.pool, origin, command)
+    result = NextPosesPlan(
+        plan, out, after, stop, wanted, request.seed, choice.working, choice.pool, origin, command
+    )
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result

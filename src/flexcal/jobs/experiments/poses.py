@@ -12,7 +12,6 @@ import numpy as np
 from flexcal.data.plans import PosePlan, page_beside, write_plan
 from flexcal.data.poses import PosePool
 from flexcal.design.poses import (
-    CriterionName,
     MeasurementOrder,
     PoseCurve,
     PoseDesign,
@@ -24,7 +23,7 @@ from flexcal.design.poses import (
     random_poses,
 )
 from flexcal.design.scene import MeasuringSetup
-from flexcal.jobs.experiments.candidate_poses import CandidatePoses
+from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
 from flexcal.jobs.inputs import robot_provenance
 from flexcal.jobs.result_files import identifiability_block
 from flexcal.model.robot import RobotModel
@@ -144,31 +143,22 @@ def working_block(working: WorkingVolume | None) -> dict[str, Any] | None:
 def plan_calibration_poses(
     robot: Path,
     out: Path,
-    count: int,
+    request: PoseRequest,
     *,
-    criterion: CriterionName = "c",
-    candidates: int | Path = 4000,
-    working: str | None = None,
-    wanted: float | None = None,
-    payload: float | None = None,
-    seed: int = 0,
     command: str = "",
     progress: Progress = silent,
 ) -> CalibrationPosePlan:
-    """Choose `count` poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
+    """Choose poses for the calibration of the robot as it is known, and write the plan to `out`, its page beside it.
 
-    The poses are in an order of short moves.
-
-    `candidates`: so many random poses to choose from, or a file of poses. `working`: where the tool error counts, as in `working_volume`.
-    With `wanted`, m, only as many poses as bring the predicted tool error down to it. `payload` in kg, None for the file's, else the
-    declared one. Raises `FlexcalError` as `design_poses`, `fewest_poses`, `read_pose_pool` and `working_volume` do.
+    The poses are in an order of short moves; where a tool error is wanted, only as many as bring the predicted one down to it. Raises
+    `FlexcalError` as `design_poses`, `fewest_poses`, `read_pose_pool` and `working_volume` do.
     """
-    model = RobotModel.from_yaml(robot)
+    model, seed, count = RobotModel.from_yaml(robot), request.seed, request.count
     rng = np.random.default_rng([seed, 2])
-    choice = CandidatePoses.of(model, candidates, working, payload, count, rng, seed, progress)
-    if wanted is not None:
-        count = fewest_poses(choice.found, count, wanted)
-    design = choose_poses(choice.found, count, rng=rng, criterion=criterion, progress=progress)
+    choice = CandidatePoses.of(model, request, rng, progress)
+    if request.wanted is not None:
+        count = fewest_poses(choice.found, count, request.wanted)
+    design = choose_poses(choice.found, count, rng=rng, criterion=request.criterion, progress=progress)
     way = measurement_order(choice.checker, design.plan.q)
     design = design.in_order(way.order)
     curve = pose_curve(design, rng=np.random.default_rng([seed, 5]), progress=progress)

@@ -13,7 +13,7 @@ from flexcal.errors import FlexcalError
 from flexcal.files.formats import read_yaml
 from flexcal.hard_cell import HardCell, counterparts
 from flexcal.model.robot import RobotModel
-from flexcal.virtual_cell import CellConfig, VirtualCell, draw_truth, read_truth, read_truth_of, write_truth
+from flexcal.virtual_cell import CellConfig, VirtualCell, write_truth
 
 CellName = Literal["virtual", "hard"]
 """Which robot stands in the demonstration's cell."""
@@ -44,8 +44,6 @@ def open_cell(
         write_truth(hidden, counterparts(cell.robot))
         return cell
     config = read_yaml(robot.parent / "cell.yaml", CellConfig)
-    rng = np.random.default_rng([seed, 0])
-    write_truth(
-        hidden, draw_truth(nominal, config.spread, rng) if truth is None else read_truth_of(truth, nominal)
-    )
-    return VirtualCell(nominal.with_values(read_truth(hidden)), config, seed, controller_model=nominal)
+    cell, values = VirtualCell.drawn(nominal, config, seed, truth)
+    write_truth(hidden, values)
+    return cell
