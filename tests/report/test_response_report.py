@@ -14,7 +14,7 @@ from outline import Outline
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.response.planned import IdentifiedResponses
-from flexcal.jobs.result_files import read_results, write_results
+from flexcal.jobs.result_files import RunRecord, read_results, write_results
 from flexcal.jobs.two_stage import TwoStageRun
 from flexcal.report.checks import limit_of, response_checks
 from flexcal.report.pages import ResponseStudy
@@ -57,7 +57,9 @@ def left(folder: Path, responses: Sequence[FrequencyResponse]) -> ResponseStudy:
     for response, file in zip(responses, files, strict=True):
         response.save(file)
     origin = {f"input.log_{k}.csv": f"{k:064d}" for k in range(30)}
-    found = IdentifiedResponses(tuple(responses), files, "arm", origin, "flexcal identify response r f")
+    found = IdentifiedResponses(
+        tuple(responses), files, "arm", RunRecord(origin, "flexcal identify response r f")
+    )
     write_results(folder, found.document())
     report_folder(folder)
     return ResponseStudy(read_results(folder), responses)

@@ -31,7 +31,7 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
     stored_estimates,
 )
-from flexcal.jobs.result_files import header, write_results
+from flexcal.jobs.result_files import RunRecord, header, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pages import RepeatabilityStudy, write_repeatability_report
@@ -43,16 +43,14 @@ class RobotRepeatability:
     """The `visited` poses; `errors` (N, 3) m, measured minus commanded, by how the command is understood.
 
     "nominal": the nominal robot's own, with instrument and measured point registered by best fit; "calibrated": the calibrated one's.
-    `drifts` are those of the poses that were visited often enough while a clock ran. `provenance` has all files with their hashes,
-    `command` the command line, where there was one.
+    `drifts` are those of the poses that were visited often enough while a clock ran. `record` says what this comes from.
     """
 
     poses: PoseSet
     visited: list[PoseRepeatability]
     errors: Mapping[str, np.ndarray]
     drifts: list[PoseDrift]
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
 
     @property
     def remarks(self) -> tuple[str, ...]:
@@ -100,8 +98,7 @@ class RobotRepeatability:
             "drift": self._drift(),
             "each": rows,
             "remarks": list(self.remarks),
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
     def _drift(self) -> dict[str, Any] | None:
@@ -186,7 +183,9 @@ def repeat_robot(
     stored = None if calibrated is None else calibrated.stored
     blocks = () if calibrated is None else tuple(calibrated.blocks)
     origin = provenance([robot, nominal.urdf, *files], None, stored, blocks)
-    result = RobotRepeatability(poses, visited, errors, pose_drifts(poses, visited), origin, command)
+    result = RobotRepeatability(
+        poses, visited, errors, pose_drifts(poses, visited), RunRecord(origin, command)
+    )
     if out is not None:
         document = result.document()
         write_results(out, document)

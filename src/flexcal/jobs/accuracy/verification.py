@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -46,7 +46,7 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
 )
 from flexcal.jobs.pages import report_folder
-from flexcal.jobs.result_files import header, write_arm, write_points, write_results
+from flexcal.jobs.result_files import RunRecord, header, write_arm, write_points, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust
@@ -61,9 +61,8 @@ class RobotVerification:
     `covariance` is that of the errors, as predicted. `refit` says what was fitted to these poses, None where nothing: then `result` has
     leave-one-out errors, and `as_calibrated` those without. `better` has what would explain most of the errors placed again, None where
     nothing would. `uncalibrated` are points that the calibration did not measure and that were not refitted; `outside` says which poses
-    lie outside the joint ranges of the calibration. `fitted` are the files among them that the calibration was made from, `provenance`
-    all files with their hashes, `command` the command line, where there was one. Of very many points all this is of a `sample`, and
-    `everywhere` are the errors at all of them.
+    lie outside the joint ranges of the calibration. `fitted` are the files among them that the calibration was made from, `record` says
+    what all this comes from. Of very many points it is of a `sample`, and `everywhere` are the errors at all of them.
     """
 
     model: RobotModel
@@ -77,8 +76,7 @@ class RobotVerification:
     uncalibrated: tuple[str, ...]
     outside: str
     fitted: tuple[str, ...]
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
     sample: StratifiedSample | None = None
     everywhere: ErrorStatistics | None = None
 
@@ -154,8 +152,7 @@ class RobotVerification:
             "sample": subsample_document(self.sample, self.everywhere),
             "fitted": list(self.fitted),
             "remarks": list(self.remarks),
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
 
@@ -207,8 +204,7 @@ def verify_robot(
         uncalibrated=() if "point" in refit else unmeasured,
         outside=outside_ranges(calibrated, measured.q),
         fitted=fitted,
-        provenance=origin,
-        command=command,
+        record=RunRecord(origin, command),
         sample=sample,
         everywhere=None if sample is None else all_errors(standing, measured, progress),
     )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,7 @@ from flexcal.jobs.inputs import (
     require_distinct_files,
     unmeasured_targets_remark,
 )
+from flexcal.jobs.result_files import RunRecord
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
 from flexcal.report.pages import MapStudy, write_map_page
@@ -54,8 +55,7 @@ class RobotMap:
 
     `scale` is what they say of the map, `before` of the uncalibrated robot; `unmeasured` what there is to say of a point that the
     calibration did not measure. `box` (2, 3) m, None for given poses or anywhere; `sources` over all poses, `worst_sources` at each of the
-    `worst` rows. `provenance` has all files with their hashes, `command` the command line, where there was one. `sample` says which of very
-    many verification points were taken.
+    `worst` rows. `record` says what this comes from. `sample` says which of very many verification points were taken.
     """
 
     reach: Propagation
@@ -69,8 +69,7 @@ class RobotMap:
     unmeasured: tuple[str, ...]
     fitted: tuple[str, ...]
     outside: str
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
     sample: StratifiedSample | None = None
 
     @property
@@ -135,8 +134,7 @@ class RobotMap:
             },
             "verdict": self.trust.document(),
             "remarks": list(self.remarks),
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
 
@@ -198,8 +196,7 @@ def map_accuracy(
         unmeasured_targets_remark(calibrated, [reach.target]),
         fitted,
         outside_ranges(calibrated, q),
-        origin,
-        command,
+        RunRecord(origin, command),
         sample,
     )
     page = MapStudy(model, found, box, result.document(), scale, study)

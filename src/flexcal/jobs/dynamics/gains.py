@@ -28,7 +28,7 @@ from flexcal.jobs.logs import (
     require_no_wrenches,
     scratch_folder,
 )
-from flexcal.jobs.result_files import header, quantities, write_results
+from flexcal.jobs.result_files import RunRecord, header, quantities, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, gain_checks
@@ -80,8 +80,7 @@ class IdentifiedGains:
     """Drive gains: `factors` to the `declared` gains (n,) of `signals: tau:`, which are 1 where there are none.
 
     `halves` are the factors from each half of the recordings, None where a half alone does not determine them. `payloads` are kg by log,
-    `signals` as `preprocessing_document` has them; `provenance` has all files with their hashes, `command` the command line, where there
-    was one.
+    `signals` as `preprocessing_document` has them; `record` says what they come from.
     """
 
     factors: Estimate
@@ -90,8 +89,7 @@ class IdentifiedGains:
     payloads: tuple[float, ...]
     signals: Mapping[str, Any]
     robot: str
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
 
     @property
     def gains(self) -> list[float]:
@@ -122,8 +120,7 @@ class IdentifiedGains:
             "gains": self.gains,
             "signals": dict(self.signals),
             "payloads_kg": list(self.payloads),
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
 
@@ -163,8 +160,7 @@ def identify_gains(
         tuple(payloads),
         preprocessing_document(treatment, read),
         model.name,
-        provenance([robot, model.urdf, *logs]),
-        command,
+        RunRecord(provenance([robot, model.urdf, *logs]), command),
     )
     if out is not None:
         from flexcal.jobs.pages import report_folder

@@ -11,7 +11,7 @@ from flexcal.files.formats import provenance, read_estimates
 from flexcal.jobs.dynamics.identification import identify_dynamics
 from flexcal.jobs.dynamics.learned_residual import LearnedDynamics
 from flexcal.jobs.dynamics.result import DynamicsIdentification
-from flexcal.jobs.result_files import estimates_target, store_block
+from flexcal.jobs.result_files import RunRecord, estimates_target, store_block
 from flexcal.model.robot import RobotModel, with_blocks
 from flexcal.progress import Progress, silent
 
@@ -67,8 +67,9 @@ def identify_robot_dynamics(
         found,
         estimate=replace(found.estimate, provenance=origin),
         estimates=target,
-        provenance=provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks)),
-        command=command,
+        record=RunRecord(
+            provenance([robot, bare.urdf, *logs, *validate], options, used, tuple(blocks)), command
+        ),
     )
     store_block(source, target, blocks, "dynamics", result.estimate)
     if result.learned is not None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from html import escape
 from pathlib import Path
@@ -26,6 +26,8 @@ from flexcal.jobs.logs import Preprocessing
 from flexcal.jobs.pages import REPORT, report_folder
 from flexcal.jobs.result_files import (
     ESTIMATES,
+    NOT_RECORDED,
+    RunRecord,
     dropped_parameters,
     header,
     quantities,
@@ -47,8 +49,7 @@ class DynamicsIdentification:
     links' weight that were accepted, `weight_shares` the identified weight of the links over that of the URDF, empty where it was
     accepted. `external` tells how much of the measured external torques the motors' show, None without a force sensor. `learned` is what
     was learned beside the estimate, None where nobody asked for it; `predictions` are those of all logs. `estimates` is the file that it
-    was stored in, None where it was not; `provenance` has all files with their hashes, `command` the command
-    line, where there was one.
+    was stored in, None where it was not; `record` says what it comes from.
     """
 
     estimate: Estimate
@@ -70,8 +71,7 @@ class DynamicsIdentification:
     predictions: tuple[TorquePrediction, ...]
     seconds: float
     estimates: Path | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
+    record: RunRecord = NOT_RECORDED
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {self.train.observation.model.name}: {self._headline}>"
@@ -192,8 +192,7 @@ class DynamicsIdentification:
             else self.learned.document(self.estimates or Path(LEARNED)),
             "seconds": self.seconds,
             "estimates": self.estimates,
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
     def _essential_parameters(self) -> dict[str, Any]:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Literal
 
@@ -34,6 +33,7 @@ from flexcal.jobs.experiments.optimised_excitation import (
 )
 from flexcal.jobs.experiments.standard_plans import frequency_plan, read_frequency_poses
 from flexcal.jobs.inputs import robot_provenance
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pages import FrequencyDesignStudy, write_frequency_page
@@ -44,7 +44,7 @@ class DesignedFrequency:
     """A plan, the file it was written to and what it will tell; the `choice` of its poses and their `curve` where they were chosen.
 
     `flat` is the same with equal amplitudes. `curve` holds numbers of poses and the largest standard deviation of a stiffness with as many,
-    chosen and at random, (3, K). `provenance` says what it comes from, `command` the command line, where there was one.
+    chosen and at random, (3, K). `record` says what it comes from.
     """
 
     planned: PlannedResponses
@@ -53,8 +53,7 @@ class DesignedFrequency:
     choice: FrequencyPoseSelection | None = None
     curve: np.ndarray | None = None
     placements: tuple[Placement, ...] = ()
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
+    record: RunRecord = NOT_RECORDED
 
     @property
     def plan(self) -> MultisinePlan:
@@ -90,8 +89,7 @@ class DesignedFrequency:
             "predicted_std": self.planned.std(),
             "predicted_std_flat": self.flat.std(),
             "largest_stiffness_std": {"name": name, "std": largest},
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
         if self.placements:
             result["payload_placements"] = [{"com": p.com, "largest_std": p.std} for p in self.placements]
@@ -168,7 +166,7 @@ def plan_frequency_experiments(
     places = payload_placements(model, planned.plan, sensors, progress) if place_payload else ()
     files = [file for file in (poses, declared_sensors(robot)) if file is not None]
     found = DesignedFrequency(
-        planned, flat, out, choice, curve, places, robot_provenance(model, files), command
+        planned, flat, out, choice, curve, places, RunRecord(robot_provenance(model, files), command)
     )
     write_plan(out, planned.plan)
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())

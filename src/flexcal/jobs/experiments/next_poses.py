@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from flexcal.design.poses import NextPoses, WorkingVolume, next_poses
 from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
 from flexcal.jobs.experiments.poses import flank_block, pool_block, working_block, write_pose_plan
 from flexcal.jobs.inputs import robot_provenance
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.units import MILLIMETRE
@@ -35,8 +36,7 @@ class NextPosesPlan:
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
+    record: RunRecord = NOT_RECORDED
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `stop_after` counts the next poses, and is null where those asked for do not suffice."""
@@ -57,8 +57,7 @@ class NextPosesPlan:
                 "flanks": flank_block(design),
                 "tool_error_mm": found.tool_error / MILLIMETRE,
                 "least_possible_mm": found.possible / MILLIMETRE,
-                "provenance": dict(self.provenance),
-                "command": self.command,
+                **self.record.document(),
             }
         )
 
@@ -86,13 +85,21 @@ def plan_next_poses(
     origin = robot_provenance(model, (*measured, *choice.files))
     if stop == 0:
         return NextPosesPlan(
-            None, None, after, stop, wanted, request.seed, choice.working, choice.pool, origin, command
+            None,
+            None,
+            after,
+            stop,
+            wanted,
+            request.seed,
+            choice.working,
+            choice.pool,
+            RunRecord(origin, command),
         )
     design = after.design.in_order(np.arange(count if stop is None else stop))
     plan = replace(design.plan, name="calibration")
     after = replace(after, design=design)
     result = NextPosesPlan(
-        plan, out, after, stop, wanted, request.seed, choice.working, choice.pool, origin, command
+        plan, out, after, stop, wanted, request.seed, choice.working, choice.pool, RunRecord(origin, command)
     )
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from flexcal.design.poses import (
 from flexcal.design.scene import MeasuringSetup
 from flexcal.jobs.experiments.candidate_poses import CandidatePoses, PoseRequest
 from flexcal.jobs.inputs import robot_provenance
-from flexcal.jobs.result_files import identifiability_block
+from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, identifiability_block
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pages import PoseStudy, write_pose_page
@@ -37,13 +36,12 @@ VERIFICATION = "verification"
 
 @dataclass(frozen=True, eq=False)
 class DesignedPoses:
-    """A plan of random poses for a verification, its file, the seed they were drawn with, what it comes from, and the command line."""
+    """A plan of random poses for a verification, its file, the seed they were drawn with, and what it comes from."""
 
     plan: PosePlan
     file: Path
     seed: int
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
 
     def document(self) -> dict[str, Any]:
         """The JSON document."""
@@ -51,8 +49,7 @@ class DesignedPoses:
             "plan": self.file,
             "poses": len(self.plan),
             "seed": self.seed,
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
 
@@ -60,8 +57,7 @@ class DesignedPoses:
 class CalibrationPosePlan:
     """A plan of calibration poses, its file, why these, the way through them, and where the robot will work (None: anywhere).
 
-    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `provenance` says what the plan comes from,
-    `command` the command line.
+    `pool` are the given poses they were chosen from, if any; else `seed` drew the random ones. `record` says what the plan comes from.
     """
 
     plan: PosePlan
@@ -72,8 +68,7 @@ class CalibrationPosePlan:
     seed: int
     working: WorkingVolume | None = None
     pool: PosePool | None = None
-    provenance: Mapping[str, str] = field(default_factory=dict)
-    command: str = ""
+    record: RunRecord = NOT_RECORDED
 
     def document(self) -> dict[str, Any]:
         """The JSON document; `chosen` are the poses' numbers in the file they come from; those left out there stand beside, with why.
@@ -104,8 +99,7 @@ class CalibrationPosePlan:
                     }
                     for n, c, r in zip(curve.counts, curve.chosen, curve.random, strict=True)
                 ],
-                "provenance": dict(self.provenance),
-                "command": self.command,
+                **self.record.document(),
             }
         )
 
@@ -165,7 +159,7 @@ def plan_calibration_poses(
     plan = replace(design.plan, name="calibration")
     origin = robot_provenance(model, choice.files)
     result = CalibrationPosePlan(
-        plan, out, design, curve, way, seed, choice.working, choice.pool, origin, command
+        plan, out, design, curve, way, seed, choice.working, choice.pool, RunRecord(origin, command)
     )
     write_pose_plan(out, model, plan, result.document(), choice.working)
     return result
@@ -179,7 +173,7 @@ def plan_verification_poses(
     setup = MeasuringSetup.declared(model, payload)
     plan = random_poses(model, count, np.random.default_rng([seed, 4]), setup)
     plan = replace(plan, name=VERIFICATION)
-    result = DesignedPoses(plan, out, seed, robot_provenance(model), command)
+    result = DesignedPoses(plan, out, seed, RunRecord(robot_provenance(model), command))
     write_pose_plan(out, model, plan, result.document(), None)
     return result
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -29,6 +28,7 @@ from flexcal.design.trajectories import (
 )
 from flexcal.errors import InputError
 from flexcal.files.formats import provenance
+from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
 from flexcal.report.pages import write_trajectory_page
@@ -118,8 +118,7 @@ class DesignedTrajectories:
     rate_hz: float
     assumed_friction: tuple[str, ...]
     file: Path
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
 
     @property
     def design(self) -> TrajectoryDesign:
@@ -207,8 +206,7 @@ class DesignedTrajectories:
             "remarks": list(self.remarks),
             "page": self.page,
             "seed": plan.seed,
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
 
@@ -233,7 +231,7 @@ def plan_trajectories(
     origin = provenance([robot, nominal.urdf, *(() if request.after is None else (request.after,))])
     designs = request.design(known, progress)
     timed = tuple(timed_motion(designs[0], number, rate_hz) for number in range(len(designs[0].plan)))
-    found = DesignedTrajectories(designs, timed, rate_hz, assumed, out, origin, command)
+    found = DesignedTrajectories(designs, timed, rate_hz, assumed, out, RunRecord(origin, command))
     write_trajectory_page(found.page, found.design, found.document())
     for motion, (csv, ros) in zip(timed, found.timed_files, strict=True):
         motion.positions.write_csv(csv)

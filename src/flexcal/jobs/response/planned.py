@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -22,7 +22,7 @@ from flexcal.frequency.periodic import (
     local_polynomial_responses,
     reciprocity,
 )
-from flexcal.jobs.result_files import header, write_results
+from flexcal.jobs.result_files import RunRecord, header, write_results
 from flexcal.model.robot import RobotModel, sensor_column
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, response_checks
@@ -33,15 +33,13 @@ from flexcal.report.results import relative_to_diagonal
 class IdentifiedResponses:
     """Measured frequency responses by pose, and the files that hold them.
 
-    `provenance` has all files that they come from, with their hashes, `command` the command line, where there was one. `declared` names the
-    sensors on the arm of robot.yaml.
+    `record` says what they come from. `declared` names the sensors on the arm of robot.yaml.
     """
 
     responses: tuple[FrequencyResponse, ...]
     files: tuple[Path, ...]
     robot: str
-    provenance: Mapping[str, str]
-    command: str = ""
+    record: RunRecord
     declared: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
@@ -52,8 +50,7 @@ class IdentifiedResponses:
             "responses": self._entries,
             "reciprocity": self._pairs,
             "verdict": self.trust.document(),
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
     @cached_property
@@ -122,7 +119,9 @@ def identify_response(
     write_plan(out / PLAN, plan)
     logs = [existing_file(folder, label.name) for label in labels(plan)]
     origin = provenance([robot, model.urdf, folder / PLAN, *logs], {"method": method})
-    result = IdentifiedResponses(responses, files, model.name, origin, command, tuple(model.sensors))
+    result = IdentifiedResponses(
+        responses, files, model.name, RunRecord(origin, command), tuple(model.sensors)
+    )
     from flexcal.jobs.pages import report_folder
 
     write_results(out, result.document())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
@@ -41,7 +41,7 @@ from flexcal.frequency.arbitrary import (
 from flexcal.importing.columns import ResponseRecords, read_response_records
 from flexcal.jobs.response.feedback import FeedbackCheck
 from flexcal.jobs.response.spectra import measure_spectra
-from flexcal.jobs.result_files import header, write_response_arrays, write_results
+from flexcal.jobs.result_files import RunRecord, header, write_response_arrays, write_results
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, excitation_checks
 
@@ -74,9 +74,8 @@ class IdentifiedExcitation:
     halves: HalfDifference | None
     fed: FeedbackCheck
     period_s: float | None
-    provenance: Mapping[str, str]
+    record: RunRecord
     files: tuple[Path, ...]
-    command: str = ""
 
     @property
     def response(self) -> LocalResponse:
@@ -119,8 +118,7 @@ class IdentifiedExcitation:
             "masses": self._masses(),
             "halves": None if self.halves is None else asdict(self.halves),
             "remarks": [*self.measured.remarks, *self._remarks()],
-            "provenance": dict(self.provenance),
-            "command": self.command,
+            **self.record.document(),
         }
 
     def _element(self, y: int, u: int) -> dict[str, Any]:
@@ -272,9 +270,8 @@ def _identified(
             guessed=measured.guessed,
         ),
         period_s=None if period is None else period * spectra.time_step,
-        provenance=provenance(list(files), {"method": identified.response.method}),
+        record=RunRecord(provenance(list(files), {"method": identified.response.method}), command),
         files=tuple(files),
-        command=command,
     )
 
 

@@ -1,6 +1,8 @@
 from .document import (
+    NOT_RECORDED,
     RESULTS,
     Kind,
+    RunRecord,
     dropped_parameters,
     header,
     identifiability_block,
@@ -20,9 +22,11 @@ from .verification_points import VERIFICATION, read_verification, write_verifica
 
 __all__ = [
     "ESTIMATES",
+    "NOT_RECORDED",
     "RESULTS",
     "VERIFICATION",
     "Kind",
+    "RunRecord",
     "dropped_parameters",
     "estimates_target",
     "header",

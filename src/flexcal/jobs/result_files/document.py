@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal, get_args
 
@@ -43,6 +44,22 @@ SCHEMA = 1
 def header(kind: Kind) -> dict[str, Any]:
     """What every results.json begins with."""
     return {"kind": kind, "schema": SCHEMA}
+
+
+@dataclass(frozen=True)
+class RunRecord:
+    """What a result comes from: program, options and the SHA-256 of all files; and the command line, where there was one."""
+
+    provenance: Mapping[str, str]
+    command: str = ""
+
+    def document(self) -> dict[str, Any]:
+        """The end of a JSON document."""
+        return {"provenance": dict(self.provenance), "command": self.command}
+
+
+NOT_RECORDED = RunRecord({})
+"""That of a result which was not made from files."""
 
 
 def json_text(document: Mapping[str, Any]) -> str:
