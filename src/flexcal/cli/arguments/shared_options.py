@@ -29,16 +29,17 @@ def _any_number(metavar: str, kind: Callable[[str], Any]) -> PrimitiveConstructo
     )
 
 
+def file_argument(metavar: str, text: str) -> Any:
+    """Notes of a positional argument of one or several files."""
+    return arg(metavar=metavar, help=text, help_behavior_hint="")
+
+
 Paths = Annotated[tuple, _any_number("FILE...", Path)]
 Numbers = Annotated[tuple, _any_number("X...", float)]
 Texts = Annotated[tuple, _any_number("TEXT...", str)]
 PoseFiles = Annotated[
     Positional[Paths],
-    arg(
-        metavar="POSES...",
-        help="files of measured poses (CSV or Parquet), one or several",
-        help_behavior_hint="",
-    ),
+    file_argument("POSES...", "files of measured poses (CSV or Parquet), one or several"),
 ]
 Estimates = Annotated[
     MaybePath,
@@ -54,6 +55,15 @@ Accept = Annotated[
         metavar="weight",
         help="weight: go on where the torques do not hold the weight of the links, as of guessed masses or an arm that springs balance.",
         help_behavior_hint="",
+    ),
+]
+Jobs = Annotated[int, arg(metavar="N", help="Number of logs read in parallel, each in its own process.")]
+EstimatesFolder = Annotated[
+    MaybePath,
+    arg(
+        metavar="DIR",
+        help="Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report.",
+        help_behavior_hint="(default: beside robot.yaml)",
     ),
 ]
 Folder = Annotated[Path, arg(metavar="DIR")]
@@ -78,8 +88,9 @@ def require_robot(robot: Path, *others: Path) -> None:
     raise InputError(f"{robot} is no robot.yaml; name the YAML file that describes the robot first.")
 
 
-def require_files(files: tuple[Path, ...], name: str) -> None:
-    """Raise `InputError` where no file was given."""
+def require_robot_and_files(robot: Path, files: tuple[Path, ...], name: str) -> None:
+    """Raise `InputError` where ROBOT is evidently something else, and where no file was given."""
+    require_robot(robot, *files)
     if not files:
         raise InputError(f"no {name} given; name at least one file after robot.yaml.")
 

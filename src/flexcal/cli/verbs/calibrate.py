@@ -16,8 +16,7 @@ from flexcal.cli.arguments.shared_options import (
     PoseFiles,
     Robot,
     require_at_least,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
@@ -81,10 +80,8 @@ class Calibrate:
         from flexcal.calibration.diagnostics import is_implausible
         from flexcal.calibration.fit import KNOWN_POINT_STD
         from flexcal.cli.tables.results import dropped_table, error_table, uncalibrated_rows, weak_table
-        from flexcal.cli.verbs.calibrate import considered_lines
 
-        require_robot(self.robot, *self.poses)
-        require_files(self.poses, "POSES")
+        require_robot_and_files(self.robot, self.poses, "POSES")
         require_at_least(0, secant_scale=self.secant_scale)
         console = Console(self.json)
         with console.progress() as progress:

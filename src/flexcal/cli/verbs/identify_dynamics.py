@@ -11,13 +11,14 @@ from tyro.conf import Positional, arg
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
     Accept,
+    EstimatesFolder,
+    Jobs,
     Json,
-    MaybePath,
     Paths,
     Robot,
+    file_argument,
     require_at_least,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_option
 from flexcal.cli.terminal.console import Console
@@ -48,7 +49,7 @@ class IdentifyDynamics:
     robot: Robot
     logs: Annotated[
         Positional[Paths],
-        arg(metavar="LOGS...", help="joint logs (CSV or Parquet), one or several", help_behavior_hint=""),
+        file_argument("LOGS...", "joint logs (CSV or Parquet), one or several"),
     ]
     hold_out: Annotated[str, arg(metavar="last:SHARE", help_behavior_hint="(for example last:0.3)")] = ""
     """Hold out this last fraction of every log, and predict its torques."""
@@ -63,10 +64,8 @@ class IdentifyDynamics:
     With the tilts of the bearings too (qax1…, qay1…) their stiffness is identified."""
     learn_residual: Annotated[bool, arg(help=_LEARNING)] = False
     accept: Accept = ()
-    jobs: Annotated[int, arg(metavar="N")] = 1
-    """Number of logs read in parallel, each in its own process."""
-    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    jobs: Jobs = 1
+    out: EstimatesFolder = None
     json: Json = False
 
     def run(self) -> None:
@@ -81,8 +80,7 @@ class IdentifyDynamics:
         from flexcal.jobs.logs import preprocessing_remarks
         from flexcal.report.checks import check_external, check_fit, check_weight_shares
 
-        require_robot(self.robot, *self.logs)
-        require_files(self.logs, "LOGS")
+        require_robot_and_files(self.robot, self.logs, "LOGS")
         require_at_least(1, jobs=self.jobs)
         share = _share(self.hold_out)
         if share and self.validate:

@@ -9,13 +9,14 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    Jobs,
     Json,
     MaybePath,
     Paths,
     Robot,
+    file_argument,
     require_at_least,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
 from flexcal.cli.terminal.console import Console
 
@@ -31,14 +32,9 @@ class IdentifyGains:
     robot: Robot
     logs: Annotated[
         Positional[Paths],
-        arg(
-            metavar="LOGS...",
-            help="joint logs (CSV or Parquet), with and without payload",
-            help_behavior_hint="",
-        ),
+        file_argument("LOGS...", "joint logs (CSV or Parquet), with and without payload"),
     ]
-    jobs: Annotated[int, arg(metavar="N")] = 1
-    """Number of logs read in parallel, each in its own process."""
+    jobs: Jobs = 1
     out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: none)")] = None
     """Folder for report.html and results.json."""
     json: Json = False
@@ -49,8 +45,7 @@ class IdentifyGains:
         from flexcal.jobs.dynamics import identify_gains
         from flexcal.jobs.logs import preprocessing_remarks
 
-        require_robot(self.robot, *self.logs)
-        require_files(self.logs, "LOGS")
+        require_robot_and_files(self.robot, self.logs, "LOGS")
         require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:

@@ -9,8 +9,8 @@ from typing import Annotated
 from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
-from flexcal.cli.arguments.shared_options import Json, MaybePath, Robot, require_robot
-from flexcal.cli.arguments.suggested_commands import after_dynamics, estimates_entry_hint
+from flexcal.cli.arguments.shared_options import EstimatesFolder, Json, Robot, require_robot
+from flexcal.cli.arguments.suggested_commands import after_dynamics, stored_lines
 from flexcal.cli.terminal.console import Console
 
 
@@ -26,8 +26,7 @@ class IdentifyInertials:
     folder: Annotated[
         Positional[Path], arg(metavar="DIR", help="folder with plan.yaml and one joint log per trajectory")
     ]
-    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    out: EstimatesFolder = None
     json: Json = False
 
     def run(self) -> None:
@@ -49,9 +48,7 @@ class IdentifyInertials:
             f"relative torque error: {error['train']:.2f} % in the fit, {error['nominal']:.2f} % with the values of robot.yaml"
         )
         console.say(found.trust.sentence)
-        console.say(f"wrote {found.estimates}")
-        if self.out is not None:
-            console.say(f"wrote {self.out / 'report.html'}")
-            console.say(estimates_entry_hint(self.robot, found.estimates))
+        for line in stored_lines(self.robot, found.estimates, self.out):
+            console.say(line)
         loaded = f"flexcal design trajectory {self.robot} --loaded --out holding.yaml, for the payload"
         console.finish(document, after_dynamics(self.robot, found.nominal, loaded))

@@ -10,15 +10,17 @@ from tyro.conf import Positional, arg
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
     Accept,
+    EstimatesFolder,
+    Jobs,
     Json,
     MaybePath,
     Paths,
     Robot,
+    file_argument,
     require_at_least,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
-from flexcal.cli.arguments.suggested_commands import estimates_entry_hint, estimates_option
+from flexcal.cli.arguments.suggested_commands import estimates_option, stored_lines
 from flexcal.cli.terminal.console import Console
 
 if TYPE_CHECKING:
@@ -37,11 +39,7 @@ class IdentifyPayload:
     robot: Robot
     logs: Annotated[
         Positional[Paths],
-        arg(
-            metavar="LOGS...",
-            help="joint logs (CSV or Parquet) with the payload, or the folder of 'measure'",
-            help_behavior_hint="",
-        ),
+        file_argument("LOGS...", "joint logs (CSV or Parquet) with the payload, or the folder of 'measure'"),
     ]
     free: Annotated[Paths, arg(metavar="LOG...", help_behavior_hint="")] = ()
     """Joint logs without the payload; not those from which the estimates were identified."""
@@ -60,10 +58,8 @@ class IdentifyPayload:
         ),
     ] = None
     accept: Accept = ()
-    jobs: Annotated[int, arg(metavar="N")] = 1
-    """Number of logs read in parallel, each in its own process."""
-    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    jobs: Jobs = 1
+    out: EstimatesFolder = None
     json: Json = False
 
     def run(self) -> None:
@@ -72,8 +68,7 @@ class IdentifyPayload:
         from flexcal.jobs.logs import preprocessing_remarks
         from flexcal.jobs.payload import identify_robot_payload
 
-        require_robot(self.robot, *self.logs)
-        require_files(self.logs, "LOGS")
+        require_robot_and_files(self.robot, self.logs, "LOGS")
         require_at_least(1, jobs=self.jobs)
         console = Console(self.json)
         with console.progress() as progress:
@@ -100,10 +95,8 @@ class IdentifyPayload:
             console.say(remark)
         console.say(found.trust.sentence)
         console.say(f"as a line of robot.yaml: {found.declaration}")
-        console.say(f"wrote {found.estimates}")
-        if self.out is not None:
-            console.say(f"wrote {self.out / 'report.html'}")
-            console.say(estimates_entry_hint(self.robot, found.estimates))
+        for line in stored_lines(self.robot, found.estimates, self.out):
+            console.say(line)
         console.finish(document, self._next(found))
 
     def _next(self, found: RobotPayload) -> str:

@@ -16,6 +16,7 @@ from flexcal.cli.arguments.shared_options import (
     Numbers,
     Paths,
     Texts,
+    file_argument,
     require_robot,
 )
 from flexcal.cli.terminal.console import Console
@@ -38,10 +39,9 @@ class IdentifyResponse:
 
     source: Annotated[
         Positional[Paths],
-        arg(
-            metavar="ROBOT DIR | FILE...",
-            help="robot.yaml and the folder with plan.yaml and one joint log per recording; or records of any excitation",
-            help_behavior_hint="",
+        file_argument(
+            "ROBOT DIR | FILE...",
+            "robot.yaml and the folder with plan.yaml and one joint log per recording; or records of any excitation",
         ),
     ]
     out: Annotated[Path, arg(metavar="DIR")] = Path("responses")

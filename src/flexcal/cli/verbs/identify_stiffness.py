@@ -9,15 +9,15 @@ from tyro.conf import Positional, arg
 
 from flexcal.cli.arguments.invocation import command_line
 from flexcal.cli.arguments.shared_options import (
+    EstimatesFolder,
     Json,
-    MaybePath,
     Paths,
     Robot,
+    file_argument,
     require_at_least,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
-from flexcal.cli.arguments.suggested_commands import estimates_entry_hint
+from flexcal.cli.arguments.suggested_commands import stored_lines
 from flexcal.cli.terminal.console import Console
 
 _CHECK = "check that responses, payload and poses are of this robot, and the start values under `elastic:`"
@@ -38,11 +38,7 @@ class IdentifyStiffness:
     robot: Robot
     responses: Annotated[
         Positional[Paths],
-        arg(
-            metavar="RESPONSES...",
-            help="files of 'identify response', or their folder",
-            help_behavior_hint="",
-        ),
+        file_argument("RESPONSES...", "files of 'identify response', or their folder"),
     ]
     inertias_known: bool = False
     """Take link inertias as exact."""
@@ -52,8 +48,7 @@ class IdentifyStiffness:
     """Search for a start: multi-start with gradients, or differential evolution in place of the paper's genetic algorithm."""
     seed: Annotated[int, arg(metavar="N")] = 0
     """Seed of the search for a start."""
-    out: Annotated[MaybePath, arg(metavar="DIR", help_behavior_hint="(default: beside robot.yaml)")] = None
-    """Folder for report.html, results.json and estimates.yaml (then not beside robot.yaml); without it there is no report."""
+    out: EstimatesFolder = None
     json: Json = False
 
     def run(self) -> None:
@@ -61,8 +56,7 @@ class IdentifyStiffness:
         from flexcal.cli.tables.results import quantity_table
         from flexcal.jobs.stiffness import identify_robot_stiffness
 
-        require_robot(self.robot, *self.responses)
-        require_files(self.responses, "RESPONSES")
+        require_robot_and_files(self.robot, self.responses, "RESPONSES")
         require_at_least(0, seed=self.seed)
         console = Console(self.json)
         with console.progress() as progress:
@@ -102,8 +96,6 @@ class IdentifyStiffness:
         for remark in found.remarks:
             console.say(remark)
         console.say(found.trust.sentence)
-        console.say(f"wrote {found.estimates}")
-        if self.out is not None:
-            console.say(f"wrote {self.out / 'report.html'}")
-            console.say(estimates_entry_hint(self.robot, found.estimates))
+        for line in stored_lines(self.robot, found.estimates, self.out):
+            console.say(line)
         console.finish(document, f"flexcal design poses {self.robot} --count 40 --out poses.yaml")

@@ -14,8 +14,7 @@ from flexcal.cli.arguments.shared_options import (
     MaybePath,
     PoseFiles,
     Robot,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
 from flexcal.cli.terminal.console import Console
 
@@ -40,8 +39,7 @@ class Repeatability:
         from flexcal.cli.tables.results import repeatability_table
         from flexcal.jobs.accuracy import repeat_robot
 
-        require_robot(self.robot, *self.poses)
-        require_files(self.poses, "POSES")
+        require_robot_and_files(self.robot, self.poses, "POSES")
         console = Console(self.json)
         with console.progress() as progress:
             document = repeat_robot(

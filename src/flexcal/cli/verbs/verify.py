@@ -14,8 +14,7 @@ from flexcal.cli.arguments.shared_options import (
     MaybePath,
     PoseFiles,
     Robot,
-    require_files,
-    require_robot,
+    require_robot_and_files,
 )
 from flexcal.cli.arguments.suggested_commands import estimates_option
 from flexcal.cli.terminal.console import Console
@@ -46,8 +45,7 @@ class Verify:
         from flexcal.cli.tables.results import error_table, uncalibrated_rows
         from flexcal.jobs.accuracy import verify_robot
 
-        require_robot(self.robot, *self.poses)
-        require_files(self.poses, "POSES")
+        require_robot_and_files(self.robot, self.poses, "POSES")
         console = Console(self.json)
         with console.progress() as progress:
             found = verify_robot(

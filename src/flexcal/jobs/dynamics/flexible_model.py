@@ -15,8 +15,6 @@ from flexcal.model.robot import RobotModel
 
 _LARGEST_TILT = 0.1
 """rad"""
-_LARGEST_TILT = 0.1
-"""rad"""
 _KNOWING: tuple[EstimatorName, ...] = ("wls", "ols", "sdp", "irls")
 """Estimators that take any equations, those of motors too; the others are of rigid robots."""
 

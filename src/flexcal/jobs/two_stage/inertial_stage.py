@@ -11,6 +11,7 @@ from flexcal.estimation import Estimate
 from flexcal.files.formats import provenance, write_estimates
 from flexcal.jobs.dynamics import identify_inertials_from_recordings
 from flexcal.jobs.experiments import exciting_plan
+from flexcal.jobs.result_files import ESTIMATES
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress
 
@@ -26,5 +27,5 @@ def run_stage_zero(cell: Cell, nominal: RobotModel, out: Path, *, seed: int, pro
     estimate = identify_inertials_from_recordings(nominal, plan, cell.record(plan), progress)[1]
     origin = provenance([nominal.path, nominal.urdf, file], {"seed": seed})
     estimate = replace(estimate, provenance=origin)
-    write_estimates(out / "estimates.yaml", "dynamics", estimate)
+    write_estimates(out / ESTIMATES, "dynamics", estimate)
     return estimate

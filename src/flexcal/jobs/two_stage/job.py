@@ -43,6 +43,7 @@ from flexcal.jobs.experiments import (
 )
 from flexcal.jobs.pages import report_folder, two_stage_study
 from flexcal.jobs.result_files import (
+    ESTIMATES,
     VERIFICATION,
     write_arm,
     write_fitted_responses,
@@ -268,7 +269,7 @@ def _store(
     geometry: Estimate,
 ) -> Estimate:
     """Store both blocks of `out`/estimates.yaml with what they came from; the geometry with its provenance."""
-    path = out / "estimates.yaml"
+    path = out / ESTIMATES
     used: tuple[Block, ...] = () if options["inertias_known"] else ("dynamics",)
     origin = provenance([*robot, out / "frequency_plan.yaml", *responses], options, path, used)
     write_estimates(path, "stiffness", replace(stiffness, provenance=origin))

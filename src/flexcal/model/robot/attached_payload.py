@@ -4,17 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model.parts import Inertia, Payload, Point, parallel_axis
 from flexcal.model.robot.robot_model import RobotModel
-from flexcal.model.urdf import read_urdf
-
-if TYPE_CHECKING:
-    from flexcal.model.robot.robot_model import RobotModel
+from flexcal.model.urdf import Frame, read_urdf
 
 
 def last_frame(model: RobotModel) -> str:
@@ -30,11 +26,7 @@ def with_payload(
     `com` (3,) m and `inertia` (3, 3) kg m² about it are in that frame. Raises `InputError` for a frame that the URDF lacks or that no
     joint moves.
     """
-    frames = read_urdf(model.urdf, model.config.locked).frames
-    place = frames.get(frame)
-    if place is None or place.joint < 0:
-        moving = ", ".join(name for name, known in frames.items() if known.joint >= 0)
-        raise InputError(f"no joint of {model.urdf.name} moves a frame '{frame}'; name one of {moving}.")
+    place = _moving_frame(model, frame)
     held = Payload(frame, place.joint, place.rotation, place.translation, mass, 0.0, com, inertia)
     return replace(
         model,
@@ -77,14 +69,19 @@ def with_point_at_frame(model: RobotModel, frame: str) -> RobotModel:
         raise InputError(
             f"{model.path} declares a point '{frame}' that is not at the origin of the frame '{frame}'; rename it there, or give --target."
         )
-    frames = read_urdf(model.urdf, model.config.locked).frames
-    place = frames.get(frame)
-    if place is None or place.joint < 0:
-        moving = ", ".join(name for name, known in frames.items() if known.joint >= 0)
-        raise InputError(f"no joint of {model.urdf.name} moves a frame '{frame}'; give one of {moving}.")
+    place = _moving_frame(model, frame)
     point = Point(frame, frame, place.joint, place.rotation, place.translation, np.zeros(3))
     return replace(
         model,
         points=MappingProxyType({**model.points, frame: point}),
         point_error=np.vstack([model.point_error, np.zeros(3)]),
     )
+
+
+def _moving_frame(model: RobotModel, name: str) -> Frame:
+    frames = read_urdf(model.urdf, model.config.locked).frames
+    place = frames.get(name)
+    if place is None or place.joint < 0:
+        moving = ", ".join(other for other, known in frames.items() if known.joint >= 0)
+        raise InputError(f"no joint of {model.urdf.name} moves a frame '{name}'; name one of {moving}.")
+    return place
