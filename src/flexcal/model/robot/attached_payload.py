@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from flexcal.errors import FlexcalError, InputError
 from flexcal.model.parts import Inertia, Payload, Point, parallel_axis
-from flexcal.model.robot.robot_model import RobotModel
 from flexcal.model.urdf import Frame, read_urdf
+
+if TYPE_CHECKING:
+    from flexcal.model.robot.robot_model import RobotModel
 
 
 def last_frame(model: RobotModel) -> str:
