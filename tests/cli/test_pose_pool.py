@@ -17,7 +17,7 @@ POSES = 40
 def test_forty_poses_chosen_from_the_ur5_grid_calibrate_it(run, ur5_folder: Path) -> None:
     """The published line: rigid geometry, trained on 40 poses of our own exchange, mean at most 0.115 mm on the 960 others.
 
-    The criterion is the paper's, σ_min of ΘᵀΘ (P1 §5.2), not chosen for the result.
+    The criterion is the paper's, σ_min of ΘᵀΘ (Neubauer et al. 2015, §5.2), not chosen for the result.
     """
     robot, grid = ur5_folder / "robot.yaml", ur5_folder / "grid.csv"
     header, rows = read_csv(grid)

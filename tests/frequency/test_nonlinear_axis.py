@@ -83,7 +83,7 @@ def sidebands():
 
 
 def test_half_integer_reference_keeps_coulomb_sidebands_off_the_excited_lines(make_plan, sidebands):
-    """METHODS: scatter of G 0.095 at 2.125 Hz against 0.157 at 2.25 Hz, one Coulomb axis."""
+    """Scatter of G 0.095 at 2.125 Hz against 0.157 at 2.25 Hz, one Coulomb axis."""
     scatter = {}
     for frequency in (2.125, 2.25):
         plan = make_axis_plan(make_plan, frequency)

@@ -39,7 +39,7 @@ def test_gravity_torque_agrees_with_pinocchio(tx90l: RobotModel) -> None:
 
 
 def test_one_newton_step_from_the_undeflected_pose_is_close(tx90l: RobotModel) -> None:
-    """METHODS: one step of (12) from (14) lands within 4e-9 rad of rest."""
+    """One step of (12) from (14) lands within 4e-9 rad of rest."""
     arm = ElasticArm(tx90l, 0.0)
     rest = static_equilibrium(tx90l, Q, 0.0)
     axes = elastic_axes(tx90l)

@@ -27,7 +27,7 @@ def crooked(tx90l: RobotModel) -> RobotModel:
 
 
 def written_out(model: RobotModel, q: np.ndarray, deflection: np.ndarray) -> np.ndarray:
-    """The chain of FORMATS' parameters, one homogeneous matrix after the other."""
+    """The chain of the parameters of docs/file-formats.md, one homogeneous matrix after the other."""
 
     def matrix(rotation: np.ndarray, translation: np.ndarray) -> np.ndarray:
         result = np.eye(4)

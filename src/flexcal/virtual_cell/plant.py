@@ -1,7 +1,7 @@
 """The virtual robot: a MuJoCo model of the elastic arm, and the forces on it that are not MuJoCo's.
 
 MuJoCo does the multibody dynamics: mass matrix, gravity, Coriolis, the step. Springs with their dead band, dampers and motor friction
-are applied to it, so that the laws are those of METHODS (a dead band, tanh friction) and their rates lie at the right instant.
+are applied to it, so that the laws are those of the identified model (a dead band, tanh friction) and their rates lie at the right instant.
 """
 
 from __future__ import annotations

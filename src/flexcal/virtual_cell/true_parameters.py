@@ -20,7 +20,7 @@ _NOT_NEGATIVE = (".damping", ".backlash", ".viscous", ".coulomb")
 
 
 def draw_truth(model: RobotModel, spread: SpreadConfig, rng: np.random.Generator) -> dict[str, float]:
-    """Named true values (SI, FORMATS) of a robot around the nominal `model`.
+    """Named true values (SI units) of a robot around the nominal `model`.
 
     Drawn are link masses, centres of mass, rotor inertias, all geometric errors with tool and first station, half gaps of the joints
     that declare backlash, stiffness and damping of every spring; `model.with_values` gives the true robot, whose link inertias

@@ -1,4 +1,4 @@
-"""Stage 2: the geometry from measured points, with the elastic deflection taken into account (P1 §3 and §5)."""
+"""Stage 2: the geometry from measured points, with the elastic deflection taken into account (Neubauer et al. 2015, §3 and §5)."""
 
 from __future__ import annotations
 

@@ -29,7 +29,7 @@ _LEAST_LOAD = 1e-6
 
 
 def geometric_parameters(model: RobotModel, poses: PoseSet, terms: Sequence[str]) -> Parameters:
-    """The geometric parameters of some terms, starting at the model's values (P1 §3).
+    """The geometric parameters of some terms, starting at the model's values (Neubauer et al. 2015, §3).
 
     `kinematic`: a place for every station, and a rotation for all but the first, whose rotation the first joint's errors span; six
     errors for every joint that moves a measured target, six for the tool, three for each further target. `backlash`: the joints declared

@@ -46,7 +46,8 @@ def flat_multisine(
     seed: int,
     schedule: Schedule = PLAIN,
 ) -> MultisinePlan:
-    """Odd lines from 3 to 80 Hz of equal amplitude on every elastic axis in `poses` (P, n), both signs; P1 §4.1.3, Fig. 4.
+    """Odd lines from 3 to 80 Hz of equal amplitude on every elastic axis in `poses` (P, n), both signs; Neubauer et al. 2015, §4.1.3, Fig.
+    4.
 
     `reference` (rad) is the amplitude of the slow motion, `payload` in kg, None for the declared. The torque is 4 % of the drives' effort,
     root mean square. Raises `InputError` where robot.yaml declares no elastic joint or no controller.

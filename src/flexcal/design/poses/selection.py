@@ -149,7 +149,7 @@ def design_poses(
     checker: CollisionChecker | None = None,
     progress: Progress = silent,
 ) -> PoseDesign:
-    """Choose `count` of many random poses, or of a pool of given ones, by exchange (P1 §5.2).
+    """Choose `count` of many random poses, or of a pool of given ones, by exchange (Neubauer et al. 2015, §5.2).
 
     What counts as a candidate, and `working`, are as in `pose_candidates`. Their sensitivities to the geometric errors are reduced to
     what can be identified. Criteria: `c` the tool error predicted over the working poses; `A` the sum of the variances in units of the

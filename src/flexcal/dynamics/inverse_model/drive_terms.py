@@ -135,4 +135,4 @@ CLASSIC: tuple[DriveTerm, ...] = (
     Coupling(),
     JointSprings(),
 )
-"""The terms that the structural rank counts (FORMATS)."""
+"""The terms that the structural rank counts."""

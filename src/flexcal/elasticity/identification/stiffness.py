@@ -1,4 +1,4 @@
-"""Stage 1 (METHODS; Neubauer et al. 2015, §4.2): from frequency responses to the stiffness and damping of drives and bearings."""
+"""Stage 1 (Neubauer et al. 2015, §4.2): from frequency responses to the stiffness and damping of drives and bearings."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of the parameters of stage 1: those of FORMATS, and those that belong to one pose."""
+"""Names of the parameters of stage 1: those of estimates.yaml, and those that belong to one pose."""
 
 from __future__ import annotations
 

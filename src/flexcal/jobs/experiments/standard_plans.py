@@ -24,7 +24,8 @@ _LEAST = 0.5
 def frequency_plan(
     model: RobotModel, poses_file: Path, kind: Literal["default", "paper"], seed: int
 ) -> MultisinePlan:
-    """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°); P1 §4.1.3, Fig. 4.
+    """The plan `default` (payload as declared, 1.5° reference at 2.125 Hz) or `paper` (no payload, 3°); Neubauer et al. 2015, §4.1.3, Fig.
+    4.
 
     Odd lines from 3 to 80 Hz on f0 = 0.25 Hz, flat amplitudes, four realisations of four periods, two of them dropped, both signs. The
     excitation is lowered, on all axes alike, until its peaks no longer pull a drive with backlash across its gap against gravity.

@@ -1,4 +1,4 @@
-"""The documents for scripts (FORMATS: results.json), and their common blocks."""
+"""results.json: kinds, common blocks, writing and reading (docs/file-formats.md)."""
 
 from __future__ import annotations
 

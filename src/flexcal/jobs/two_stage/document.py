@@ -1,4 +1,4 @@
-"""The document and table of a two-stage run (FORMATS: results.json, verification.csv)."""
+"""The document and table of a two-stage run (results.json)."""
 
 from __future__ import annotations
 

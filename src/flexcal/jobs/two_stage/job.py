@@ -1,4 +1,6 @@
-"""The complete two-stage procedure: inertials, stiffness, pose selection, measurement, calibration, verification, report (P0, P1)."""
+"""The complete two-stage procedure: inertials, stiffness, pose selection, measurement, calibration, verification, report (Neubauer et al.
+2015).
+"""
 
 from __future__ import annotations
 

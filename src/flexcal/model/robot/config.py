@@ -1,4 +1,4 @@
-"""Content of robot.yaml, one frozen dataclass per block (FORMATS: robot.yaml)."""
+"""Content of robot.yaml, one frozen dataclass per block (docs/file-formats.md)."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Table of parameter names (FORMATS): attribute of `RobotModel` and unit of each."""
+"""Table of parameter names (docs/file-formats.md): attribute of `RobotModel` and unit of each."""
 
 from __future__ import annotations
 

@@ -42,9 +42,9 @@ _FIRST_MOMENTS = {"mc_x": 0, "mc_y": 1, "mc_z": 2}
 class RobotModel:
     """An immutable robot: structure from the URDF, and one array a kind of parameter (n joints, SI units).
 
-    Every number that can be identified has a name (FORMATS): `values` reads them all, `with_values` makes a changed robot. Setting a
-    link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first moment `mc_x`…
-    (mass times centre of mass, after the mass) moves that inertia rigidly.
+    Every number that can be identified has a name (docs/file-formats.md): `values` reads them all, `with_values` makes a changed robot.
+    Setting a link's or the payload's mass scales its inertia about the centre of mass with it; setting a link's `com_x`… or first moment
+    `mc_x`… (mass times centre of mass, after the mass) moves that inertia rigidly.
     """
 
     config: RobotConfig

@@ -1,4 +1,4 @@
-"""The verdict on a result, and its deciding checks (FORMATS: `verdict` of results.json)."""
+"""The verdict on a result, and its deciding checks (`verdict` of results.json)."""
 
 from __future__ import annotations
 
