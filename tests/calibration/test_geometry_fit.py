@@ -42,6 +42,7 @@ def test_noiseless_recovery(simulate: Callable, tx90l: RobotModel) -> None:
     elastic = {n: v for n, v in simulated.truth.items() if n.startswith("link_") or n.endswith(".stiffness")}
     fit = calibrate(tx90l.with_values(elastic), simulated.poses)
     assert fit.errors.max < 1e-6
+    assert str(fit.errors) in repr(fit) and "joint_2.offset" in fit.summary()
     expected = fit.estimate.regrouped(simulated.truth)
     for name in fit.identifiability.kept_names:
         np.testing.assert_allclose(fit.estimate.values[name], expected[name], atol=5e-6, err_msg=name)

@@ -49,6 +49,25 @@ class Calibration:
     ambiguous: np.ndarray
     terms: tuple[str, ...]
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {self.model.name}: {self.errors}>"
+
+    def summary(self) -> str:
+        """Errors at the poses of the fit and every identified parameter with its standard deviation, for people."""
+        rows = [
+            f"{item.name:<40} {self.estimate.values[item.name]:>12.5g} ± {std:<10.2g} {item.unit}"
+            for item in self.estimate.parameters
+            if (std := self.estimate.std(item.name)) is not None
+        ]
+        return "\n".join(
+            [
+                f"errors of the fit: {self.errors}",
+                f"terms: {', '.join(self.terms)}",
+                *rows,
+                self.estimate.message,
+            ]
+        )
+
     @property
     def errors(self) -> ErrorStatistics:
         """How far the calibrated robot is from the points it was fitted to."""

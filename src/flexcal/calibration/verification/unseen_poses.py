@@ -24,6 +24,7 @@ from flexcal.calibration.measurement import (
 )
 from flexcal.data.poses import PoseSet
 from flexcal.model.robot import RobotModel
+from flexcal.units import MILLIMETRE
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,6 +41,15 @@ class Verification:
     parameter_rms: np.ndarray
     scatter_rms: np.ndarray
     ambiguous: np.ndarray
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.all}>"
+
+    def summary(self) -> str:
+        """Errors, and how large they were predicted to be, for people."""
+        predicted = float(np.sqrt(np.mean(self.expected_rms**2))) / MILLIMETRE
+        observed = float(np.sqrt(np.mean(np.sum(self.errors**2, axis=1)))) / MILLIMETRE
+        return f"errors: {self.all}\nroot mean square {observed:.3f} mm, predicted {predicted:.3f} mm"
 
     @property
     def expected_rms(self) -> np.ndarray:
