@@ -20,9 +20,8 @@ from flexcal.jobs.calibration import RobotCalibration, calibrate_robot
 from flexcal.jobs.pages import report_folder
 from flexcal.jobs.pages.report import calibration_study
 from flexcal.jobs.result_files import read_arm, read_points
-from flexcal.report.layout import millimetres
-from flexcal.report.pages import CalibrationStudy, write_calibration_report
-from flexcal.report.pages.calibration import calibration_page
+from flexcal.report.layout import millimetres, write_page
+from flexcal.report.pages import CalibrationStudy, calibration_page
 
 COMMAND = "flexcal calibrate robot.yaml grid.csv --out fit"
 
@@ -64,7 +63,7 @@ def study(fit: RobotCalibration, folder: Path) -> CalibrationStudy:
 def test_calibration_report_is_complete(
     study: CalibrationStudy, fit: RobotCalibration, tmp_path: Path
 ) -> None:
-    write_calibration_report(tmp_path / "report.html", study)
+    write_page(tmp_path / "report.html", calibration_page(study))
     outline = Outline((tmp_path / "report.html").read_text("utf-8"))
     assert outline.unbalanced == []
     assert set(outline.figures()) == {
@@ -138,13 +137,13 @@ def test_without_a_selection_fresh_poses_are_asked_for(study: CalibrationStudy) 
 
 def test_outliers_are_listed(study: CalibrationStudy, tmp_path: Path) -> None:
     flagged = replace(study, estimate=replace(study.estimate, outliers=(3, 7)))
-    write_calibration_report(tmp_path / "report.html", flagged)
+    write_page(tmp_path / "report.html", calibration_page(flagged))
     words = Outline((tmp_path / "report.html").read_text("utf-8")).words
     assert "2 outliers, to which the robust loss gave hardly any weight" in words
 
 
 def test_nothing_to_see_is_not_blamed_on_a_kept_parameter(study: CalibrationStudy, tmp_path: Path) -> None:
-    write_calibration_report(tmp_path / "report.html", study)
+    write_page(tmp_path / "report.html", calibration_page(study))
     words = Outline((tmp_path / "report.html").read_text("utf-8")).words
     assert (
         "e−1"

@@ -9,8 +9,8 @@ import pytest
 from outline import Outline
 
 from flexcal.jobs.two_stage import TwoStageRun
-from flexcal.report.pages import StiffnessStudy, write_stiffness_report
-from flexcal.report.pages.stiffness import stiffness_page
+from flexcal.report.layout import write_page
+from flexcal.report.pages import StiffnessStudy, stiffness_page
 from flexcal.report.results import TwoStageStudy
 
 
@@ -28,7 +28,7 @@ def stiffness(study: TwoStageStudy) -> StiffnessStudy:
 def test_the_numbers_are_those_of_the_whole_report(
     stiffness: StiffnessStudy, simulated: TwoStageRun, report: Path, tmp_path: Path
 ) -> None:
-    write_stiffness_report(tmp_path / "report.html", stiffness)
+    write_page(tmp_path / "report.html", stiffness_page(stiffness))
     outline = Outline((tmp_path / "report.html").read_text("utf-8"))
     whole = Outline(report.read_text("utf-8")).figures()
     assert outline.unbalanced == []

@@ -21,8 +21,8 @@ from flexcal.jobs.pages import report_folder
 from flexcal.jobs.result_files import quantities
 from flexcal.jobs.two_stage import TwoStageRun
 from flexcal.model.robot import RobotModel
-from flexcal.report.layout import document_millimetres, millimetres, significant
-from flexcal.report.pages import write_two_stage_report
+from flexcal.report.layout import document_millimetres, millimetres, significant, write_page
+from flexcal.report.pages import two_stage_page
 from flexcal.report.results import TX90L_PAPER, TwoStageStudy
 
 MEBIBYTE = 1e6
@@ -209,7 +209,7 @@ def test_provenance_names_every_input_of_both_stages(outline: Outline, study: Tw
 def test_names_from_files_cannot_break_the_page(study: TwoStageStudy, tmp_path: Path) -> None:
     path = tmp_path / "odd.html"
     odd = "</script><script>alert(1)</script>"
-    write_two_stage_report(path, replace(study, results={**study.results, "command": odd, "note": odd}))
+    write_page(path, two_stage_page(replace(study, results={**study.results, "command": odd, "note": odd})))
     assert Outline(path.read_text("utf-8")).unbalanced == []
     assert odd not in path.read_text("utf-8")
 
@@ -217,7 +217,7 @@ def test_names_from_files_cannot_break_the_page(study: TwoStageStudy, tmp_path: 
 def test_a_place_that_cannot_be_written_leaves_nothing(study: TwoStageStudy, tmp_path: Path) -> None:
     (tmp_path / "report.html").mkdir()
     with pytest.raises(InputError):
-        write_two_stage_report(tmp_path / "report.html", study)
+        write_page(tmp_path / "report.html", two_stage_page(study))
     assert list(tmp_path.iterdir()) == [tmp_path / "report.html"]
 
 
@@ -247,8 +247,9 @@ def test_stage_zero_stands_beside_cad_alone(study: TwoStageStudy, tmp_path: Path
     }
     path = tmp_path / "report.html"
     results = {**study.results, **with_stage_zero}
-    write_two_stage_report(
-        path, replace(study, results=results, estimates={**study.estimates, "dynamics": found})
+    write_page(
+        path,
+        two_stage_page(replace(study, results=results, estimates={**study.estimates, "dynamics": found})),
     )
     section = path.read_text("utf-8")
     section = section[section.index('id="table-stage0-gain"') : section.index('id="provenance"')]
@@ -258,5 +259,5 @@ def test_stage_zero_stands_beside_cad_alone(study: TwoStageStudy, tmp_path: Path
     expected = float(np.sqrt(np.mean(study.verification.parameter_rms**2)))
     assert f"rms / mm 0.432 {millimetres(expected)}" in text
     assert "link_2.com_x mm 230 10.0 234 0.100" in text or "link_2.com_x mm 230 10.0 235 0.100" in text
-    write_two_stage_report(path, study)
+    write_page(path, two_stage_page(study))
     assert "table-stage0" not in path.read_text("utf-8")

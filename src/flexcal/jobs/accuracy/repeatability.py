@@ -34,7 +34,8 @@ from flexcal.jobs.inputs import (
 from flexcal.jobs.result_files import RunRecord, header, write_results
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.pages import RepeatabilityStudy, write_repeatability_report
+from flexcal.report.layout import write_page
+from flexcal.report.pages import RepeatabilityStudy, repeatability_page
 from flexcal.units import MILLIMETRE
 
 
@@ -190,7 +191,7 @@ def repeat_robot(
         document = result.document()
         write_results(out, document)
         study = RepeatabilityStudy(nominal.name, poses, visited, document)
-        write_repeatability_report(out / "report.html", study)
+        write_page(out / "report.html", repeatability_page(study))
     return result
 
 

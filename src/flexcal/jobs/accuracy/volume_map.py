@@ -39,7 +39,8 @@ from flexcal.jobs.inputs import (
 from flexcal.jobs.result_files import RunRecord
 from flexcal.progress import Progress, silent
 from flexcal.report.checks import Trust, prediction_checks
-from flexcal.report.pages import MapStudy, write_map_page
+from flexcal.report.layout import write_page
+from flexcal.report.pages import MapStudy, map_page
 from flexcal.units import MILLIMETRE
 
 _WORST = 5
@@ -202,7 +203,7 @@ def map_accuracy(
     page = MapStudy(model, found, box, result.document(), scale, study)
     if out != page_beside(out):
         _write_table(out, found)
-    write_map_page(page_beside(out), page)
+    write_page(page_beside(out), map_page(page))
     return result
 
 

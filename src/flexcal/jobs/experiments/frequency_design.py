@@ -36,7 +36,8 @@ from flexcal.jobs.inputs import robot_provenance
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.pages import FrequencyDesignStudy, write_frequency_page
+from flexcal.report.layout import write_page
+from flexcal.report.pages import FrequencyDesignStudy, frequency_page
 
 
 @dataclass(frozen=True, eq=False)
@@ -170,7 +171,7 @@ def plan_frequency_experiments(
     )
     write_plan(out, planned.plan)
     study = FrequencyDesignStudy(model, planned, flat, found.curve, found.document())
-    write_frequency_page(page_beside(out), study)
+    write_page(page_beside(out), frequency_page(study))
     return found
 
 

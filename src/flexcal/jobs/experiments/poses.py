@@ -27,7 +27,8 @@ from flexcal.jobs.inputs import robot_provenance
 from flexcal.jobs.result_files import NOT_RECORDED, RunRecord, identifiability_block
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.pages import PoseStudy, write_pose_page
+from flexcal.report.layout import write_page
+from flexcal.report.pages import PoseStudy, pose_page
 from flexcal.units import MILLIMETRE
 
 VERIFICATION = "verification"
@@ -186,4 +187,4 @@ def write_pose_plan(
     study = PoseStudy(model, plan.q, document)
     if working is not None:
         study = replace(study, working=working.points, box=working.box)
-    write_pose_page(page_beside(out), study)
+    write_page(page_beside(out), pose_page(study))

@@ -31,7 +31,8 @@ from flexcal.files.formats import provenance
 from flexcal.jobs.result_files import RunRecord
 from flexcal.model.robot import RobotModel
 from flexcal.progress import Progress, silent
-from flexcal.report.pages import write_trajectory_page
+from flexcal.report.layout import write_page
+from flexcal.report.pages import trajectory_page
 
 SEARCHES = 3
 ALIKE = 1.3
@@ -232,7 +233,7 @@ def plan_trajectories(
     designs = request.design(known, progress)
     timed = tuple(timed_motion(designs[0], number, rate_hz) for number in range(len(designs[0].plan)))
     found = DesignedTrajectories(designs, timed, rate_hz, assumed, out, RunRecord(origin, command))
-    write_trajectory_page(found.page, found.design, found.document())
+    write_page(found.page, trajectory_page(found.design, found.document()))
     for motion, (csv, ros) in zip(timed, found.timed_files, strict=True):
         motion.positions.write_csv(csv)
         motion.positions.write_ros(ros)

@@ -18,7 +18,8 @@ from flexcal.jobs.result_files import (
     read_results,
     read_verification,
 )
-from flexcal.report.pages import write_comparison
+from flexcal.report.layout import write_page
+from flexcal.report.pages import comparison_page
 from flexcal.report.results import Comparison, Run
 from flexcal.report.sections import common_origin
 
@@ -43,7 +44,7 @@ def compare_folders(first: Path, second: Path) -> dict[str, Any]:
             f"{first} is of the robot '{one.robot}', {second} of '{two.robot}'; compare two runs of one robot."
         )
     found = Comparison(one, two)
-    write_comparison(first / COMPARISON, found)
+    write_page(first / COMPARISON, comparison_page(found))
     return found.document()
 
 

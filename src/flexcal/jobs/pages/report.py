@@ -28,6 +28,7 @@ from flexcal.jobs.result_files import (
     read_results,
     read_verification,
 )
+from flexcal.report.layout import write_page
 from flexcal.report.pages import (
     CalibrationStudy,
     DynamicsStudy,
@@ -37,16 +38,16 @@ from flexcal.report.pages import (
     ResponseStudy,
     StiffnessStudy,
     VerificationStudy,
-    write_calibration_report,
-    write_dynamics_report,
-    write_excitation_report,
-    write_gains_report,
-    write_inertials_report,
-    write_payload_report,
-    write_response_report,
-    write_stiffness_report,
-    write_two_stage_report,
-    write_verification_report,
+    calibration_page,
+    dynamics_page,
+    excitation_page,
+    gains_page,
+    inertials_page,
+    payload_page,
+    response_page,
+    stiffness_page,
+    two_stage_page,
+    verification_page,
 )
 from flexcal.report.results import TX90L_PAPER, TwoStageStudy
 from flexcal.units import MILLIMETRE
@@ -67,33 +68,32 @@ def report_folder(folder: Path) -> Path:
     kind: Kind = results["kind"]
     try:
         if kind == "inertials":
-            write_inertials_report(path, InertialsStudy(results, _block(folder, "dynamics")))
+            page = inertials_page(InertialsStudy(results, _block(folder, "dynamics")))
         elif kind == "gains":
-            write_gains_report(path, results)
+            page = gains_page(results)
         elif kind == "payload":
-            payload = PayloadStudy(results, _block(folder, "payload"), read_predictions(folder))
-            write_payload_report(path, payload)
+            page = payload_page(PayloadStudy(results, _block(folder, "payload"), read_predictions(folder)))
         elif kind == "dynamics":
-            dynamics = DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder))
-            write_dynamics_report(path, dynamics)
+            page = dynamics_page(DynamicsStudy(results, _block(folder, "dynamics"), read_predictions(folder)))
         elif kind == "verification":
             points = read_points(folder, sigma=DEFAULT_SIGMA)
-            write_verification_report(path, VerificationStudy(results, points, read_arm(folder)))
+            page = verification_page(VerificationStudy(results, points, read_arm(folder)))
         elif kind == "calibration":
-            write_calibration_report(path, calibration_study(folder))
+            page = calibration_page(calibration_study(folder))
         elif kind == "demo":
-            write_two_stage_report(path, two_stage_study(folder))
+            page = two_stage_page(two_stage_study(folder))
         elif kind == "stiffness":
             stiffness = StiffnessStudy(results, _block(folder, "stiffness"), read_fitted_responses(folder))
-            write_stiffness_report(path, stiffness)
+            page = stiffness_page(stiffness)
         elif kind == "excitation":
-            write_excitation_report(path, ExcitationStudy(results, read_response_arrays(folder)))
+            page = excitation_page(ExcitationStudy(results, read_response_arrays(folder)))
         elif kind == "response":
-            write_response_report(path, ResponseStudy(results, _responses(folder, results)))
+            page = response_page(ResponseStudy(results, _responses(folder, results)))
         else:
             raise InputError(
                 f"{folder / RESULTS} holds no calibration, verification or identification; give the folder of one of these."
             )
+        write_page(path, page)
     except KeyError as problem:
         raise missing_key_error(folder, problem) from problem
     return path

@@ -1,21 +1,21 @@
-from .accuracy_map import MapStudy, write_map_page
-from .calibration import CalibrationStudy, calibration_checks, write_calibration_report
+from .accuracy_map import MapStudy, map_page
+from .calibration import CalibrationStudy, calibration_checks, calibration_page
 from .certificate import CertificateStudy, write_certificate
 from .customer import CustomerStudy, write_customer_report
-from .drive_gains import write_gains_report
-from .dynamics import DynamicsStudy, dynamics_checks, write_dynamics_report
-from .excitation import ExcitationStudy, write_excitation_report
-from .frequency_design import FrequencyDesignStudy, write_frequency_page
-from .frequency_response import ResponseStudy, write_response_report
-from .inertials import InertialsStudy, inertials_checks, write_inertials_report
-from .payload import PayloadStudy, write_payload_report
-from .pose_design import PoseStudy, write_pose_page
-from .repeatability import RepeatabilityStudy, write_repeatability_report
-from .run_comparison import write_comparison
-from .stiffness import StiffnessStudy, stiffness_checks, write_stiffness_report
-from .trajectory_design import write_trajectory_page
-from .two_stage import two_stage_checks, write_two_stage_report
-from .verification import VerificationStudy, verification_checks, write_verification_report
+from .drive_gains import gains_page
+from .dynamics import DynamicsStudy, dynamics_checks, dynamics_page
+from .excitation import ExcitationStudy, excitation_page
+from .frequency_design import FrequencyDesignStudy, frequency_page
+from .frequency_response import ResponseStudy, response_page
+from .inertials import InertialsStudy, inertials_checks, inertials_page
+from .payload import PayloadStudy, payload_page
+from .pose_design import PoseStudy, pose_page
+from .repeatability import RepeatabilityStudy, repeatability_page
+from .run_comparison import comparison_page
+from .stiffness import StiffnessStudy, stiffness_checks, stiffness_page
+from .trajectory_design import trajectory_page
+from .two_stage import two_stage_checks, two_stage_page
+from .verification import VerificationStudy, verification_checks, verification_page
 
 __all__ = [
     "CalibrationStudy",
@@ -33,27 +33,27 @@ __all__ = [
     "StiffnessStudy",
     "VerificationStudy",
     "calibration_checks",
+    "calibration_page",
+    "comparison_page",
     "dynamics_checks",
+    "dynamics_page",
+    "excitation_page",
+    "frequency_page",
+    "gains_page",
     "inertials_checks",
+    "inertials_page",
+    "map_page",
+    "payload_page",
+    "pose_page",
+    "repeatability_page",
+    "response_page",
     "stiffness_checks",
+    "stiffness_page",
+    "trajectory_page",
     "two_stage_checks",
+    "two_stage_page",
     "verification_checks",
-    "write_calibration_report",
+    "verification_page",
     "write_certificate",
-    "write_comparison",
     "write_customer_report",
-    "write_dynamics_report",
-    "write_excitation_report",
-    "write_frequency_page",
-    "write_gains_report",
-    "write_inertials_report",
-    "write_map_page",
-    "write_payload_report",
-    "write_pose_page",
-    "write_repeatability_report",
-    "write_response_report",
-    "write_stiffness_report",
-    "write_trajectory_page",
-    "write_two_stage_report",
-    "write_verification_report",
 ]

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from flexcal.report.layout import (
     document_millimetres,
     scaled,
     significant,
-    write_page,
 )
 from flexcal.report.sections import provenance_section, uncalibrated_table
 
@@ -41,11 +39,6 @@ class MapStudy:
     results: Mapping[str, Any]
     scale: ErrorScale | None = None
     verification: Verification | None = None
-
-
-def write_map_page(path: Path, study: MapStudy) -> None:
-    """Write the page of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, map_page(study))
 
 
 def map_page(study: MapStudy) -> Page:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from flexcal.calibration.diagnostics import GravityLoads
@@ -35,7 +34,6 @@ from flexcal.report.layout import (
     ratio,
     sentences,
     statistics_cells,
-    write_page,
 )
 from flexcal.report.pages.two_stage import HEADLINES
 from flexcal.report.results import IdentifiableParameters
@@ -76,11 +74,6 @@ class CalibrationStudy:
 def determined(results: Mapping[str, Any]) -> IdentifiableParameters:
     """Parameters of the calibrated model."""
     return IdentifiableParameters.stored(results["identifiability"]["selected"])
-
-
-def write_calibration_report(path: str | Path, study: CalibrationStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, calibration_page(study))
 
 
 def calibration_page(study: CalibrationStudy) -> Page:

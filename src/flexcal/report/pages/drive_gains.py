@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from flexcal.report.checks import Trust, gain_checks
@@ -17,7 +16,6 @@ from flexcal.report.layout import (
     Verdict,
     percent,
     significant,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
@@ -27,11 +25,6 @@ _HEADLINES: dict[Status, str] = {
     "bad": "These recordings determine no drive gain",
     "unknown": "Drive gains identified; whether they can be trusted cannot be judged",
 }
-
-
-def write_gains_report(path: str | Path, results: Mapping[str, Any]) -> None:
-    """Write the report of a results.json to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, gains_page(results))
 
 
 def gains_page(results: Mapping[str, Any]) -> Page:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path, PurePath
+from pathlib import PurePath
 from typing import Any
 
 from flexcal.dynamics.diagnostics import TorquePrediction
@@ -21,7 +21,7 @@ from flexcal.report.checks import (
     check_weight,
     check_weight_shares,
 )
-from flexcal.report.layout import Check, Fact, Page, Section, Status, Verdict, significant, write_page
+from flexcal.report.layout import Check, Fact, Page, Section, Status, Verdict, significant
 from flexcal.report.sections import (
     base_parameters_section,
     friction_section,
@@ -58,11 +58,6 @@ def held_out(results: Mapping[str, Any]) -> str:
     if found.get("logs"):
         return " and ".join(PurePath(log).name for log in found["logs"])
     return f"the last {100 * found['share']:.0f} % of every recording" if found.get("share") else ""
-
-
-def write_dynamics_report(path: str | Path, study: DynamicsStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, dynamics_page(study))
 
 
 def dynamics_page(study: DynamicsStudy) -> Page:

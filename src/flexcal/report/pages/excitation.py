@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from flexcal.report.layout import (
     sentences,
     significant,
     to_half_width,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
@@ -44,11 +42,6 @@ class ExcitationStudy:
 
     results: Mapping[str, Any]
     arrays: Mapping[str, np.ndarray]
-
-
-def write_excitation_report(path: str | Path, study: ExcitationStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, excitation_page(study))
 
 
 def excitation_page(study: ExcitationStudy) -> Page:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,6 @@ from flexcal.report.layout import (
     spring_label,
     tally,
     worst,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
@@ -49,11 +47,11 @@ class FrequencyDesignStudy:
     results: Mapping[str, Any]
 
 
-def write_frequency_page(path: str | Path, study: FrequencyDesignStudy) -> None:
-    """Write the page of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
+def frequency_page(study: FrequencyDesignStudy) -> Page:
+    """The page before it becomes HTML."""
     plan, results = study.planned.plan, study.results
     minutes = results["seconds_on_the_robot"] / 60
-    page = Page(
+    return Page(
         title=f"{study.model.name}: plan of the frequency experiments",
         subtitle=f"{len(plan.poses)} poses · {len(plan.lines)} lines from {plan.frequencies_hz[0]:g} to {plan.frequencies_hz[-1]:g} Hz · "
         f"{plan.realisations} realisations · {minutes:.0f} minutes on the robot",
@@ -66,7 +64,6 @@ def write_frequency_page(path: str | Path, study: FrequencyDesignStudy) -> None:
         ],
         document=results,
     )
-    write_page(path, page)
 
 
 def _verdict(study: FrequencyDesignStudy) -> Verdict:

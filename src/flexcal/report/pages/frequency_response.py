@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from flexcal.frequency.periodic import FrequencyResponse
 from flexcal.report.checks import Trust, limit_of, response_checks, worst_pose
-from flexcal.report.layout import NOTHING, Fact, Page, Section, Status, Table, Verdict, percent, write_page
+from flexcal.report.layout import NOTHING, Fact, Page, Section, Status, Table, Verdict, percent
 from flexcal.report.results import relative_to_diagonal
 from flexcal.report.sections import levels_block, provenance_section
 from flexcal.units import DEGREE
@@ -35,11 +34,6 @@ class ResponseStudy:
     def labels(self) -> tuple[str, ...]:
         """What a reader calls the poses."""
         return tuple(f"Pose {response.pose + 1}" for response in self.responses)
-
-
-def write_response_report(path: str | Path, study: ResponseStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, response_page(study))
 
 
 def response_page(study: ResponseStudy) -> Page:

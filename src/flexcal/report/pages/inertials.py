@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from flexcal.estimation import Estimate
@@ -20,7 +19,6 @@ from flexcal.report.layout import (
     Verdict,
     scaled,
     significant,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
@@ -38,11 +36,6 @@ class InertialsStudy:
 
     results: Mapping[str, Any]
     estimate: Estimate
-
-
-def write_inertials_report(path: str | Path, study: InertialsStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, inertials_page(study))
 
 
 def inertials_page(study: InertialsStudy) -> Page:

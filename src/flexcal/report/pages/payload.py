@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from flexcal.dynamics.diagnostics import TorquePrediction
@@ -21,7 +20,6 @@ from flexcal.report.layout import (
     Verdict,
     scaled,
     to_half_width,
-    write_page,
 )
 from flexcal.report.sections import provenance_section, recording_labels, signals_table, torque_blocks
 
@@ -45,11 +43,6 @@ class PayloadStudy:
     results: Mapping[str, Any]
     estimate: Estimate
     predictions: Sequence[TorquePrediction]
-
-
-def write_payload_report(path: str | Path, study: PayloadStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, payload_page(study))
 
 
 def payload_page(study: PayloadStudy) -> Page:

@@ -22,7 +22,6 @@ from flexcal.report.layout import (
     Verdict,
     significant,
     worst,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
@@ -39,11 +38,6 @@ class PoseStudy:
     results: Mapping[str, Any]
     working: np.ndarray | None = None
     box: np.ndarray | None = None
-
-
-def write_pose_page(path: Path, study: PoseStudy) -> None:
-    """Write the page of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, pose_page(study))
 
 
 def pose_page(study: PoseStudy) -> Page:

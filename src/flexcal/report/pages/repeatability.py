@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from flexcal.report.layout import (
     Verdict,
     document_millimetres,
     worst,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
@@ -42,11 +40,6 @@ class RepeatabilityStudy:
     poses: PoseSet
     visited: Sequence[PoseRepeatability]
     results: Mapping[str, Any]
-
-
-def write_repeatability_report(path: str | Path, study: RepeatabilityStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, repeatability_page(study))
 
 
 def repeatability_page(study: RepeatabilityStudy) -> Page:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
 
 import numpy as np
 
@@ -27,7 +26,6 @@ from flexcal.report.layout import (
     significant,
     statistics_cells,
     worst,
-    write_page,
 )
 from flexcal.report.layout import Block as PageBlock
 from flexcal.report.results import LEVEL, Comparison, Run
@@ -36,11 +34,6 @@ from flexcal.units import MILLIMETRE
 
 _FEW = 20
 _ANSWERS: dict[Status, str] = {"good": "Yes", "care": "With care", "bad": "No", "unknown": "Unknown"}
-
-
-def write_comparison(path: str | Path, found: Comparison) -> None:
-    """Write the page of `found` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, comparison_page(found))
 
 
 def comparison_page(found: Comparison) -> Page:

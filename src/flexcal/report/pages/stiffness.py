@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from flexcal.estimation import Estimate
 from flexcal.report.checks import Trust, check_response_bearings, check_responses, check_springs
-from flexcal.report.layout import Block, Check, Page, Section, Status, Text, Verdict, sentences, write_page
+from flexcal.report.layout import Block, Check, Page, Section, Status, Text, Verdict, sentences
 from flexcal.report.results import FittedResponse
 from flexcal.report.sections import provenance_section, response_blocks, spring_table, unseen_springs
 
@@ -33,11 +32,6 @@ class StiffnessStudy:
 def springs_of(estimate: Estimate, kind: str) -> tuple[str, ...]:
     """Names of all stiffnesses or dampings."""
     return tuple(name for name in estimate.parameters.names if name.endswith(f".{kind}"))
-
-
-def write_stiffness_report(path: str | Path, study: StiffnessStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, stiffness_page(study))
 
 
 def stiffness_page(study: StiffnessStudy) -> Page:

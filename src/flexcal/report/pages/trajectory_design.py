@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,16 +22,10 @@ from flexcal.report.layout import (
     significant,
     tally,
     worst,
-    write_page,
 )
 from flexcal.report.sections import provenance_section
 
 _INSTANTS = 400
-
-
-def write_trajectory_page(path: str | Path, design: TrajectoryDesign, document: Mapping[str, Any]) -> None:
-    """Write the page of a design to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, trajectory_page(design, document))
 
 
 def trajectory_page(design: TrajectoryDesign, document: Mapping[str, Any]) -> Page:

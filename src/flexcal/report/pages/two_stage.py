@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from flexcal.calibration.verification import CALIBRATED, RIGID
 from flexcal.report.checks import (
     Trust,
@@ -26,7 +24,6 @@ from flexcal.report.layout import (
     Verdict,
     millimetres,
     ratio,
-    write_page,
 )
 from flexcal.report.results import TwoStageStudy
 from flexcal.report.sections import (
@@ -56,11 +53,6 @@ _ROBOTS = {
     "virtual": "simulated robot, its truth known",
     "hard": "simulated robot, independent of the identified model",
 }
-
-
-def write_two_stage_report(path: str | Path, study: TwoStageStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, two_stage_page(study))
 
 
 def two_stage_page(study: TwoStageStudy) -> Page:

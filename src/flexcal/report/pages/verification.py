@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 from flexcal.calibration.error_model import ErrorStatistics
@@ -34,7 +33,6 @@ from flexcal.report.layout import (
     millimetres,
     sentences,
     statistics_cells,
-    write_page,
 )
 from flexcal.report.sections import (
     BEFORE_NOTE,
@@ -71,11 +69,6 @@ class VerificationStudy:
     def verification(self) -> Verification:
         """Prediction, errors and their predicted standard deviations."""
         return self.points.verification
-
-
-def write_verification_report(path: str | Path, study: VerificationStudy) -> None:
-    """Write the report of `study` to `path`, atomically; raises `InputError` where it cannot be written."""
-    write_page(path, verification_page(study))
 
 
 def verification_page(study: VerificationStudy) -> Page:
